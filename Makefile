@@ -6,7 +6,7 @@ PYTHON = .venv/bin/python
 TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 
 # what is read: pages and docstrings
-SPELLED = README.md CONTRIBUTING.md CHANGELOG.md docs files meshes modal rom coupling studies scripts vanedamp/__init__.py
+SPELLED = README.md CONTRIBUTING.md CHANGELOG.md docs files meshes modal rom coupling studies benchmarks paper scripts vanedamp/__init__.py
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all test-arithmetic test-last-bits test-versions check bench docs

@@ -23,6 +23,8 @@ from vanedamp.modal.algebra import symmetric_part
 Solve = Callable[[np.ndarray], np.ndarray]
 
 _RESTARTS = 100
+# residuals below this, relative to the largest eigenvalue of the shifted inverse, are the round-off of its solves
+_ROUND_OFF = 5e-14
 # directions are dropped below this share of their block, and made orthogonal once more below the other
 _DEPENDENT, _LOSING = 1e-14, 1e-6
 
@@ -49,7 +51,7 @@ def eigenpairs(
     solve      (K - shift M)^-1 applied to rows, or its inverse in a subspace, where the vectors then lie
     mass       (n, n) sparse, positive definite
     tolerance  of the residual of the shifted inverse, relative to its eigenvalue, in the norm of the mass: eigenvalues
-               have its square
+               have its square; not below the round-off of the largest one
     spare      that many more pairs, to the square root of the tolerance
 
     n must be greater than `directions(count + spare)`. Raises NotConvergedError.
@@ -64,10 +66,12 @@ def eigenpairs(
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
             residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
-            if len(values) == wanted and np.all(residuals <= limits * np.abs(values)):
+            size = np.abs(values)
+            converged = residuals <= np.maximum(limits[: len(values)] * size, _ROUND_OFF * size.max())
+            if len(values) == wanted and converged.all():
                 return shift + 1.0 / values, turns.T @ space.vectors[: len(turns)]
         space.restart(wanted + 2 * width)
-    raise NotConvergedError(f"{np.count_nonzero(residuals <= limits * np.abs(values))} of {wanted} modes converged")
+    raise NotConvergedError(f"{np.count_nonzero(converged)} of {wanted} modes converged")
 
 
 class _Space:

@@ -11,7 +11,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ReducedModel
-from vanedamp.studies.paper.figure_file import Structure
+from vanedamp.studies.demo.figure_file import Structure
 
 #: share of the structure's mass that the body has, and of the undamped amplitude that its gap has
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5

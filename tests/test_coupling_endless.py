@@ -10,8 +10,8 @@ from tests.tools.planar import open_run
 from tests.tools.processes import environment
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
-from vanedamp.coupling.methods.time_stepping import SteppedRun
-from vanedamp.coupling.numerics.codes import COUNTERS, DONE, PERIOD, SEGMENTS, STEPS
+from vanedamp.coupling.methods import time_stepping
+from vanedamp.coupling.numerics.codes import SEGMENTS, STEPS
 from vanedamp.coupling.planar import planar_run
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
@@ -80,24 +80,54 @@ def test_runs_of_sliders_return_now_and_then(resting):
     assert len(calls) >= 3
 
 
-class Stepping:
-    """A motion of some steps a period."""
+def stepped(method, body, steps, periods=3):
+    """A run of a stepping method, with events and samples."""
+    scene = validate(Scene, {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+        "excitation": {"frequency": 15.9, "force": 2.0},
+        "cavity": [{"name": "c", "gap": 1e-3} | ({"play": 1e-4} if body else {})],
+        "damper": [{"cavity": "c", "mass": 0.05, "friction": 0.3, "restitution": 0.6} | (body or {"normal_load": 0.1})],
+        "solver": {"steps_per_period": steps, "penetration": 0.5} | method,
+        "time": {"periods": periods, "transient": 0},
+    }, "scene")  # fmt: skip
+    return simulate(scene, events=True, samples_per_period=100)
 
-    def __init__(self, steps):
-        self.counters, self.deepest, self.steps, self.calls = np.zeros(COUNTERS, np.int64), np.zeros(1), steps, []
 
-    def march(self, motion, log, periods):
-        self.calls.append(periods - int(self.counters[PERIOD]))
-        self.counters[STEPS] += self.calls[-1] * self.steps
-        self.counters[PERIOD] = periods
-        return DONE
+BLOCK = {"shape": "block", "length": 8e-3, "height": 3e-3}
 
 
-@pytest.mark.parametrize(("steps", "calls"), [(1000, [1, 99]), (25_000, [1] + [4] * 24 + [3]), (200_000, [1] * 100)])
-def test_methods_with_steps_return_now_and_then(steps, calls):
-    motion = Stepping(steps)
-    assert SteppedRun(None, motion.march, motion, None, False).advance_to(100) is Status.OK
-    assert motion.calls == calls
+@pytest.mark.parametrize(
+    ("method", "body"),
+    [
+        ({"method": "moreau"}, {}), ({"method": "penalty"}, {}), ({"method": "penalty", "scheme": "hht"}, {}),
+        ({"method": "cosim", "substeps": 3}, {}), ({"method": "moreau"}, BLOCK), ({"method": "penalty"}, BLOCK),
+    ],
+    ids=["moreau", "penalty", "hht", "cosim", "moreau of a block", "penalty of a block"],
+)  # fmt: skip
+def test_a_period_of_many_steps_is_cut(method, body, monkeypatch):
+    """Cut anywhere within their periods, runs are the same."""
+    whole = stepped(method, body, 2000)
+    monkeypatch.setattr(time_stepping, "_SLICE", 1234)
+    lengths, march = [], time_stepping.SteppedRun.advance_to
+
+    def watched(run, periods):
+        inner = run.march
+
+        def count(motion, log, until):
+            lengths.append(until - int(motion.counters[STEPS]))
+            return inner(motion, log, until)
+
+        run.march = count
+        return march(run, periods)
+
+    monkeypatch.setattr(time_stepping.SteppedRun, "advance_to", watched)
+    cut = stepped(method, body, 2000)
+    assert len(lengths) > 6
+    assert max(lengths) <= 1234
+    assert whole.counters["impacts"] > 0
+    for name in ("peak", "section", "time", "displacement"):
+        np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name))
+    assert list(cut.event_list) == list(whole.event_list)
 
 
 _GIVEN_UP = """

@@ -15,6 +15,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from benchmarks.methods import charts, figures
+from benchmarks.methods.scenes import charted
+from benchmarks.rows import Rows
 from tests.test_studies_extension import ROOT, install
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import Variant
@@ -28,9 +31,6 @@ from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import InputError, Positive, validate
-from vanedamp.studies.bench.methods import charts, figures
-from vanedamp.studies.bench.methods.scenes import charted
-from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.commands.support.budget import check_run
 
 # -- the method
@@ -298,7 +298,7 @@ def test_what_it_cannot_do_is_refused():
 
 def test_appears_in_the_chart(tmp_path, monkeypatch):
     """Measured like ours, and drawn: in the legend with its own marks, beside all that did not fail."""
-    effort = charts.Effort(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
+    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
     measured = charts.Chart("one body", scene, True, effort)
     chart = measured.measure(Rows(tmp_path, "work-precision", {}, measured.rows()), 0)
     ours = {(point["method"], point["setting"]): point for point in chart["points"]}

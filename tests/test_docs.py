@@ -24,9 +24,9 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.external_model import External
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parser, main
-from vanedamp.studies.demo import EFFORT
+from vanedamp.studies.demo.demo import EFFORT
+from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.optimisation.study import Study
-from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 from vanedamp.studies.pipeline.tables import PipelineFile
 
 DOCS = ROOT / "docs"
@@ -188,7 +188,7 @@ def program(page: str, word: str) -> str:
 def test_program_of_the_readme(tmp_path):
     """On the scene that `make demo` leaves, with its effort."""
     structure = Structure(0.157, 0.157 * (2 * np.pi * 2412.0) ** 2, 0.002, 2412.0, 70e-6, Path("rom.h5"))
-    scene = PaperFigure.load("fig10", structure, EFFORT).scenes["single"]
+    scene = FigureScenes.load(FOLDER / "fig10.toml", structure, EFFORT).scenes["single"]
     (tmp_path / "out").mkdir()
     scene.save(tmp_path / "out" / "fig10_single.toml")
     status, *printed = run(program("README.md", "simulate"), tmp_path).replace("[", "").replace("]", "").split()

@@ -17,14 +17,15 @@ from tests.tools.schemas import faults, kind_of, shipped_schema
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.reference import options
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.studies.demo import RIGID_FIGURES
+from vanedamp.studies.demo.demo import FIGURES, RIGID_FIGURES
+from vanedamp.studies.demo.figure_file import FigureScenes, Structure
 from vanedamp.studies.file_kinds import KINDS
-from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 
 SHIPPED = [
     *sorted((ROOT / "docs" / "examples").glob("*.toml")),
-    ROOT / "studies" / "case" / "demo_case.toml",
-    *(ROOT / "studies" / "paper" / "scenes" / name for name in ("case.toml", "blade.toml")),
+    ROOT / "benchmarks" / "cluster_case.toml",
+    ROOT / "studies" / "demo" / "scenes" / "case.toml",
+    ROOT / "paper" / "scenes" / "blade.toml",
 ]
 
 
@@ -67,7 +68,7 @@ def test_shipped_files(path):
 
 @pytest.mark.parametrize("name", RIGID_FIGURES)
 def test_scenes_of_the_paper_s_figures(name):
-    for scene in PaperFigure.load(name, Structure.shipped()).scenes.values():
+    for scene in FigureScenes.load(FIGURES[name].file, Structure.shipped()).scenes.values():
         assert faults("scene", scene.to_dict()) == []
 
 

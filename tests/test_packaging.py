@@ -11,8 +11,8 @@ import pytest
 from tests.tools.input_files import DAMPED_BLOCK
 from vanedamp.studies.case.stages import assemble, modal_analysis
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.demo import run_demo
-from vanedamp.studies.paper.figure_file import FOLDER, Structure
+from vanedamp.studies.demo.demo import run_demo
+from vanedamp.studies.demo.figure_file import FOLDER, Structure
 
 ROOT = Path(__file__).parent.parent
 PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -59,6 +59,11 @@ def test_packages_hold_the_project_and_run_without_a_checkout(tmp_path):
     tracked_files = set(tracked.split("\0"))
     assert {f"vanedamp/{path}" for path in shipped if str(path) in tracked_files} <= held
     assert {name.split("/")[0].split("-")[0] for name in held} == {"vanedamp"}
+    assert {name.split("/")[1] for name in held if name.startswith("vanedamp/")} == {
+        *PARTS,
+        "__init__.py",
+        "__main__.py",
+    }
     fresh = tmp_path / "fresh"
     subprocess.run([sys.executable, "-m", "venv", str(fresh)], check=True)
     install = [str(fresh / "bin" / "pip"), "install", "--quiet", str(wheel)]
@@ -66,6 +71,10 @@ def test_packages_hold_the_project_and_run_without_a_checkout(tmp_path):
     command = str(fresh / "bin" / "vanedamp")
     ran = subprocess.run([command, "demo", "--rigid", "-o", "out"], cwd=tmp_path, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
+    for evidence in ("bench", "paper"):
+        refused = subprocess.run([command, evidence, "--help"], cwd=tmp_path, capture_output=True, text=True)
+        assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+        assert "run it in a checkout" in refused.stderr
     assert (tmp_path / "out" / "report.html").is_file()
     (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
     refused = subprocess.run([command, "modal", "case.toml"], cwd=tmp_path, capture_output=True, text=True)

@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.bodies.measure import AMPLITUDE, MASS, NATURAL, STIFFNESS
+from benchmarks.model_order.body_trial import body_trial_text, draw, judge_trial, summary
+from benchmarks.model_order.figures import bodies_figure
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.model_order.body_choice import judge, judge_all, with_blocks, with_sliders
@@ -18,9 +21,6 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.store import frozen, load
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.bench.bodies.measure import AMPLITUDE, MASS, NATURAL, STIFFNESS
-from vanedamp.studies.bench.model_order.body_trial import draw, judge_trial, print_body_trial, summary
-from vanedamp.studies.bench.model_order.figures import bodies_figure
 from vanedamp.studies.cli import main
 
 #: gravity in the unit of the undamped peak's acceleration
@@ -309,7 +309,7 @@ def test_trial_of_the_choice(tmp_path, capsys):
     result = summary(verdicts) | {"periods": 600}
     assert [row["number"] for row in result["tolerances"]] == [2, 2]
     bodies_figure(result, tmp_path / "bodies.png")
-    print_body_trial(json.loads(json.dumps(result)))
+    print(*body_trial_text(json.loads(json.dumps(result))), sep="\n")
     assert "2 of 2 within" in capsys.readouterr().out
 
 

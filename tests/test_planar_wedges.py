@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
-from vanedamp.coupling.numerics.codes import OPEN
+from tests.tools.planar_laws import check_laws, tables
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, OPEN
 from vanedamp.coupling.planar.constraints import CEILING, FLOOR, PlanarMotion
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
@@ -149,3 +150,30 @@ def newton(system, contacts, before):
         if fits:
             return impulse
     return None
+
+
+@pytest.mark.parametrize(("seed", "law", "largest"), [
+    pytest.param(301063, "newton", 1e-12, id="a block between floor and ceiling stops the structure"),
+    pytest.param(301325, "newton", 1e-12, id="two wedged blocks: forces exist beside contacts that slip"),
+    pytest.param(22, "newton", 1e-2, id="a slip of round-off turns by the loads"),
+    pytest.param(22, "poisson", 1e-2, id="compression of a wedge, with speeds of round-off"),
+])  # fmt: skip
+def test_wedges_do_not_turn_on_last_bits(seed, law, largest):
+    """Copies with perturbed data obey the laws of contact and end with a result, whatever the data's last bits are.
+
+    Impulses of 300 momenta nearly balance each other in the first scene, forces of 100 loads in the second.
+    """
+    for copy in range(8):
+        rng = np.random.default_rng([seed, copy])
+        data = perturbed(tables(seed), largest * 10.0 ** rng.uniform(-3, 0), rng)
+        _, code = check_laws(seed, data=data | {"contact": {"law": law}})
+        assert code in (DONE, EVENT_BUDGET)
+
+
+def perturbed(data, size, rng):
+    """Data of a scene with numbers that differ by up to this share."""
+    if isinstance(data, dict):
+        return {key: perturbed(value, size, rng) for key, value in data.items()}
+    if isinstance(data, list):
+        return [perturbed(value, size, rng) for value in data]
+    return data * (1.0 + size * rng.uniform(-1, 1)) if isinstance(data, float) else data

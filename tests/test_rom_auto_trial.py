@@ -1,16 +1,16 @@
 """The automatic choice on scenes that nothing was settled on: is the error it promises kept?
 
-The truth is the response of the whole model, over periods and starts (studies.bench.model_order.trial); `vanedamp
+The truth is the response of the whole model, over periods and starts (benchmarks.model_order.trial); `vanedamp
 bench ladder` adds what the models cost.
 """
 
 import numpy as np
 import pytest
 
+from benchmarks.model_order import trial as auto_choice
+from benchmarks.model_order.scenes import SEED, chain_trial, trials
+from benchmarks.model_order.structures import beam_model, rod_model
 from vanedamp.coupling.model_order.selection import select_model_order
-from vanedamp.studies.bench.model_order import trial as auto_choice
-from vanedamp.studies.bench.model_order.scenes import SEED, chain_trial, trials
-from vanedamp.studies.bench.model_order.structures import beam_model, rod_model
 
 
 def test_models_of_rod_and_beam():

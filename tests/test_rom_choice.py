@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.model_order.structures import beam_model
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
@@ -17,7 +18,6 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.reduction import reduce
-from vanedamp.studies.bench.model_order.structures import beam_model
 from vanedamp.studies.cli import main
 
 

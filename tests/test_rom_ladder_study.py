@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from vanedamp.studies.bench.model_order.bar_on_wall import GAP, GRAVITY, LENGTH, MODULUS, PERIOD, bar, bounce
+from benchmarks.model_order.bar_on_wall import GAP, GRAVITY, LENGTH, MODULUS, PERIOD, bar, bounce
 from vanedamp.studies.cli import main
 
 

@@ -6,21 +6,21 @@ import json
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
-from vanedamp.studies.bench.engine import scenes as bench_scenes
-from vanedamp.studies.bench.engine.hand_written_loop import (
+from benchmarks.engine import scenes as bench_scenes
+from benchmarks.engine.hand_written_loop import (
     ACCOUNT,
     ImpactOscillator,
     complete_loop,
     lean_loop,
     plain_loop,
 )
-from vanedamp.studies.bench.engine.measure import Effort, print_summary, run_bench
-from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
+from benchmarks.engine.measure import Engine
+from benchmarks.engine.reference_solutions import solve_with_events, truth
+from vanedamp.coupling.engine import simulate
 from vanedamp.studies.cli import BAD_INPUT, main
 
 PERIODS = 20
-TINY = Effort(
+TINY = Engine(
     rounds=2, settle=2000, checked=PERIODS, engine=(50, 150), loop=100, solver=3, modes=(1, 6), calm=(20, 60),
     hard=(20, 60),
 )  # fmt: skip
@@ -97,7 +97,7 @@ def test_more_modes_keep_the_first(tmp_path):
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys):
-    result = run_bench(tmp_path / "bench", TINY)
+    result = TINY.run(tmp_path / "bench")
     written = json.loads((tmp_path / "bench" / "bench_engine.json").read_text())
     assert written == json.loads(json.dumps(result))
     assert set(result) == {"machine", "seed", "effort", "one_mode", "modes", "bodies", "costs", "wall_time_s"}
@@ -116,7 +116,7 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert {row["part"] for row in rows} >= {"one mode", "bodies", "costs", "modes, free"}
     for name in ("bench_one_mode.png", "bench_scaling.png"):
         assert (tmp_path / "bench" / name).read_bytes().startswith(b"\x89PNG")
-    print_summary(result)
+    TINY.print_summary(result)
     assert "engine / lean loop" in capsys.readouterr().out
 
 

@@ -5,12 +5,13 @@ import json
 
 from PIL import Image
 
-from vanedamp.studies.bench.bodies import methods
-from vanedamp.studies.bench.bodies.measure import Effort, print_summary, run_bodies
+from benchmarks.bodies import methods
+from benchmarks.bodies.measure import Bodies
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys):
-    result = run_bodies(tmp_path, Effort((0.985, 1.0), 60, 30))
+    bench = Bodies((0.985, 1.0), 60, 30)
+    result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_bodies.json").read_text())["points"] == result["points"]
     with (tmp_path / "bench_bodies.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -21,12 +22,13 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     for name in ("bench_bodies.png", "bench_bodies_motion.png"):
         with Image.open(tmp_path / name) as picture:
             assert picture.size[0] > 1000
-    print_summary(result)
+    bench.print_summary(result)
     assert "time a period and impact" in capsys.readouterr().out
 
 
 def test_benchmark_of_methods_leaves_its_results(tmp_path, capsys):
-    result = methods.run_methods(tmp_path, methods.Effort(3, (500, 8000), (), (1e-8,), 4, 1))
+    bench = methods.BlockMethods(3, (500, 8000), (), (1e-8,), 4, 1)
+    result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_bodies_methods.json").read_text())["points"] == result["points"]
     errors = {(row["method"], row["friction"], row["setting"]): row["error"] for row in result["points"]}
     assert errors["exact engine", 0.4, 0] < 1e-8
@@ -35,5 +37,5 @@ def test_benchmark_of_methods_leaves_its_results(tmp_path, capsys):
     assert "sliders only" in result["absent"]["penalty, HHT"]
     with Image.open(tmp_path / "bench_bodies_methods.png") as picture:
         assert picture.size[0] > 1000
-    methods.print_methods(result)
+    bench.print_summary(result)
     assert "ratio" in capsys.readouterr().out

@@ -7,9 +7,9 @@ import math
 import pytest
 from PIL import Image
 
+from benchmarks.doubling import measure
+from benchmarks.doubling.measure import Doubling
 from tests.reference.orbit_upright_body import UprightBody
-from vanedamp.studies.bench.doubling import measure
-from vanedamp.studies.bench.doubling.measure import Effort, print_summary, run_doubling
 
 
 def test_the_doubling_is_that_of_forty_digits():
@@ -27,7 +27,8 @@ def test_the_doubling_is_that_of_forty_digits():
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys):
-    result = run_doubling(tmp_path, Effort((100, 1000), 600, 6, 5, (100, 200)))
+    bench = Doubling((100, 1000), 600, 6, 5, (100, 200))
+    result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_doubling.json").read_text())["points"] == result["points"]
     with (tmp_path / "bench_doubling.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -44,5 +45,5 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert all(1e-4 < fine[method] < coarse[method] for method in measure.METHODS)
     with Image.open(tmp_path / "bench_doubling.png") as picture:
         assert picture.size[0] > 1000
-    print_summary(result)
+    bench.print_summary(result)
     assert "multiplier -1" in capsys.readouterr().out

@@ -6,16 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from vanedamp.studies.bench.modes import measure as bench_modal
-from vanedamp.studies.bench.modes.measure import Effort, print_summary, run_bench
+from benchmarks.apart import apart
+from benchmarks.modes import measure as bench_modal
+from benchmarks.modes.measure import Modal
 
-TINY = Effort(sizes=(0.008,), rounds=1, limit=120.0)
+TINY = Modal(sizes=(0.008,), rounds=1, limit=120.0)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "out"
-    run_bench(folder, TINY)
+    TINY.run(folder)
     return folder
 
 
@@ -38,7 +39,7 @@ def test_table_and_figure(folder, capsys):
         rows = list(csv.DictReader(stream))
     assert [row["solver"] for row in rows][:2] == ["assembly", "block Lanczos, CHOLMOD"]
     assert (folder / "bench_modal.png").read_bytes().startswith(b"\x89PNG")
-    print_summary(json.loads((folder / "bench_modal.json").read_text()))
+    TINY.print_summary(json.loads((folder / "bench_modal.json").read_text()))
     assert "degrees of freedom" in capsys.readouterr().out
 
 
@@ -55,18 +56,18 @@ def test_solvers_that_need_less_time_are_named(ratio, told, folder, capsys):
     for other in entry["ratio"].values():
         other["modes"] = 0.5
     entry["ratio"]["superlu"]["modes"] = ratio
-    print_summary(result | {"ahead": bench_modal._ahead(result["sizes"])})
+    TINY.print_summary(result | {"ahead": bench_modal._ahead(result["sizes"])})
     assert capsys.readouterr().out.splitlines()[-1].startswith(told)
 
 
-OURS = bench_modal.OURS
+OURS, WORKER = bench_modal.OURS, bench_modal._WORKER
 SOLVERS = [OURS, "superlu", "superlu_default"]
 
 
 def faked(calls, stop_at=None):
     """Measurements without work: the default SuperLU takes 5.4 times the best's time, the other fails at size two."""
 
-    def process(_limit, task, *files):
+    def process(_module, task, *files, limit):
         calls.append(task)
         if len(calls) == stop_at:
             raise KeyboardInterrupt
@@ -89,8 +90,8 @@ def three(monkeypatch, tmp_path):
     monkeypatch.setattr(bench_modal, "build", lambda *_: None)
 
     def run(process, folder):
-        monkeypatch.setattr(bench_modal, "_process", process)
-        return run_bench(tmp_path / folder, Effort((0.004, 0.003), 3, 100.0))
+        monkeypatch.setattr(bench_modal, "apart", process)
+        return Modal((0.004, 0.003), 3, 100.0).run(tmp_path / folder)
 
     return run
 
@@ -126,5 +127,5 @@ def test_stopped_it_goes_on_to_the_same_results(stop_at, three, tmp_path):
 
 
 def test_what_takes_too_long_is_told():
-    assert bench_modal._process(0.01, "assemble", "none.msh", "none.npz") == {"status": "more than 0.01 s"}
-    assert "no such mesh file" in bench_modal._process(60.0, "assemble", "none.msh", "none.npz")["status"]
+    assert apart(WORKER, "assemble", "none.msh", "none.npz", limit=0.01) == {"status": "more than 0.01 s"}
+    assert "no such mesh file" in apart(WORKER, "assemble", "none.msh", "none.npz", limit=60.0)["status"]

@@ -5,14 +5,16 @@ import json
 
 import pytest
 
-from vanedamp.studies.bench.reduction import measure as bench
-from vanedamp.studies.bench.reduction.measure import Effort, print_summary, run_bench
+from benchmarks.reduction import measure as bench
+from benchmarks.reduction.measure import Reduction
+
+TINY = Reduction((0.012,), 1, 600.0)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "out"
-    run_bench(folder, Effort((0.012,), 1, 600.0))
+    TINY.run(folder)
     return folder
 
 
@@ -37,12 +39,12 @@ def test_table_and_summary(folder, capsys):
     with (folder / "bench_reduction.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [row["task"] for row in rows] == list(bench.NAMES)
-    print_summary(json.loads((folder / "bench_reduction.json").read_text()))
+    TINY.print_summary(json.loads((folder / "bench_reduction.json").read_text()))
     assert "12 interface coordinates, 30 modes" in capsys.readouterr().out
 
 
 def test_trouble_is_a_status(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(bench, "_size", lambda *_: {"status": "killed (out of memory?)"})
-    print_summary(run_bench(tmp_path, Effort((0.012,), 1, 600.0)))
+    TINY.print_summary(TINY.run(tmp_path))
     assert "element size 0.012 m: killed" in capsys.readouterr().out
     assert (tmp_path / "bench_reduction.csv").read_text().count("\n") == 1

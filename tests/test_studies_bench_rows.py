@@ -7,18 +7,19 @@ import sys
 
 import pytest
 
+from benchmarks import rows as bench_rows
+from benchmarks.rows import Contest, Rows
+from benchmarks.tables import seconds_text, table
 from tests.tools.processes import environment
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.bench import rows as bench_rows
-from vanedamp.studies.bench.rows import Contest, Rows
-from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.terminal import duration
 
 BENCHMARK = """
 import os, signal, sys
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from vanedamp.files.store import write_json
-from vanedamp.studies.bench.rows import Rows
+from benchmarks.benchmark import Benchmark, Row
 from vanedamp.studies.figures import save, subplots
 
 folder, order = Path(sys.argv[1]), Path(sys.argv[2])
@@ -30,16 +31,32 @@ def measured(number):
     if number == 3 and order.exists():
         order.unlink()
         os.kill(os.getpid(), signal.SIGKILL)
-    return {"square": number**2, "root": number**0.5, "pair": (1, 2)}
+    return {"square": number**2, "root": number**0.5, "pair": (1, 2), "none": float("nan")}
 
 
-rows = Rows(folder, "squares", {"rounds": 1}, {str(number): 0.01 for number in range(1, 6)})
-found = [rows.take(str(n), lambda n=n: measured(n), tell=lambda row: f"square {row['square']}") for n in range(1, 6)]
-write_json(folder / "bench_squares.json", found)
-figure, axes = subplots(size=(3, 2))
-axes.plot([row["root"] for row in found])
-save(figure, folder / "bench_squares.png")
-rows.finish()
+@dataclass(frozen=True)
+class Squares(Benchmark):
+    last: int
+    NAME, CLOCK, COLUMNS = "squares", "none", ("square", "root")
+
+    def rows(self, folder):
+        tell = lambda row: f"square {row['square']}"
+        return {str(n): Row(0.01, partial(measured, n), tell) for n in range(1, self.last + 1)}
+
+    def result(self, values):
+        return {"points": list(values.values())}
+
+    def draw(self, result, folder):
+        figure, axes = subplots(size=(3, 2))
+        axes.plot([row["root"] for row in result["points"]])
+        save(figure, folder / "bench_squares.png")
+
+    def summary(self, result):
+        yield f"{len(result['points'])} squares"
+
+
+squares = Squares(5)
+squares.print_summary(squares.run(folder))
 """
 
 
@@ -69,11 +86,21 @@ def test_killed_in_the_middle_it_goes_on_to_the_same_files(tmp_path):
     assert [row["name"] for row in json.loads((stopped / "bench_squares.partial").read_text())] == ["1", "2"]
     again = run(stopped, order)
     assert again.returncode == 0, again.stderr
-    assert ["kept" in line for line in again.stdout.splitlines()[1:]] == [True, True, False, False, False]
+    assert ["kept" in line for line in again.stdout.splitlines()[1:-1]] == [True, True, False, False, False]
     assert (stopped.parent / "measured").read_text() == "123345"
-    assert {file.name for file in stopped.iterdir()} == {"bench_squares.json", "bench_squares.png"}
-    for file in whole.iterdir():
-        assert (stopped / file.name).read_bytes() == file.read_bytes()
+    assert again.stdout.splitlines()[-1] == "5 squares"
+    assert {file.name for file in stopped.iterdir()} == {f"bench_squares.{ending}" for ending in ("json", "csv", "png")}
+    for ending in ("csv", "png"):
+        assert (stopped / f"bench_squares.{ending}").read_bytes() == (whole / f"bench_squares.{ending}").read_bytes()
+    made, other = (json.loads((where / "bench_squares.json").read_text()) for where in (stopped, whole))
+    assert made["points"] == other["points"] and made["points"][3] == {
+        "square": 16, "root": 2.0, "pair": [1, 2], "none": None,
+    }  # fmt: skip
+    assert made["effort"] == {"last": 5} and made["machine"]["clock"] == "none" and made["wall_time_s"] > 0
+    assert (whole / "bench_squares.csv").read_text().split() == [
+        "square,root",
+        *(f"{n**2},{n**0.5}" for n in range(1, 6)),
+    ]
 
 
 def taken(folder, inputs, measured):

@@ -8,8 +8,8 @@ import sys
 import pytest
 from PIL import Image
 
-from vanedamp.studies.bench.start import measure
-from vanedamp.studies.bench.start.measure import Effort, imports_of, print_summary, run_start, small_scene
+from benchmarks.start import measure
+from benchmarks.start.measure import Start, imports_of, small_scene
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,8 @@ def test_commands_import_nothing_that_they_do_not_use(arguments, tmp_path):
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys):
-    result = run_start(tmp_path, Effort(2, compile=False))
+    bench = Start(2, compile=False)
+    result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_start.json").read_text())["ratio"] == result["ratio"]
     with (tmp_path / "bench_start.csv").open(newline="") as stream:
         rows = {row["what"] for row in csv.DictReader(stream)}
@@ -40,7 +41,7 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert result["ratio"][measure.UNIT] == {"median": 1.0, "low": 1.0, "high": 1.0}
     with Image.open(tmp_path / "bench_start.png") as picture:
         assert picture.size[0] > 1000
-    print_summary(result)
+    bench.print_summary(result)
     assert "vanedamp run" in capsys.readouterr().out
 
 

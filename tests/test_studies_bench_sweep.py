@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.sweep.measure import SweepScaling, _efficiency
+from benchmarks.sweep.simulation import Costs, simulated
+from benchmarks.sweep.worker import Job, measure, scene
 from vanedamp.coupling.sweep.grid import grid
-from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, print_summary, run_bench
-from vanedamp.studies.bench.sweep.simulation import Costs, simulated
-from vanedamp.studies.bench.sweep.worker import Job, measure, scene
 
-TINY = Effort((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20)
+TINY = SweepScaling((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20)
 FREE = Costs(0.0, 0.0, 0.0, 0.0)
 
 
@@ -73,7 +73,7 @@ def test_simulated_checkpoints_take_their_share():
 
 @pytest.mark.slow
 def test_benchmark_leaves_its_results(tmp_path, capsys):
-    result = run_bench(tmp_path / "bench", TINY)
+    result = TINY.run(tmp_path / "bench")
     assert json.loads((tmp_path / "bench" / "bench_sweep.json").read_text())["pairs"] == result["pairs"]
     with (tmp_path / "bench" / "bench_sweep.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -83,5 +83,5 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     }
     with Image.open(tmp_path / "bench" / "bench_sweep.png") as picture:
         assert picture.width > 1000
-    print_summary(result)
+    TINY.print_summary(result)
     assert "parallel efficiency by the processor" in capsys.readouterr().out

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
+from paper.scene_files import scene_file
 from tests.tools.schemas import faults
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.studies import demo
 from vanedamp.studies.cli import main
-from vanedamp.studies.paper.figure_file import Effort, PaperFigure, Structure
-from vanedamp.studies.paper.runner import write_scene
+from vanedamp.studies.demo import demo
+from vanedamp.studies.demo.figure_file import Effort, FigureScenes, Structure
+from vanedamp.studies.demo.figure_study import write_scene
 from vanedamp.studies.report.forced_response import forced_responses
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
@@ -43,7 +44,9 @@ def shows_impact_mistuning(response, first, fixed, peak):
 
 
 def test_rigid_model_shows_impact_mistuning():
-    (scene,) = PaperFigure.load("fig9", STRUCTURE, Effort(points=41, periods=1000, transient=600)).scenes.values()
+    (scene,) = FigureScenes.load(
+        scene_file("fig9"), STRUCTURE, Effort(points=41, periods=1000, transient=600)
+    ).scenes.values()
     frequencies = scene.to_dict()["sweep"]["excitation.frequency"]
     half = scene.replace({"cavity.c1.gap": AMPLITUDE / 2, "sweep": {"excitation.frequency": frequencies}})
     (response,) = forced_responses(sweep(half))
@@ -53,7 +56,7 @@ def test_rigid_model_shows_impact_mistuning():
 SCENES = [
     (name, curve, scene)
     for name in ("fig9", "fig10", "fig14", "mistuning", "blocks", "self_tuning", "rotating_body")
-    for curve, scene in PaperFigure.load(name, STRUCTURE, demo.EFFORT).scenes.items()
+    for curve, scene in FigureScenes.load(scene_file(name), STRUCTURE, demo.EFFORT).scenes.items()
 ]
 
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from benchmarks.methods.full_mesh_comparison import CurveEffort, curve, ladder
+from benchmarks.methods.full_mesh_run import explicit_run, glued_frequencies_hz, lumped
 from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.bases.craig_bampton import reduce
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
-from vanedamp.studies.bench.methods.full_mesh_comparison import CurveEffort, curve, ladder
-from vanedamp.studies.bench.methods.full_mesh_run import explicit_run, glued_frequencies_hz, lumped
 
 
 @pytest.fixture(scope="module")

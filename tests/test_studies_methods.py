@@ -8,18 +8,18 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from benchmarks.methods import scenes as method_scenes
+from benchmarks.methods.charts import status_after
+from benchmarks.methods.measure import WorkPrecision
+from benchmarks.methods.peers import PEERS
+from benchmarks.stability import limits as stability
+from benchmarks.stability.macro_step import macro_step
+from benchmarks.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
+from benchmarks.stability.scenes import DAMPING
 from vanedamp.coupling.engine import simulate
-from vanedamp.studies.bench.methods import measure as work_precision
-from vanedamp.studies.bench.methods import scenes as method_scenes
-from vanedamp.studies.bench.methods.charts import status_after
-from vanedamp.studies.bench.methods.peers import PEERS
-from vanedamp.studies.bench.stability import limits as stability
-from vanedamp.studies.bench.stability.macro_step import macro_step
-from vanedamp.studies.bench.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
-from vanedamp.studies.bench.stability.scenes import DAMPING
 from vanedamp.studies.cli import main
 
-SMALL = stability.Effort(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))
+SMALL = stability.Stability(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,8 @@ def test_macro_step_of_a_far_too_light_body_is_the_structure_alone():
 
 
 def test_work_precision_leaves_its_results(tmp_path, capsys):
-    effort = work_precision.Effort(1, (100, 1000), (1e-6,), 2, 60, 200, 2, 1e5, 2000, None, ())
-    result = work_precision.run_work_precision(tmp_path, effort)
+    bench = WorkPrecision(1, (100, 1000), (1e-6,), 2, 60, 200, 2, 1e5, 2000, None, ())
+    result = bench.run(tmp_path)
     assert json.loads((tmp_path / "work_precision.json").read_text()) == json.loads(json.dumps(result))
     assert (tmp_path / "work_precision.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "work_precision.csv").open(newline="") as stream:
@@ -108,7 +108,7 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
     else:
         assert list(chart["absent"]) == ["SUNDIALS CVODE"]
         assert not cvode
-    work_precision.print_summary(result)
+    bench.print_summary(result)
     out = capsys.readouterr().out
     assert "exact engine is" in out and "| Moreau-Jean, 1000 " in out
 
@@ -120,7 +120,7 @@ def test_timed_runs_are_not_judged_by_what_so_few_periods_have_settled():
 
 
 def test_command_writes_the_maps(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(stability, "QUICK", stability.Effort(2, 1, (0, 1)))
+    monkeypatch.setattr(stability, "QUICK", stability.Stability(2, 1, (0, 1)))
     assert main(["bench", "stability", "-o", str(tmp_path / "maps"), "--quick"]) == 0
     assert "measured / analytic limit" in capsys.readouterr().out
     assert {file.name for file in (tmp_path / "maps").iterdir()} == {"stability.json", "stability.csv", "stability.png"}

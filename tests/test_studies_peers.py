@@ -5,12 +5,12 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from benchmarks.bodies.methods import block_scene
+from benchmarks.methods import peers
+from benchmarks.methods import scenes as method_scenes
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.studies.bench.bodies.methods import block_scene
-from vanedamp.studies.bench.methods import peers
-from vanedamp.studies.bench.methods import scenes as method_scenes
 
 PERIODS, SAMPLES = 3, 10
 

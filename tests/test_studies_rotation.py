@@ -7,18 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from paper import blade as study_of_blade
+from paper.blade import beam_southwell, southwell
+from paper.claims_rotation import campbell, friction_only, load_ratio, values
+from paper.claims_self_tuning import resonance_on_track, tuned_order
+from paper.plots_rotation import campbell_picture
+from paper.runner import study
+from paper.scene_files import scene_file
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.paper import blade as study_of_blade
-from vanedamp.studies.paper.blade import beam_southwell, southwell
-from vanedamp.studies.paper.claims_rotation import campbell, friction_only, load_ratio, values
-from vanedamp.studies.paper.claims_self_tuning import resonance_on_track, tuned_order
-from vanedamp.studies.paper.curve import curves
-from vanedamp.studies.paper.figure_file import Effort, PaperFigure, Structure, linear_peaks
-from vanedamp.studies.paper.plots_rotation import campbell_picture
-from vanedamp.studies.paper.runner import Session, study
+from vanedamp.studies.demo.curve import curves
+from vanedamp.studies.demo.figure_file import Effort, FigureScenes, Structure, linear_peaks
+from vanedamp.studies.demo.figure_study import Session
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
@@ -27,7 +29,7 @@ BOTH = ("rotating_body", "self_tuning")
 
 
 def scenes(name):
-    return PaperFigure.load(name, STRUCTURE).scenes
+    return FigureScenes.load(scene_file(name), STRUCTURE).scenes
 
 
 def along(scene, frequencies, periods=1500, transient=800, sweep_of=None, **changes):
@@ -40,7 +42,7 @@ def along(scene, frequencies, periods=1500, transient=800, sweep_of=None, **chan
 
 @pytest.mark.parametrize("name", BOTH)
 def test_scenes_go_along_an_engine_order(name):
-    figure = PaperFigure.load(name, STRUCTURE)
+    figure = FigureScenes.load(scene_file(name), STRUCTURE)
     for scene in figure.scenes.values():
         assert scene.excitation.resonance_amplitude == AMPLITUDE
         assert scene.cavity[0].radius == pytest.approx(4320 * AMPLITUDE, rel=1e-12)

@@ -22,7 +22,7 @@ from vanedamp.coupling.methods.step_records import (
     record_start,
     row_speed,
 )
-from vanedamp.coupling.numerics.codes import DONE, PERIOD
+from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.system.system import System
 
@@ -34,43 +34,44 @@ def central_difference_matrix(system: System, times: TimeGrid) -> np.ndarray:
 
 
 @entry
-def march_central_difference(system, times, motion, records, log, inverse, slow, periods, budget, deepest):
-    """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, m/s."""
+def march_central_difference(system, times, motion, records, log, inverse, slow, until, budget, deepest):
+    """Step until this many steps are done. slow: (friction rows,) speed below which friction is viscous, m/s."""
     size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, change = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before, old = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows], motion.rows[3]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, slow)
         for i in range(size):
             motion.half[i] = (
                 motion.v[i] + 0.5 * h * net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
             )
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            open_step(system, times, motion, records, k, q, v, before)
-            copy(motion.force, old)
-            for i in range(size):
-                motion.q[i] += h * motion.half[i]
-            for r in range(rows):
-                speed[r] = row_speed(system, r, motion.half)
-                row_force(system, motion, r, row_speed(system, r, motion.q), speed[r], slow, h * speed[r])
-                impulse[r] = 0.5 * h * (old[r] + motion.force[r])
-            for i in range(size):
-                rhs[i] = load_at(system, times, k + 1, i) - damping_force(system, motion.half, i)
-                rhs[i] -= system.stiffness[i] * motion.q[i]
-            for r in range(rows):
-                if motion.force[r] != 0.0:
-                    for i in range(size):
-                        rhs[i] += system.J[r, i] * motion.force[r]
-            apply_inverse(inverse, system.proportional, rhs, change)
-            for i in range(size):
-                motion.v[i] = motion.half[i] + 0.5 * h * change[i]
-                motion.half[i] += h * change[i]
-            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
-            if code != DONE:
-                return code
-        code = end_period(system, times, motion, records, budget)
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] % steps
+        open_step(system, times, motion, records, k, q, v, before)
+        copy(motion.force, old)
+        for i in range(size):
+            motion.q[i] += h * motion.half[i]
+        for r in range(rows):
+            speed[r] = row_speed(system, r, motion.half)
+            row_force(system, motion, r, row_speed(system, r, motion.q), speed[r], slow, h * speed[r])
+            impulse[r] = 0.5 * h * (old[r] + motion.force[r])
+        for i in range(size):
+            rhs[i] = load_at(system, times, k + 1, i) - damping_force(system, motion.half, i)
+            rhs[i] -= system.stiffness[i] * motion.q[i]
+        for r in range(rows):
+            if motion.force[r] != 0.0:
+                for i in range(size):
+                    rhs[i] += system.J[r, i] * motion.force[r]
+        apply_inverse(inverse, system.proportional, rhs, change)
+        for i in range(size):
+            motion.v[i] = motion.half[i] + 0.5 * h * change[i]
+            motion.half[i] += h * change[i]
+        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
         if code != DONE:
             return code
+        if k == steps - 1:
+            code = end_period(system, times, motion, records, budget)
+            if code != DONE:
+                return code
     return DONE

@@ -20,7 +20,7 @@ from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, star
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
-from vanedamp.coupling.numerics.codes import DONE, PERIOD, STEPS
+from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
@@ -64,13 +64,13 @@ def begin(
     memory = np.zeros((3, 4 * soft.modes + len(soft.J)))
     budget, deepest = options.max_events, options.penetration
 
-    def march(motion: Motion, log: np.ndarray, periods: int) -> int:
+    def march(motion: Motion, log: np.ndarray, until: int) -> int:
         return march_cosimulation(
-            soft, times, motion, records, log, *matrices, memory, slow, gauss_seidel, hold, substeps, periods, budget,
+            soft, times, motion, records, log, *matrices, memory, slow, gauss_seidel, hold, substeps, until, budget,
             deepest,
         )  # fmt: skip
 
-    return SteppedRun(soft, march, start(soft, initial), records, events)
+    return SteppedRun(soft, march, start(soft, initial), records, events, options.smallest_steps)
 
 
 def cosimulation_matrices(
@@ -105,17 +105,20 @@ def cosimulation_matrices(
 
 @entry
 def march_cosimulation(
-    system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, periods,
+    system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, until,
     budget, deepest,
 ):  # fmt: skip
-    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; earlier ones; scratch."""
+    """Step until the bodies have done this many steps.
+
+    memory: (3, 4n + r) last velocities and mean forces; earlier ones; scratch.
+    """
     n, size, rows = system.modes, len(motion.q), len(system.J)
     h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
     place, rate, bend, mean = motion.rows[4], motion.rows[5], motion.rows[6], motion.rows[7]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
     last_speed, last_force, older_force = memory[0, :n], memory[0, n : n + rows], memory[1, :rows]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, slow)
         for i in range(n, size):
@@ -124,34 +127,35 @@ def march_cosimulation(
         copy(motion.v, last_speed)
         copy(motion.force, last_force)
         copy(motion.force, older_force)
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            open_step(system, times, motion, records, k, q, v, before)
-            _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k, q, v)
-            for r in range(rows):
-                place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
-                speed[r], mean[r] = row_speed(system, r, v), 0.0
-                for i in range(n):
-                    place[r] += system.J[r, i] * q[i]
-                    if gauss_seidel and hold == 0:
-                        rate[r] += system.J[r, i] * (motion.q[i] - q[i]) / h
-                    else:
-                        rate[r] += system.J[r, i] * v[i]
-                    if hold == 1:
-                        change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
-                        bend[r] += system.J[r, i] * change / h
-            copy(v, last_speed)
-            _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean)
-            copy(last_force, older_force)
-            copy(mean, last_force)
-            for r in range(rows):
-                impulse[r] = h * mean[r]
-            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
-            if code != DONE:
-                return code
-        code = end_period(system, times, motion, records, budget)
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] // substeps % steps
+        open_step(system, times, motion, records, k, q, v, before)
+        _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k, q, v)
+        for r in range(rows):
+            place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
+            speed[r], mean[r] = row_speed(system, r, v), 0.0
+            for i in range(n):
+                place[r] += system.J[r, i] * q[i]
+                if gauss_seidel and hold == 0:
+                    rate[r] += system.J[r, i] * (motion.q[i] - q[i]) / h
+                else:
+                    rate[r] += system.J[r, i] * v[i]
+                if hold == 1:
+                    change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
+                    bend[r] += system.J[r, i] * change / h
+        copy(v, last_speed)
+        _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean)
+        copy(last_force, older_force)
+        copy(mean, last_force)
+        for r in range(rows):
+            impulse[r] = h * mean[r]
+        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
         if code != DONE:
             return code
+        if k == steps - 1:
+            code = end_period(system, times, motion, records, budget)
+            if code != DONE:
+                return code
     return DONE
 
 

@@ -29,7 +29,7 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
-from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
+from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.planar.recorder import plane_of
@@ -73,10 +73,10 @@ def begin(
     matrices = moreau_matrices(system, times, theta)
     budget, deepest = options.max_events, options.penetration
 
-    def march(motion: Motion, log: np.ndarray, periods: int) -> int:
-        return march_moreau(system, times, motion, records, log, problem, *matrices, theta, periods, budget, deepest)
+    def march(motion: Motion, log: np.ndarray, until: int) -> int:
+        return march_moreau(system, times, motion, records, log, problem, *matrices, theta, until, budget, deepest)
 
-    return SteppedRun(system, march, start(system, initial), records, events)
+    return SteppedRun(system, march, start(system, initial), records, events, options.smallest_steps)
 
 
 def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
@@ -91,12 +91,12 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     theta, budget, deepest = options.theta, options.max_events, options.penetration
     matrices = planar.step_matrices(system, times.step, theta)
 
-    def march(motion: SteppedMotion, log: np.ndarray, periods: int) -> int:
-        return planar.march(system, times, motion, records, log, *matrices, theta, periods, budget, deepest)
+    def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
+        return planar.march(system, times, motion, records, log, *matrices, theta, until, budget, deepest)
 
     motion = start_steps(system, initial, records)
     plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(flat, march, motion, records, events, plane)
+    return SteppedRun(flat, march, motion, records, events, options.smallest_steps, plane)
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -110,39 +110,40 @@ def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.n
 
 @entry
 def march_moreau(
-    system, times, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest
+    system, times, motion, records, log, problem, inverse, turned, mobility, theta, until, budget, deepest
 ):
-    """Step to the end of `periods`. Return the code of numerics.codes."""
+    """Step until this many steps are done. Return the code of numerics.codes."""
     size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            open_step(system, times, motion, records, k, q, v, before)
-            for i in range(size):
-                load = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
-                rhs[i] = h * (load - damping_force(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
-            apply_inverse(inverse, system.proportional, rhs, free)
-            for i in range(size):
-                free[i] += v[i]
-            for r in range(rows):
-                speed[r], impulse[r] = row_speed(system, r, v), 0.0
-            if not _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
-                return UNDECIDED
-            for i in range(size):
-                motion.v[i] = free[i]
-                motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
-            for r in range(system.friction_rows):
-                if system.spring[r] != math.inf and system.limit[r] > 0.0:
-                    motion.elongation[r] = -impulse[r] / (h * system.spring[r])
-            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
-            if code != DONE:
-                return code
-        code = end_period(system, times, motion, records, budget)
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] % steps
+        open_step(system, times, motion, records, k, q, v, before)
+        for i in range(size):
+            load = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
+            rhs[i] = h * (load - damping_force(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
+        apply_inverse(inverse, system.proportional, rhs, free)
+        for i in range(size):
+            free[i] += v[i]
+        for r in range(rows):
+            speed[r], impulse[r] = row_speed(system, r, v), 0.0
+        if not _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
+            return UNDECIDED
+        for i in range(size):
+            motion.v[i] = free[i]
+            motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+        for r in range(system.friction_rows):
+            if system.spring[r] != math.inf and system.limit[r] > 0.0:
+                motion.elongation[r] = -impulse[r] / (h * system.spring[r])
+        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
         if code != DONE:
             return code
+        if k == steps - 1:
+            code = end_period(system, times, motion, records, budget)
+            if code != DONE:
+                return code
     return DONE
 
 

@@ -26,7 +26,7 @@ from vanedamp.coupling.methods.step_records import (
     record_start,
     row_speed,
 )
-from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
+from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.system.system import System
 
@@ -44,63 +44,64 @@ def newmark_matrices(
 
 @entry
 def march_newmark(
-    system, times, motion, records, log, problem, parameters, inverse, turned, mobility, slow, periods, budget, deepest
+    system, times, motion, records, log, problem, parameters, inverse, turned, mobility, slow, until, budget, deepest
 ):
-    """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, 0 for Coulomb's."""
+    """Step until this many steps are done. slow: (friction rows,) speed below which friction is viscous, or 0."""
     alpha, beta, gamma = parameters[0], parameters[1], parameters[2]
     size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, accel = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     ahead, fast, listed = motion.coordinates[4], motion.coordinates[5], motion.listed
     impulse, speed, before, old = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows], motion.rows[3]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, slow)
         for i in range(size):
             motion.half[i] = net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            open_step(system, times, motion, records, k, q, v, before)
-            copy(motion.force, old)
-            for i in range(size):
-                a = motion.half[i]
-                ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
-                fast[i] = v[i] + h * (1.0 - gamma) * a
-            for i in range(size):
-                new = load_at(system, times, k + 1, i) - damping_force(system, fast, i) - system.stiffness[i] * ahead[i]
-                rhs[i] = (1.0 + alpha) * new
-                if alpha != 0.0:
-                    rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
-            apply_inverse(inverse, system.proportional, rhs, accel)
-            for i in range(size):
-                ahead[i] += beta * h * h * accel[i]
-                fast[i] += gamma * h * accel[i]
-            count = _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
-            if count > 0:
-                motion.counters[SOLVES] += 1
-                if not solve_rows(problem, count):
-                    return UNDECIDED
-            for r in range(rows):
-                motion.force[r] = 0.0
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] % steps
+        open_step(system, times, motion, records, k, q, v, before)
+        copy(motion.force, old)
+        for i in range(size):
+            a = motion.half[i]
+            ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
+            fast[i] = v[i] + h * (1.0 - gamma) * a
+        for i in range(size):
+            new = load_at(system, times, k + 1, i) - damping_force(system, fast, i) - system.stiffness[i] * ahead[i]
+            rhs[i] = (1.0 + alpha) * new
+            if alpha != 0.0:
+                rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
+        apply_inverse(inverse, system.proportional, rhs, accel)
+        for i in range(size):
+            ahead[i] += beta * h * h * accel[i]
+            fast[i] += gamma * h * accel[i]
+        count = _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
+        if count > 0:
+            motion.counters[SOLVES] += 1
+            if not solve_rows(problem, count):
+                return UNDECIDED
+        for r in range(rows):
+            motion.force[r] = 0.0
+        for a in range(count):
+            motion.force[listed[a]] = problem.force[a]
+        for i in range(size):
+            change = 0.0
             for a in range(count):
-                motion.force[listed[a]] = problem.force[a]
-            for i in range(size):
-                change = 0.0
-                for a in range(count):
-                    change += turned[i, listed[a]] * problem.force[a]
-                motion.half[i] = accel[i] + change
-                motion.q[i] = ahead[i] + beta * h * h * change
-                motion.v[i] = fast[i] + gamma * h * change
-            for r in range(rows):
-                speed[r] = row_speed(system, r, v)
-                impulse[r] = 0.5 * h * (old[r] + motion.force[r])
-                if r < system.friction_rows and system.spring[r] != math.inf and system.limit[r] > 0.0:
-                    motion.elongation[r] = -motion.force[r] / system.spring[r]
-            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
-            if code != DONE:
-                return code
-        code = end_period(system, times, motion, records, budget)
+                change += turned[i, listed[a]] * problem.force[a]
+            motion.half[i] = accel[i] + change
+            motion.q[i] = ahead[i] + beta * h * h * change
+            motion.v[i] = fast[i] + gamma * h * change
+        for r in range(rows):
+            speed[r] = row_speed(system, r, v)
+            impulse[r] = 0.5 * h * (old[r] + motion.force[r])
+            if r < system.friction_rows and system.spring[r] != math.inf and system.limit[r] > 0.0:
+                motion.elongation[r] = -motion.force[r] / system.spring[r]
+        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
         if code != DONE:
             return code
+        if k == steps - 1:
+            code = end_period(system, times, motion, records, budget)
+            if code != DONE:
+                return code
     return DONE
 
 

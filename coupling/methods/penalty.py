@@ -63,8 +63,8 @@ def begin(
     if options.scheme == "central_difference":
         inverse = central_difference_matrix(soft, times)
 
-        def march(motion: Motion, log: np.ndarray, periods: int) -> int:
-            return march_central_difference(soft, times, motion, records, log, inverse, slow, periods, budget, deepest)
+        def march(motion: Motion, log: np.ndarray, until: int) -> int:
+            return march_central_difference(soft, times, motion, records, log, inverse, slow, until, budget, deepest)
 
     else:
         problem = new_problem(len(soft.J))
@@ -72,10 +72,10 @@ def begin(
         if options.slip_velocity is None:
             slow = np.zeros_like(slow)  # implicit: Coulomb's law as it is
 
-        def march(motion: Motion, log: np.ndarray, periods: int) -> int:
-            return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, periods, budget, deepest)
+        def march(motion: Motion, log: np.ndarray, until: int) -> int:
+            return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, until, budget, deepest)
 
-    return SteppedRun(soft, march, start(soft, initial), records, events)
+    return SteppedRun(soft, march, start(soft, initial), records, events, options.smallest_steps)
 
 
 def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
@@ -95,9 +95,9 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     forces, inverse = planar.penalty_forces(system, times.step, options), planar.step_matrix(system, times.step)
     budget, deepest = options.max_events, options.penetration
 
-    def march(motion: SteppedMotion, log: np.ndarray, periods: int) -> int:
-        return planar.march(system, times, motion, records, log, forces, inverse, periods, budget, deepest)
+    def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
+        return planar.march(system, times, motion, records, log, forces, inverse, until, budget, deepest)
 
     motion = start_steps(system, initial, records, forces.spring)
     plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(flat, march, motion, records, events, plane)
+    return SteppedRun(flat, march, motion, records, events, options.smallest_steps, plane)

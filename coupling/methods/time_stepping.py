@@ -15,13 +15,10 @@ from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
 _OPEN_LEDGER = 0.1
-#: entries of the log of impacts between two looks at it
-_LOG = 100_000
-
-#: steps after which compiled functions return to Python, which sees interrupts, at a period's end
+#: steps of all contacts after which compiled functions return to Python, which sees interrupts and empties the log
 _SLICE = 100_000
 
-#: step the motion to the end of a number of periods with this log; returns a code of numerics.codes
+#: step the motion until a number of steps is done, with this log; returns a code of numerics.codes
 March = Callable[[Any, np.ndarray, int], int]
 
 
@@ -33,34 +30,44 @@ class Stepped(Protocol):
         """Counters (COUNTERS,) of numerics.codes."""
 
     @property
+    def active(self) -> np.ndarray:
+        """Whether each row or unit (r,) is in contact."""
+
+    @property
     def deepest(self) -> np.ndarray:
         """Largest penetration (1,), relative to the free travel."""
 
 
 class SteppedRun:
-    """A run of a stepping method: the system as the method has it, its march, the motion and the records."""
+    """A run of a stepping method, which marches a motion by its steps per period and fills the records."""
 
     def __init__(
-        self, system: System, march: March, motion: Stepped, records: Records, events: bool, plane: Plane | None = None
+        self,
+        system: System,
+        march: March,
+        motion: Stepped,
+        records: Records,
+        events: bool,
+        steps: int,
+        plane: Plane | None = None,
     ) -> None:
         self.system, self.march, self.motion, self.records, self.plane = system, march, motion, records, plane
-        self.log = np.zeros((_LOG if events else 0, 6 if plane is None else LOG_WIDTH))
+        self.steps = steps
+        # a contact logs at most one impact per step
+        self.slice = max(_SLICE // max(len(motion.active), 1), 1)
+        self.log = np.zeros((_SLICE if events else 0, 6 if plane is None else LOG_WIDTH))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:
         """Continue to the end of `periods`, unless the run ends before."""
         counters = self.motion.counters
-        while True:
-            done = int(counters[PERIOD])
-            # with a log, period by period, so that it can be emptied
-            more = 1 if len(self.log) or not done else max(1, _SLICE * done // int(counters[STEPS]))
-            code = self.march(self.motion, self.log, min(periods, done + more))
+        while counters[PERIOD] < periods:
+            until = min(periods * self.steps, int(counters[STEPS]) + self.slice)
+            code = self.march(self.motion, self.log, until)
             self.chunks.append(self.log[: counters[LOGGED]].copy())
             counters[LOGGED] = 0
             if code != DONE:
                 return STATUS_OF[code]
-            if counters[PERIOD] >= periods:
-                break
         return Status.OK
 
     def outcome(self) -> Outcome:

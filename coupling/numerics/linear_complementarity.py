@@ -17,6 +17,8 @@ from vanedamp.coupling.numerics.compiler.record import record
 
 #: entries of the tableau below this are round-off, for problems scaled to numbers of size one
 _PIVOT = 1e-11
+#: round-off of the tableau relative to the largest entry that it has had: forces of a wedge make it grow to 1e8
+_GROWN = 5e-13
 #: share of its terms by which a row of a solution may be wrong
 _RESIDUAL = 1e-9
 #: round-off of a solution relative to its largest term: forces of a wedge nearly balance each other
@@ -50,19 +52,24 @@ def solve_lemke(problem, k, first):
     """Solve the problem of the first k unknowns in place (z, w). Returns False if the method finds no solution.
 
     M and q should have numbers of size one: round-off is judged by that. Where it makes a wrong choice among ties,
-    another covering vector leads past them, or to another one of several solutions.
+    another covering vector leads past them, or to another one of several solutions. Where none does, round-off is
+    judged by how far the tableau grows.
     first: number of the covering vector to begin with, 0 or more.
     """
-    attempt, last = first, first + _ATTEMPTS
-    while attempt < last and not (_solve(problem, k, attempt) and _fits(problem, k)):
-        attempt += 1
-    return attempt < last
+    for grown in (0.0, _GROWN):
+        for attempt in range(first, first + _ATTEMPTS):
+            if _solve(problem, k, attempt, grown) and _fits(problem, k):
+                return True
+    return False
 
 
 @kernel
-def _solve(problem, k, attempt):
-    """Solve the problem by one covering vector: that of ones, or another one for later attempts."""
-    t, basis, cover, last = problem.tableau, problem.basis, 2 * k, 2 * k + 1
+def _solve(problem, k, attempt, grown):
+    """Solve the problem by one covering vector: that of ones, or another one for later attempts.
+
+    grown: round-off relative to the largest entry so far, beside _PIVOT.
+    """
+    t, basis, cover, last, noise = problem.tableau, problem.basis, 2 * k, 2 * k + 1, 0.0
     lowest, leaving = -_PIVOT, -1
     for i in range(k):
         for j in range(2 * k + 1):
@@ -100,9 +107,13 @@ def _solve(problem, k, attempt):
                     problem.z[basis[i] - k] = max(t[i, last], 0.0)
             return True
         entering = left + k if left < k else left - k
-        leaving = -1
+        if grown > 0.0:
+            for i in range(k):
+                for j in range(2 * k + 2):
+                    noise = max(noise, grown * abs(t[i, j]))
+        leaving, least = -1, max(_PIVOT, noise)
         for i in range(k):
-            if t[i, entering] > _PIVOT and (leaving < 0 or _before(t, basis, i, leaving, entering, k)):
+            if t[i, entering] > least and (leaving < 0 or _before(t, basis, i, leaving, entering, k, noise)):
                 leaving = i
         if leaving < 0:
             return False
@@ -127,16 +138,17 @@ def _fits(problem, k):
 
 
 @kernel
-def _before(t, basis, i, other, entering, k):
+def _before(t, basis, i, other, entering, k, noise):
     """Whether row i leaves the basis before another one: smaller ratio, covering variable, lexicographic order."""
     last, a, b = 2 * k + 1, t[i, entering], t[other, entering]
+    tie = max(_PIVOT * a * b, noise * (a + b))
     difference = t[i, last] * b - t[other, last] * a
-    if abs(difference) > _PIVOT * a * b:
+    if abs(difference) > tie:
         return difference < 0.0
     if basis[i] == 2 * k or basis[other] == 2 * k:
         return basis[i] == 2 * k
     for j in range(k):
         difference = t[i, j] * b - t[other, j] * a
-        if abs(difference) > _PIVOT * a * b:
+        if abs(difference) > tie:
             return difference < 0.0
     return False

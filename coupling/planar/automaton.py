@@ -278,9 +278,12 @@ def _happen(system, st, rec, log, work, r, what):
 @kernel
 def _settle(system, st, rec, log, work):
     """Decide the states, if no forces are possible after the impulses that stop what slips. False if that fails."""
-    if decide(system, st, work, st.scale[0]):
-        return True
-    return jam(system, st, rec, log, work) and decide(system, st, work, st.scale[0])
+    for _ in range(len(system.rest) + 1):
+        if decide(system, st, work, st.scale[0]):
+            return True
+        if not jam(system, st, rec, log, work):
+            return False
+    return False
 
 
 @kernel

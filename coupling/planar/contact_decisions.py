@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
@@ -364,32 +365,61 @@ def _loaded(system, work, count, right, bound, row):
 
 
 @kernel
-def _classify(system, work, count, nothing, verdict):
-    """States (verdict) of the listed units from the solution, and what it leaves open (work.doubtful)."""
+def _judge(system, st, work, count, terms, nothing):
+    """Decide the states of the listed units (work.verdict) by accelerations (work.speed). False if none are possible.
+
+    Lemke's method need not find forces of contacts that slip. Over a short step in which they might stop it does: the
+    slips become parts of the accelerations that remain to be stopped. Its forces are those of the instant if no
+    contact that presses stops; if one does, none are found, and the slip ends by impulses (impacts.jam).
+    """
+    u = len(system.rest)
+    if solve_rows(system, work, count, work.speed, terms, work.bound):
+        _classify(system, work, count, nothing)
+        return True
+    moment, possible = CHATTER * system.period, True
+    for p in range(count):
+        work.slips[p] = work.way[p]
+        if work.way[p] != 0:
+            work.speed[u + work.listed[p]] += row_speed(system, u + work.listed[p], st.v) / moment
+            work.way[p] = 0
+    if not solve_rows(system, work, count, work.speed, terms, work.bound):
+        return False
+    _classify(system, work, count, nothing)
+    for p in range(count):
+        if work.slips[p] != 0:
+            same = work.verdict[p] == (SLIP_RIGHT if work.slips[p] > 0 else SLIP_LEFT)
+            possible = possible and (same or work.verdict[p] >= OPEN)
+            work.way[p] = work.slips[p]
+    return possible
+
+
+@kernel
+def _classify(system, work, count, nothing):
+    """States (work.verdict) of the listed units from the solution, and what it leaves open (work.doubtful)."""
     problem = work.lemke
     for p in range(count):
         r, i = work.listed[p], work.place[p]
         work.doubtful[p] = 0
         contact = is_rigid(system, r)
         if contact and problem.z[i] <= nothing:
-            verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
+            work.verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
             work.doubtful[p] = _NORMAL if problem.w[i] <= nothing else 0
         elif work.way[p] != 0:
-            verdict[p] = SLIP_RIGHT if work.way[p] > 0 else SLIP_LEFT
+            work.verdict[p] = SLIP_RIGHT if work.way[p] > 0 else SLIP_LEFT
         elif contact and system.friction[r] == 0.0:
-            verdict[p] = SLIP_RIGHT
+            work.verdict[p] = SLIP_RIGHT
         else:
             first = i + 1 if contact else i
             # a spring without force has no friction: both bounds are one, and the acceleration tells
             left = problem.w[first + 1] <= nothing and problem.z[first + 1] > nothing
             if problem.z[first] <= nothing and not left:
-                verdict[p] = SLIP_RIGHT
+                work.verdict[p] = SLIP_RIGHT
                 work.doubtful[p] = _SLIP if problem.w[first] <= nothing else 0
             elif problem.w[first + 1] <= nothing:
-                verdict[p] = SLIP_LEFT
+                work.verdict[p] = SLIP_LEFT
                 work.doubtful[p] = _SLIP if problem.z[first + 1] <= nothing else 0
             else:
-                verdict[p] = STICK
+                work.verdict[p] = STICK
 
 
 @entry
@@ -425,9 +455,8 @@ def decide(system, st, work, scale):
         work.listed[count], work.way[count] = r, way if rubs(system, r) else 0
         count += 1
     terms = loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
-    if not solve_rows(system, work, count, work.speed, terms, work.bound):
+    if not _judge(system, st, work, count, terms, _NOTHING):
         return False
-    _classify(system, work, count, _NOTHING, work.verdict)
     doubts = _press_or_open(system, work, count, _NOTHING * terms)
     if sliders > 0:
         doubts += _draw_sliders(system, st, work, _NOTHING * terms)
@@ -559,9 +588,8 @@ def _look_ahead(system, st, work, count):
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
     terms = loaded_acceleration(system, st, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not solve_rows(system, work, count, work.speed, terms, work.bound):
+    if not _judge(system, st, work, count, terms, _NEXT_TO_NOTHING):
         return False
-    _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     # which of contacts that depend on each other carry the force is decided for all of them together
     carriers = False
     for p in range(count):

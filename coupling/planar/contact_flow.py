@@ -30,6 +30,8 @@ _SQUARED = 1e-13
 _SLOW = 1e-6
 #: and those beyond this many times it: forces would be, and following them would not end
 _FAST = 1e6
+#: ratio of frequencies above which modes are polished, and the largest step of that, relative to a mode
+_APART, _POLISHED = 30.0, 1e-6
 #: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
 _STIFF = 1e4
 
@@ -310,9 +312,41 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np
         raise IllConditioned("a mode is too fast for the excitation")
     if np.abs(values).min() < _SLOW * omega or np.linalg.cond(vectors) > DEFECTIVE:
         raise IllConditioned("its modes are one to round-off, or it has no stiffness")
+    if np.abs(values).max() > _APART * np.abs(values).min():
+        values, shapes = _polish(values, vectors[:k], stiffness, damping)
+        vectors = np.vstack([shapes, shapes * values / scale])
+        vectors /= np.linalg.norm(vectors, axis=0)
     inverse = np.linalg.inv(vectors)
     vectors[k:] *= scale
     inverse[:, k:] /= scale
     keep = values.imag >= 0.0
     inverse[values.imag > 0.0] *= 2.0
     return values[keep], vectors[:, keep], inverse[keep]
+
+
+def _polish(
+    values: np.ndarray, shapes: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take two of Newton's steps on the quadratic problem for eigenvalues (m,) and shapes (k, m), lengths kept.
+
+    Beside stiff contacts the linear problem leaves slow modes with round-off relative to the quick ones. Equal modes,
+    whose steps are not small, stay as they are.
+    """
+    values, eye = values.copy(), np.eye(len(stiffness))
+    shapes = (shapes / np.linalg.norm(shapes, axis=0)).astype(complex)
+    for n, value in enumerate(values):
+        shape = shapes[:, n]
+        for _ in range(2):
+            force = value**2 * eye + value * damping + stiffness
+            slope = (2 * value * eye + damping) @ shape
+            system = np.block([[force, slope[:, None]], [shape.conj()[None], np.zeros((1, 1))]])
+            size = np.maximum(np.abs(system).max(axis=1), np.finfo(float).tiny)
+            try:
+                change = np.linalg.solve(system / size[:, None], np.r_[-(force @ shape), 0.0] / size)
+            except np.linalg.LinAlgError:
+                break
+            if not max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= _POLISHED:
+                break
+            shape, value = shape + change[:-1], value + change[-1]
+        values[n], shapes[:, n] = value, shape
+    return values, shapes

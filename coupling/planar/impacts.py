@@ -50,6 +50,8 @@ _EDGE = 1e-9
 _SHORTEST = 0.1
 #: share of the motion by which a step is measured, at least: round-off is below what a pivot resolves then
 _ROUGH = 1e-4
+#: what a closed contact does in a short step: it pushes, or its slip turns without
+_PUSHES, _TURNS = 1, 2
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -61,7 +63,8 @@ def collide(system, st, rec, log, work):
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
-    if system.two_phases and not _compress(system, work, count, tiny):
+    # speeds as they are, round-off included, always have a solution
+    if system.two_phases and not _compress(system, work, count, tiny) and not _compress(system, work, count, 0.0):
         return False
     if not _rebound(system, st, work, count, 1.0, tiny):
         st.counters[REDUCED] += 1
@@ -72,7 +75,7 @@ def collide(system, st, rec, log, work):
                 low = middle
             else:
                 high = middle
-        # without rebound the speeds as they are, round-off included, always have a solution
+        # without rebound the speeds as they are have a solution here, too
         wedged = low <= _WEDGED
         if not _rebound(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
@@ -247,6 +250,7 @@ def _catch(system, st, work, count, tiny):
     near = False
     for p in range(count):
         r = work.listed[p]
+        work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else 0
         near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
     if near:
         _stop(system, st, work, count, tiny, slow, 1.0 - _EDGE)
@@ -257,7 +261,8 @@ def _catch(system, st, work, count, tiny):
 def jam(system, st, rec, log, work):
     """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
 
-    They are those of a step of Moreau's scheme in the limit of short ones. Returns False if there are none.
+    They are those of a step of Moreau's scheme in the limit of short ones. Slips that the loads turn within it stop.
+    Returns False if there are none.
     """
     u, count = len(system.rest), _list_shut(system, st, work)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
@@ -271,6 +276,13 @@ def jam(system, st, rec, log, work):
         if work.impulse[work.listed[p]] > 0.0:
             _note(system, st, rec, log, work, work.listed[p])
     _account(system, st, work)
+    for p in range(count):
+        r, slip = work.listed[p], work.speed[u + work.listed[p]]
+        for o in range(2 * u):
+            slip += system.delassus[u + r, o] * work.impulse[o]
+        turns = rubs(system, r) and slip * row_speed(system, u + r, st.v) < 0.0
+        turns = turns and abs(row_speed(system, r, st.v)) <= tiny
+        work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else (_TURNS if turns else 0)
     _stop(system, st, work, count, tiny, slow, math.inf)
     return True
 
@@ -311,7 +323,7 @@ def _step(system, st, work, count, share):
 
 @inlined
 def _stop(system, st, work, count, tiny, slow, most):
-    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together.
+    """Stop contacts that push or turn (work.slips), those that stick with their slips, and whom that drives together.
 
     most: share of its bound below which friction counts as that of a contact that sticks.
     """
@@ -321,9 +333,9 @@ def _stop(system, st, work, count, tiny, slow, most):
     for p in range(count):
         r = work.listed[p]
         normal = work.impulse[r]
-        if normal > 0.0:
+        if work.slips[p] != 0:
             found = _stop_row(system, st, work, r, found)
-            sticks = abs(work.impulse[u + r]) < most * system.friction[r] * normal
+            sticks = work.slips[p] == _TURNS or abs(work.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
                 found = _stop_row(system, st, work, u + r, found)
     again = found > 0

@@ -84,6 +84,7 @@ class Scratch(NamedTuple):
     before: np.ndarray  # (u,) int: states before the event
     listed: np.ndarray  # (u,) int: units of a problem
     way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
+    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop; what it does in a short step
     place: np.ndarray  # (u,) int: where its unknowns begin
     verdict: np.ndarray  # (u,) int
     doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
@@ -134,13 +135,14 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
 def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
-    integers = iter(np.zeros((10, u), np.int64))
+    integers = iter(np.zeros((11, u), np.int64))
     return Scratch(
         free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
         before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
         least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
-        way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
-        doubt=next(integers), sliding=next(integers), resting=next(integers),
+        way=next(integers), slips=next(integers), place=next(integers), verdict=next(integers),
+        doubtful=next(integers), first=next(integers), doubt=next(integers),
+        sliding=next(integers), resting=next(integers),
         span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
         attempt=np.zeros(1, np.int64),

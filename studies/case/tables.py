@@ -38,9 +38,6 @@ from vanedamp.studies.case.temperature_tables import TemperatureTable
 if TYPE_CHECKING:
     from vanedamp.modal.elasticity import ElasticSupport, Material
 
-#: the case of `vanedamp demo`, whose mesh is the shipped one
-DEMO_CASE = Path(__file__).with_name("demo_case.toml")
-
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
 # 1/K: no solid expands more

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from vanedamp.studies.demo import PIPELINE, run_demo
+from vanedamp.studies.demo.demo import PIPELINE, run_demo
 from vanedamp.studies.pipeline.pipeline import adopt
 
 

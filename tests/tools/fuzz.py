@@ -69,11 +69,11 @@ PRESCRIBED = {
     "solver": {"method": "penalty", "scheme": "hht", "alpha": -0.1, "steps_per_period": 50, "contact_steps": 10.0},
 }
 OPTIMISE = {
-    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.05},
     "excitation": {"frequency": 15.9, "force": 1.0},
     "cavity": [{"name": "c1", "gap": 2e-4}],
     "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}],
-    "time": {"periods": 3, "transient": 1},
+    "time": {"periods": 25, "transient": 20},
     "solver": {"max_events": 2000},
     "optimise": {
         "band": {"start": 15.5, "stop": 16.0, "num": 2},

@@ -15,7 +15,7 @@ from scipy import io, sparse
 
 from tests.tools import fork_mesh
 from tests.tools.archives import ansys_archive, labelled
-from tests.tools.fuzz import CASE, SCENE
+from tests.tools.fuzz import CASE, OPTIMISE, SCENE
 from tests.tools.op2_file import write_op2
 
 #: what takes the place of a number in a text
@@ -75,6 +75,8 @@ def _write_tables() -> None:
     for ending in ("csv", "uff"):
         write_frf(frf, f"frf.{ending}")
         write_shapes(shapes, f"shapes.{ending}")
+    Path("history.csv").write_text("time,value\n0,0\n0.01,1\n0.03,-1\n0.06,0\n")
+    Path("pattern.csv").write_text("at,order,force,phase_deg\ntip,1,1.0,0\ntop,2,0.5,90\n")
     Path("heat.csv").write_text("x,y,z,temperature\n0,0,0,20\n0.1,0,0,100\n0,0.1,0,50\n0,0,0.1,30\n")
 
 
@@ -86,9 +88,15 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
     damping = {"frf": "frf.csv", "quantity": "receptance", "band": [3800.0, 4500.0], "modes": 1}
     calibration = {"share": 0.7, "hot_spot": ["block"], "damping": damping}
     matrices = {"file": "matrices.npz", "mass": "m", "stiffness": "k", "damping_ratio": 0.01}
+    campbell = {
+        "rotation": {"axis": [0.0, 1.0, 0.0], "point": [-0.1, 0.0, 0.0]},
+        "campbell": {"rpm": {"start": 0, "stop": 3000, "num": 2}, "engine_orders": [1]},
+    }
     files = {
         "scene.toml": plain, "swept.toml": plain | {"sweep": SCENE["sweep"]}, "ramp.toml": plain | ramp,
         "down.toml": plain | down, "case.toml": CASE | {"calibration": calibration},
+        "orbit.toml": plain | {"orbit": {"to": 15.95, "max_points": 4}}, "optimise.toml": OPTIMISE,
+        "campbell.toml": CASE | campbell,
         "external.toml": {"matrices": matrices, "interface": {"tip": {"coordinate": 0}, "top": {"coordinate": 2}}},
     }  # fmt: skip
     for name, tables in files.items():
@@ -98,7 +106,9 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
         ["sweep", "swept.toml", "--workers", "1", "-o", "sweep.h5"],
         ["ramp", "ramp.toml", "-o", "ramp.h5"], ["ringdown", "down.toml", "-o", "down.h5"],
         ["import", "external.toml", "-o", "rom.h5"], ["modal", "case.toml", "-o", "modes.h5"],
-        ["calibrate", "case.toml", "-o", "calibration.h5"],
+        ["calibrate", "case.toml", "-o", "calibration.h5"], ["campbell", "campbell.toml", "-o", "campbell.h5"],
+        ["orbits", "orbit.toml", "-o", "orbits.h5"],
+        ["optimise", "optimise.toml", "--workers", "1", "-o", "optimum.h5"],
     ):  # fmt: skip
         if run(words):
             raise RuntimeError(Path("../standard_error.txt").read_text())
@@ -107,7 +117,7 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
 #: by the name of a sample: the words of commands that read the damaged file "damaged.*", or a call of Python
 READS: dict[str, tuple[list[str], ...]] = {
     **{f"{name}.h5": (["report", "@", "-o", "out.html"], *(["export", "@", "-o", f"out.{e}"] for e in ("csv", "mat")))
-       for name in ("run", "sweep", "ramp", "down", "modes", "calibration")},
+       for name in ("run", "sweep", "ramp", "down", "modes", "calibration", "campbell", "orbits", "optimum")},
     "rom.h5": (["report", "@", "-o", "out.html"], ["run", "on_rom.toml"], ["export", "@", "-o", "out.uff"],
                ["export", "@", "-o", "out.mat"]),
     **{f"mesh.{ending}": (["check", "on_mesh.toml"], ["check", "on_mesh.toml"], ["modal", "on_mesh.toml"])
@@ -118,6 +128,7 @@ READS: dict[str, tuple[list[str], ...]] = {
     **{name: (["read_frf"],) for name in ("frf.csv", "frf.uff")},
     **{name: (["read_shapes"],) for name in ("shapes.csv", "shapes.uff")},
     "heat.csv": (["read_temperature"],),
+    "history.csv": (["run", "on_history.toml"],), "pattern.csv": (["run", "on_pattern.toml"],),
     "scene.toml": (["run", "@"], ["check", "@"]), "swept.toml": (["check", "@"],), "case.toml": (["check", "@"],),
     "external.toml": (["import", "@", "-o", "out.h5"], ["check", "@"]), "down.toml": (["ringdown", "@"],),
 }  # fmt: skip
@@ -164,8 +175,18 @@ def _write_users(file: str) -> None:
         "cavity": [{"name": "c1", "gap": 2e-4, "left": "tip", "right": "tip", "floor": "tip"}],
         "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}], "time": {"periods": 3},
     }  # fmt: skip
+    history = {
+        "structure": SCENE["structure"], "cavity": SCENE["cavity"], "damper": rom["damper"], "time": {"periods": 3},
+        "excitation": {"force": 1.0, "waveform": {"shape": "history", "file": file}},
+        "solver": {"method": "moreau", "steps_per_period": 20},
+    }  # fmt: skip
+    pattern = rom | {
+        "structure": {"model": "rom", "file": "rom.h5"},
+        "excitation": {"frequency": 150.0, "at": "tip", "pattern": file},
+    }  # fmt: skip
     for name, tables in {
-        "on_mesh.toml": mesh, "on_rom.toml": rom, "on_matrices.toml": one | {"matrices": named},
+        "on_mesh.toml": mesh, "on_rom.toml": rom, "on_history.toml": history,
+        "on_pattern.toml": pattern, "on_matrices.toml": one | {"matrices": named},
         "on_matrix.toml": one | {"matrices": single},
     }.items():  # fmt: skip
         Path(name).write_text(tomli_w.dumps(tables))
@@ -229,7 +250,8 @@ def _change_record(path: Path, draw: random.Random) -> None:
                 del file[name]
                 file[name] = np.asarray(values)[..., :-1]
             case 3:
-                file[name][...] = draw.choice((np.nan, np.inf, -1, 1e308, 10**9))
+                with np.errstate(over="ignore"):
+                    file[name][...] = draw.choice((np.nan, np.inf, -1, 1e308, 10**9))
             case 4:
                 del file.attrs[attribute]
             case 5:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.model_order.bar_on_wall import bounce
 from tests.tools.closed_form_scenes import scene
 from tests.tools.small_structures import rod
 from tests.validation.page import Figure, case
@@ -16,7 +17,6 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduction import reduce
 from vanedamp.rom.truncation import massless
-from vanedamp.studies.bench.model_order.bar_on_wall import bounce
 
 # the engine takes no free structure and no wall but a body: a spring that is soft against the bar's stiffness, 1, and
 # a body that is heavy against its mass, 1. They take some 1e-4 from the impulse.

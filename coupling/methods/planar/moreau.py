@@ -20,7 +20,7 @@ from vanedamp.coupling.methods.planar.step_records import (
     record_sample,
     record_start,
 )
-from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, UNDECIDED
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
@@ -53,40 +53,41 @@ def step_matrices(system: PlanarSystem, step: float, theta: float) -> tuple[np.n
 
 
 @entry
-def march(system, times, motion, records, log, inverse, turned, mobility, theta, periods, budget, deepest):
-    """Step to the end of `periods`, on a grid of equations_of_motion.TimeGrid. Return the code of numerics.codes."""
+def march(system, times, motion, records, log, inverse, turned, mobility, theta, until, budget, deepest):
+    """Step until this many steps are done, on a grid of equations_of_motion.TimeGrid. Return the code of a status."""
     h, steps, size = times.step, len(times.phase) - 1, len(motion.q)
     q, v, rhs, free = motion.start[0], motion.start[1], motion.free[0], motion.free[1]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            for i in range(size):
-                q[i], v[i] = motion.q[i], motion.v[i]
-            record_sample(system, times, motion, records, k)
-            for i in range(size):
-                rhs[i] = system.weight[i] + theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
-                for j in range(size):
-                    rhs[i] -= system.damping[i, j] * v[j] + system.stiffness[i, j] * (q[j] + h * theta * v[j])
-            for i in range(size):
-                free[i] = v[i]
-                for j in range(size):
-                    free[i] += h * inverse[i, j] * rhs[j]
-            if not _impulses(system, motion, mobility, turned, h, theta):
-                return UNDECIDED
-            for i in range(size):
-                motion.v[i] = free[i]
-                motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
-            for j in range(len(system.tangential)):
-                drag_slider(system, j, motion.q)
-            follow_contacts(system, times, motion, records, log, k)
-            code = account_step(system, times, motion, records, k, deepest)
-            if code != DONE:
-                return code
-        motion.counters[PERIOD] += 1
-        record_start(system, motion, records)
-        if motion.counters[IMPACTS] >= budget:
-            return EVENT_BUDGET
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] % steps
+        for i in range(size):
+            q[i], v[i] = motion.q[i], motion.v[i]
+        record_sample(system, times, motion, records, k)
+        for i in range(size):
+            rhs[i] = system.weight[i] + theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
+            for j in range(size):
+                rhs[i] -= system.damping[i, j] * v[j] + system.stiffness[i, j] * (q[j] + h * theta * v[j])
+        for i in range(size):
+            free[i] = v[i]
+            for j in range(size):
+                free[i] += h * inverse[i, j] * rhs[j]
+        if not _impulses(system, motion, mobility, turned, h, theta):
+            return UNDECIDED
+        for i in range(size):
+            motion.v[i] = free[i]
+            motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+        for j in range(len(system.tangential)):
+            drag_slider(system, j, motion.q)
+        follow_contacts(system, times, motion, records, log, k)
+        code = account_step(system, times, motion, records, k, deepest)
+        if code != DONE:
+            return code
+        if k == steps - 1:
+            motion.counters[PERIOD] += 1
+            record_start(system, motion, records)
+            if motion.counters[IMPACTS] >= budget:
+                return EVENT_BUDGET
     return DONE
 
 

@@ -18,7 +18,7 @@ from vanedamp.coupling.methods.planar.step_records import (
     record_sample,
     record_start,
 )
-from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.constraints import STOP, PlanarSystem
@@ -71,44 +71,45 @@ def step_matrix(system: PlanarSystem, step: float) -> np.ndarray:
 
 
 @entry
-def march(system, times, motion, records, log, penalty, inverse, periods, budget, deepest):
-    """Step to the end of `periods`, on a grid of equations_of_motion.TimeGrid. Return the code of numerics.codes."""
+def march(system, times, motion, records, log, penalty, inverse, until, budget, deepest):
+    """Step until this many steps are done, on a grid of equations_of_motion.TimeGrid. Return the code of a status."""
     h, steps, u, size = times.step, len(times.phase) - 1, len(system.rest), len(motion.q)
     q, v, half, rhs = motion.start[0], motion.start[1], penalty.half, motion.free[0]
-    if motion.counters[PERIOD] == 0:
+    if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         _set_forces(system, penalty, motion.q, motion.v)
         _set_load(system, times, penalty, motion.q, motion.v, 0, rhs)
         for i in range(size):
             half[i] = motion.v[i] + 0.5 * h * rhs[i] / system.mass[i]
-    while motion.counters[PERIOD] < periods:
-        for k in range(steps):
-            record_sample(system, times, motion, records, k)
-            for i in range(size):
-                q[i], v[i] = motion.q[i], motion.v[i]
-                motion.q[i] += h * half[i]
-            for r in range(2 * u):
-                motion.before[r], penalty.old[r] = row_speed(system, r, half), penalty.force[r]
-            _set_forces(system, penalty, motion.q, half)
-            for r in range(2 * u):
-                motion.impulse[r] = 0.5 * h * (penalty.old[r] + penalty.force[r])
-            _set_load(system, times, penalty, motion.q, half, k + 1, rhs)
-            for i in range(size):
-                change = 0.0
-                for j in range(size):
-                    change += inverse[i, j] * rhs[j]
-                motion.v[i] = half[i] + 0.5 * h * change
-                motion.free[1, i] = half[i] + h * change
-            for i in range(size):
-                half[i] = motion.free[1, i]
-            follow_contacts(system, times, motion, records, log, k)
-            code = account_step(system, times, motion, records, k, deepest)
-            if code != DONE:
-                return code
-        motion.counters[PERIOD] += 1
-        record_start(system, motion, records)
-        if motion.counters[IMPACTS] >= budget:
-            return EVENT_BUDGET
+    while motion.counters[STEPS] < until:
+        k = motion.counters[STEPS] % steps
+        record_sample(system, times, motion, records, k)
+        for i in range(size):
+            q[i], v[i] = motion.q[i], motion.v[i]
+            motion.q[i] += h * half[i]
+        for r in range(2 * u):
+            motion.before[r], penalty.old[r] = row_speed(system, r, half), penalty.force[r]
+        _set_forces(system, penalty, motion.q, half)
+        for r in range(2 * u):
+            motion.impulse[r] = 0.5 * h * (penalty.old[r] + penalty.force[r])
+        _set_load(system, times, penalty, motion.q, half, k + 1, rhs)
+        for i in range(size):
+            change = 0.0
+            for j in range(size):
+                change += inverse[i, j] * rhs[j]
+            motion.v[i] = half[i] + 0.5 * h * change
+            motion.free[1, i] = half[i] + h * change
+        for i in range(size):
+            half[i] = motion.free[1, i]
+        follow_contacts(system, times, motion, records, log, k)
+        code = account_step(system, times, motion, records, k, deepest)
+        if code != DONE:
+            return code
+        if k == steps - 1:
+            motion.counters[PERIOD] += 1
+            record_start(system, motion, records)
+            if motion.counters[IMPACTS] >= budget:
+                return EVENT_BUDGET
     return DONE
 
 

@@ -1,0 +1,150 @@
+"""A damped curve over frequencies as claims read it: smoothed means, maxima, scatter, onset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.studies.headline import UNTOUCHED
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses
+
+#: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
+_SMOOTHING = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """Top of a curve: frequency (Hz), height over the undamped maximum with its 95 % confidence, index of the point."""
+
+    frequency: float
+    height: float
+    confidence: float
+    index: int
+
+    def __str__(self) -> str:
+        return f"{self.height:.3f} ± {self.confidence:.3f} at {self.frequency:.1f} Hz"
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the undamped maximum X.
+
+    X (m, `reference`) is the resonance's, as the paper has it, whether or not the frequencies reach it; where the scene
+    names no level of a resonance, the undamped maximum over the frequencies.
+
+    largest, mean, confidence  absolute maxima, means of the periods' peaks, half widths of their 95 % confidence
+                               intervals (0 where there are too few periods)
+    harmonic                   amplitudes at the excitation's frequency, without the offset by a body that leans on a
+                               wall
+    undamped, fixed            linear curves without bodies and with all glued
+    attached, impacts          attached mass fraction and impacts per period
+    periodic                   whether the response repeats
+    """
+
+    name: str
+    frequency: np.ndarray
+    largest: np.ndarray
+    mean: np.ndarray
+    confidence: np.ndarray
+    harmonic: np.ndarray
+    undamped: np.ndarray
+    fixed: np.ndarray
+    attached: np.ndarray
+    impacts: np.ndarray
+    periodic: np.ndarray
+    reference: float
+
+    @property
+    def smooth(self) -> np.ndarray:
+        """The means, smoothed over neighbouring frequencies."""
+        return np.asarray(gaussian_filter1d(self.mean, _SMOOTHING, mode="nearest"))
+
+    @property
+    def touched(self) -> np.ndarray:
+        """Where the bodies hit something, or at least change the response by 1 %."""
+        return (self.impacts > 0) | self._changed
+
+    @property
+    def onset(self) -> float:
+        """The first frequency at which the bodies change the mean by 1 %; nan if they never do."""
+        changed = np.flatnonzero(self._changed)
+        return float(self.frequency[changed[0]]) if changed.size else float("nan")
+
+    @property
+    def _changed(self) -> np.ndarray:
+        return np.abs(self.mean - self.undamped) > UNTOUCHED * self.undamped
+
+    @property
+    def scatter(self) -> dict[str, float]:
+        """Root mean square distance of maxima and means from their smoothed curves where there are impacts."""
+        hit = self.impacts > 0
+        if not hit.any():
+            return {"largest": 0.0, "mean": 0.0}
+        curves = {"largest": self.largest, "mean": self.mean}
+        distance = {name: values - gaussian_filter1d(values, _SMOOTHING) for name, values in curves.items()}
+        return {name: float(np.sqrt(np.mean(values[hit] ** 2))) for name, values in distance.items()}
+
+    def peak(self, values: np.ndarray | None = None) -> Peak:
+        """Return the top of a curve (n,), by default of the means."""
+        values = self.mean if values is None else values
+        top = int(np.argmax(values))
+        return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top)
+
+
+def curves(sweep: Sweep, name: str) -> list[Curve]:
+    """Return a curve for every combination of the axes before the last, the frequency; without points not ok.
+
+    Along an engine order the last axis is the speed, and the frequency the excitation's.
+    """
+    responses = forced_responses(sweep, name)
+    count = len(responses[0].x)
+    confidence, harmonic, classification = (
+        values.reshape(-1, count)
+        for values in (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
+    )
+    unit = sweep.scene.excitation.resonance_amplitude
+    return [
+        _curve(*parts, unit or parts[0].reference)
+        for parts in zip(responses, confidence, harmonic, classification, strict=True)
+    ]
+
+
+def means_of(curves: Sequence[Curve]) -> np.ndarray:
+    """Return the means (k, f) of k curves at all f frequencies that one of them has; nan where a run is not ok."""
+    frequencies = np.unique(np.concatenate([curve.frequency for curve in curves]))
+    means = np.full((len(curves), len(frequencies)), np.nan)
+    for row, curve in zip(means, curves, strict=True):
+        row[np.searchsorted(frequencies, curve.frequency)] = curve.mean
+    return means
+
+
+def _curve(
+    response: ForcedResponse,
+    confidence: np.ndarray,
+    harmonic: np.ndarray,
+    classification: np.ndarray,
+    unit: float,
+) -> Curve:
+    done = np.isfinite(response.damped_mean)
+
+    def relative(values: np.ndarray) -> np.ndarray:
+        return np.nan_to_num(values[done] / unit)
+
+    return Curve(
+        name=response.name,
+        frequency=response.hertz * response.x[done],
+        largest=relative(response.damped_max),
+        mean=relative(response.damped_mean),
+        confidence=relative(confidence),
+        harmonic=relative(harmonic),
+        undamped=relative(response.undamped),
+        fixed=relative(response.fixed),
+        attached=response.attached_mass_fraction[done],
+        impacts=response.impacts_per_period[done],
+        periodic=classification[done] != "non-periodic",
+        reference=unit,
+    )

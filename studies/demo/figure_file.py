@@ -1,0 +1,267 @@
+"""A figure as a file: scenes in the units of the structure that they are made for.
+
+The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
+and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
+none, and a curve may have `frequencies` of its own: along an engine order they are those of its speeds. Quantities in
+quotes are multiples of what the structure is like: "0.5 amplitude". A cavity or damper with a `count` stands for that
+number of equal cavities, or of bodies in a row.
+
+A `[bar]` (density in kg/m^3, section in m^2) is a body that fills its cavity but for the gap: a curve that is `longer`
+by a share of its tangential length is heavier by that share, and its gap is less by as much as the bar is longer.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass as checked
+
+from vanedamp.coupling.scene.rotation import FREQUENCY, speed_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rigid, Rom
+from vanedamp.coupling.system.reduced_model_file import reduced_model
+from vanedamp.files.store import load
+from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole, read_toml, validate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.report.forced_response import resonance_grid
+
+FOLDER = Path(__file__).with_name("scenes")
+#: axis of a curve along an engine order
+SPEED = "rotation.speed"
+_QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
+
+    mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
+    resonance; rom: file of the reduced model, if there is one.
+    """
+
+    mass: float
+    stiffness: float
+    damping_ratio: float
+    frequency: float
+    amplitude: float
+    rom: Path | None = None
+
+    @classmethod
+    def shipped(cls) -> Structure:
+        """Return the rigid model of the shipped cluster, which needs no finite elements."""
+        return cls(**read_toml(FOLDER / "rigid_model.toml"))
+
+    @classmethod
+    def load(cls, modes: Path, rom: Path) -> Structure:
+        """Read the record that `vanedamp modal` wrote. Raises InputError without rigid model and fatigue strength."""
+        _, attributes = load(modes, "modes")
+        if "rigid" not in attributes or "fatigue" not in attributes:
+            raise InputError(f"{modes}: needs a rigid model and a fatigue strength; name both in the case")
+        rigid, fatigue = json.loads(attributes["rigid"]), json.loads(attributes["fatigue"])
+        return cls(
+            rigid["mass"], rigid["stiffness"], rigid["damping_ratio"], rigid["frequency_hz"], fatigue["amplitude"], rom
+        )
+
+    def unit(self, name: str) -> float:
+        """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N).
+
+        `speed` (rad/s) is that at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
+        times that.
+        """
+        speed = 2 * math.pi * self.frequency
+        values = {
+            "mass": self.mass, "stiffness": self.stiffness, "damping_ratio": self.damping_ratio,
+            "frequency": self.frequency, "amplitude": self.amplitude,
+            "force": 2 * self.damping_ratio * self.stiffness * self.amplitude,
+            "inertia": self.mass * speed**2 * self.amplitude, "speed": speed, "impedance": self.mass * speed,
+        }  # fmt: skip
+        if name not in values:
+            raise InputError(f"unknown unit '{name}'; known: {', '.join(values)}")
+        return values[name]
+
+
+@checked(frozen=True, config=STRICT)
+class Frequencies:
+    """`points` frequencies from start to stop, finer around the linear resonances."""
+
+    start: Positive
+    stop: Positive
+    points: Annotated[Whole, Field(gt=4)]
+
+
+@checked(frozen=True, config=STRICT)
+class Bar:
+    """A bar of given density (kg/m^3) and section (m^2) whose tangential length goes with its mass."""
+
+    density: Positive
+    section: Positive
+
+    def length(self, mass: float) -> float:
+        """Return the length along the cavity, m."""
+        return mass / (self.density * self.section)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Less than a figure's file says: frequencies per curve, periods of a run and its transient (None: the file's)."""
+
+    points: int
+    periods: int | None = None
+    transient: int | None = None
+
+    def of(self, scene: Scene) -> Scene:
+        """Return the scene with this many periods."""
+        if self.periods is None:
+            return scene
+        return scene.replace({"time.periods": self.periods, "time.transient": self.transient})
+
+
+@dataclass(frozen=True)
+class FigureScenes:
+    """A figure: its title and its scenes by the names of their curves, each with its [sweep]."""
+
+    name: str
+    title: str
+    scenes: dict[str, Scene]
+
+    @classmethod
+    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> FigureScenes:
+        """Read a figure, on a structure. Raises InputError, naming the file."""
+        data = read_toml(file)
+        try:
+            return cls._made(file.stem, _scaled(data, structure), structure, effort)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from error
+
+    @classmethod
+    def _made(cls, name: str, data: dict[str, Any], structure: Structure, effort: Effort | None) -> FigureScenes:
+        bar = validate(Bar, data["bar"], "bar") if "bar" in data else None
+        scenes = {}
+        for curve, changes in data.get("curve", {"": {}}).items():
+            changes = dict(changes)
+            longer = changes.pop("longer", None)
+            chosen = validate(Frequencies, changes.pop("frequencies", data["frequencies"]), f"{curve}.frequencies")
+            tables = _expanded(_merged(data["scene"], changes))
+            if tables["structure"].get("model") == "rom":
+                tables["structure"]["file"] = str(structure.rom)
+            scene = validate(Scene, tables, curve or "scene")
+            if longer is not None:
+                assert bar is not None
+                scene = with_length(scene, bar, longer)
+            scene = scene if effort is None else effort.of(scene)
+            scenes[curve] = with_frequencies(scene, chosen, effort.points if effort else chosen.points)
+        return cls(name, data["title"], scenes)
+
+    def stem(self, curve: str) -> str:
+        """Return the name of the files of a curve, without suffix."""
+        return f"{self.name}_{curve}" if curve else self.name
+
+
+def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
+    """Return the scene with a bar longer by a share of its length: heavier by that share, the gap less by the same.
+
+    Of a scene with one cavity and one body. Raises InputError if it does not fit.
+    """
+    (cavity,), (damper,) = scene.cavity, scene.damper
+    change = longer * bar.length(damper.mass)
+    gap = cavity.gap - change
+    if gap <= 0:
+        raise InputError(f"longer: by {change:g} m, which is more than the gap of {cavity.gap:g} m")
+    # a body at a wall stays there
+    values = {"cavity.0.gap": gap, "damper.0.mass": damper.mass * (1 + longer)}
+    if damper.length is not None:
+        values["damper.0.length"] = damper.length * (1 + longer)
+    return scene.replace(values | {"damper.0.position": damper.position * gap / cavity.gap})
+
+
+def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Scene:
+    """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances.
+
+    Along an engine order it is one of the speeds that have these frequencies.
+    """
+    peaks = [peak for peak in linear_peaks(scene) if frequencies.start < peak < frequencies.stop]
+    if not peaks:
+        grid = np.linspace(frequencies.start, frequencies.stop, points)
+    else:
+        grid = resonance_grid(frequencies.start, frequencies.stop, peaks, 2 * _damping_ratio(scene), points)
+    path, values = FREQUENCY, grid.tolist()
+    if (order := scene.excitation.engine_order) is not None:
+        path, values = SPEED, [speed_of(order, frequency) for frequency in values]
+    return scene.replace({"sweep": {**scene.to_dict()["sweep"], path: values}})
+
+
+def linear_peaks(scene: Scene) -> list[float]:
+    """Return the first natural frequencies with all bodies fixed and without them, Hz, of any structure.
+
+    Of a rigid one along an engine order those where the order meets them: m (2 pi f)^2 = c + c1 (2 pi f / order)^2.
+    """
+    structure = scene.structure
+    if isinstance(structure, Rom):
+        floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
+        model = _whole(structure, scene.speed)
+        fixed = model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
+        return sorted({float(item.natural_frequencies_hz[0]) for item in (fixed, model)})
+    assert isinstance(structure, Rigid)
+    order, mass, stiffness = scene.excitation.engine_order, structure.mass, structure.stiffness_at(scene.speed)
+    if order is not None:
+        mass, stiffness = mass - structure.centrifugal_stiffness / order**2, structure.stiffness
+    masses = {mass, mass + sum(damper.mass for damper in scene.damper)}
+    return sorted(math.sqrt(stiffness / mass) / (2 * math.pi) for mass in masses)
+
+
+def _whole(structure: Rom, speed: float) -> ReducedModel:
+    """Return the reduced model at a speed (rad/s) with all that its file holds."""
+    return reduced_model(replace(structure, modes=None), speed)
+
+
+def _damping_ratio(scene: Scene) -> float:
+    if isinstance(scene.structure, Rom):
+        return float(np.max(_whole(scene.structure, scene.speed).damping_ratio or 0.0)) or 1e-3
+    return getattr(scene.structure, "damping_ratio", None) or 1e-3
+
+
+def _scaled(data: Any, structure: Structure) -> Any:
+    """Return data with its quantities as numbers."""
+    if isinstance(data, dict):
+        return {key: _scaled(value, structure) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_scaled(value, structure) for value in data]
+    match = _QUANTITY.fullmatch(data) if isinstance(data, str) else None
+    return data if match is None else float(match[1]) * structure.unit(match[2])
+
+
+def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of both, with the values of the second where they differ; lists are replaced as a whole."""
+    merged = {key: _merged(value, {}) if isinstance(value, Mapping) else value for key, value in base.items()}
+    for key, value in changes.items():
+        merged[key] = _merged(base.get(key, {}), value) if isinstance(value, Mapping) else value
+    return merged
+
+
+def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return tables with counted cavities and bodies spelt out; these start spread about mid-travel."""
+    cavities, names = [], {}
+    for table in tables.get("cavity", []):
+        count = table.get("count")
+        table = {key: value for key, value in table.items() if key != "count"}
+        names[table["name"]] = [table["name"]] if count is None else [f"{table['name']}{k + 1}" for k in range(count)]
+        cavities += [table | {"name": name} for name in names[table["name"]]]
+    gaps = {cavity["name"]: cavity["gap"] for cavity in cavities}
+    dampers = []
+    for table in tables.get("damper", []):
+        count = table.get("count", 1)
+        table = {key: value for key, value in table.items() if key != "count"}
+        homes = names.get(table["cavity"], [table["cavity"]])
+        for place, home in enumerate(homes):
+            for body in range(count):
+                aside = ((place + 0.5) / len(homes) - 0.5) / 2 if count == 1 else (body + 0.5) / count - 0.5
+                dampers.append({"position": aside * gaps.get(home, 0.0)} | table | {"cavity": home})
+    return tables | {"cavity": cavities, "damper": dampers}
