@@ -9,16 +9,20 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.errors import VanedampError
 
 #: folder that holds the package vanedamp: the top of the repository, or a folder of installed packages
 _ROOT = Path(__file__).parents[2]
 
 
+class CheckoutError(VanedampError):
+    """A command of a checkout where there is none, or whose results would lie in its source."""
+
+
 class CheckoutCommand(NamedTuple):
     """A command whose arguments and work are in the module `command` of a package at the top of the repository.
 
-    Its methods raise InputError where there is no checkout.
+    Its methods raise CheckoutError where there is no checkout.
     """
 
     package: str
@@ -28,14 +32,14 @@ class CheckoutCommand(NamedTuple):
         self._module().add_arguments(parser)
 
     def run(self, arguments: Namespace) -> None:
-        """Run it. Raises InputError for an output folder that is the package's."""
+        """Run it. Raises CheckoutError for an output folder that is the package's."""
         if Path(arguments.output).resolve() == (_ROOT / self.package).resolve():
-            raise InputError(f"--output {arguments.output}: holds the source of this command; name another folder")
+            raise CheckoutError(f"--output {arguments.output}: holds the source of this command; name another folder")
         self._module().run(arguments)
 
     def _module(self) -> ModuleType:
         if not ((_ROOT / "pyproject.toml").is_file() and (_ROOT / self.package / "command.py").is_file()):
-            raise InputError(
+            raise CheckoutError(
                 f"this command needs the folder {self.package}/ of the project's repository, which is not installed "
                 "with the package; run it in a checkout (there: pip install -e .)"
             )

@@ -5,7 +5,7 @@ Nothing heavy is imported here, since `vanedamp --help` reads all of it.
 
 from __future__ import annotations
 
-from vanedamp.studies.commands import bench, paper
+from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
     add_json,
     add_resume,
@@ -22,6 +22,7 @@ from vanedamp.studies.commands.support.declaration import Command, Function, arg
 
 #: endings of a result, which is HDF5 (a device has none); an output that is a folder
 _RECORD, _FOLDER = (".h5", ".hdf5", ".nc", ""), ("/",)
+_BENCHMARKS, _PAPER = CheckoutCommand("benchmarks"), CheckoutCommand("paper")
 _CASE, _SCENE = Function("support.cases:read_case"), Function("support.scenes:read_scene")
 
 COMMANDS = (
@@ -207,7 +208,15 @@ COMMANDS = (
         ),
         Function("demo:run"), writes={"output": _FOLDER},
     ),
+    Command(
+        "paper", "the paper's figures as studies, each claim with a verdict", 110,
+        (_PAPER.add_arguments,), _PAPER.run, writes=None,
+    ),
+    Command(
+        "bench", "how fast and how exact the methods are, measured here", 130,
+        (_BENCHMARKS.add_arguments,), _BENCHMARKS.run, writes=None,
+    ),
 )  # fmt: skip
 
-#: by name; modules as other packages have them are those of a checkout
-PARTS = {command.NAME: command for command in COMMANDS} | {"bench": bench, "paper": paper}
+#: by name
+PARTS = {command.NAME: command for command in COMMANDS}
