@@ -164,7 +164,11 @@ def test_a_file_beside_the_scene(tmp_path):
     )
     made = Scene.load(tmp_path / "scene.toml")
     assert made.files == [str(tmp_path / "force.csv")]
-    assert simulate(made).status is not None
+    found = simulate(made)
+    # twice the force, twice the motion: the file's, as without bodies all is linear
+    twice = simulate(made.replace({"excitation.force": 2.0}))
+    assert found.amplitude_max > 0.0
+    np.testing.assert_allclose(twice.peak, 2.0 * found.peak, rtol=1e-9)
 
 
 HEADER = "time,value\n"
