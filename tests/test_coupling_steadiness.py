@@ -59,7 +59,8 @@ def steady(scene, spring, dashpot=0.0, inertia=0.0, outwards=0.0):
     bound = spring + 1j * w * dashpot - w**2 * inertia
     own = structure.stiffness[0] - w**2 + 1j * w * structure.damping[0, 0]
     dynamic = [[own + bound * floor**2, -bound * floor], [-bound * floor, bound - outwards - w**2 * m]]
-    return abs(np.linalg.solve(dynamic, system.load[0])[0] * system.response[0])
+    load = np.r_[structure.load[0], system.of_bodies.load[0]]
+    return abs(np.linalg.solve(dynamic, load)[0] * system.response[0])
 
 
 def test_rates_of_an_absorber():

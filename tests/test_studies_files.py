@@ -1,5 +1,6 @@
 """Files of the command: links, devices and pipes, outputs that are inputs, full disks; packages that are missing."""
 
+import importlib
 import json
 import os
 import resource
@@ -180,11 +181,12 @@ def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypa
         assert main(["run", "scene.toml", "-o", "response.h5"]) == 0
     if "--vtk" in arguments or arguments[0] == "matrices":
         # what dolfinx compiles and the mesh on its way fit
-        from vanedamp.studies.case import stages as pipeline
+        from vanedamp.studies.case.stages import assemble
         from vanedamp.studies.case.tables import Case
 
-        structure = pipeline.assemble(Case.load("case.toml"))
-        monkeypatch.setattr(pipeline, "assemble", lambda case: structure)
+        structure = assemble(Case.load("case.toml"))
+        command = importlib.import_module(f"vanedamp.studies.commands.{arguments[0]}")
+        monkeypatch.setattr(command, "assemble", lambda case: structure)
     assert main(arguments) == 0
     before = (folder / output).read_bytes()
     capfd.readouterr()

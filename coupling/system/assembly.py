@@ -57,15 +57,15 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     check_directions(scene, basis)
     at = forced_label(scene)
     forced = interface_row(basis, at, "excitation.at")
+    bodies = _bodies(scene, n)
+    owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
+    surfaces = [_surfaces(scene, basis, index, bodies) for index in range(len(scene.cavity))]
     base, loads = base_acceleration(scene, basis), body_loads(scene, basis)
     table = np.zeros(len(shares), complex)
     if isinstance(scene.structure, Prescribed):
         table = np.array(list(shares.values())) * -1j * scene.structure.displacement_amplitude
     force = force_shapes(scene, basis, forced) * -1j * force_amplitude(scene, basis, forced) - base @ basis.base.T
 
-    bodies = _bodies(scene, n)
-    owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
-    surfaces = [_surfaces(scene, basis, index, bodies) for index in range(len(scene.cavity))]
     casing = [interface_row(basis, damper.at or at, f"friction_damper[{i}].at")
               for i, damper in enumerate(scene.friction_damper)]  # fmt: skip
     grip = np.array([coefficient(damper.friction) * damper.normal_force for damper in scene.friction_damper])
