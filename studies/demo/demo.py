@@ -47,7 +47,7 @@ The same, step by step:
     vanedamp sweep fig12_reduced.toml -o fig12_reduced.h5
     vanedamp report . -o report.html
 After a change of the case or a scene, all that depends on it: vanedamp pipeline pipeline.toml
-All figures of the paper, in a checkout of the project: vanedamp paper -o paper"""
+All figures of the paper, in a checkout of the project: vanedamp paper -o out/paper"""
 _RIGID_COMMANDS = """\
 The same, step by step:
     cd {folder}
