@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from vanedamp.coupling.system.system import FLOOR, STOP, SURFACES, System
 from vanedamp.coupling.system.units import (
     Body,
     Law,
+    Unit,
     check_friction,
     coefficient,
     contacts_of,
@@ -55,54 +56,149 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     basis = basis or basis_of(scene)
     n, omega, shares = len(basis.stiffness), 2 * np.pi * scene.frequency, scene.excitation.shares
     check_directions(scene, basis)
-    at = forced_label(scene)
-    forced = interface_row(basis, at, "excitation.at")
+    forced = interface_row(basis, forced_label(scene), "excitation.at")
     bodies = _bodies(scene, n)
-    owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
     surfaces = [_surfaces(scene, basis, index, bodies) for index in range(len(scene.cavity))]
-    base, loads = base_acceleration(scene, basis), body_loads(scene, basis)
+    loads = body_loads(scene, basis)
     table = np.zeros(len(shares), complex)
     if isinstance(scene.structure, Prescribed):
         table = np.array(list(shares.values())) * -1j * scene.structure.displacement_amplitude
-    force = force_shapes(scene, basis, forced) * -1j * force_amplitude(scene, basis, forced) - base @ basis.base.T
+    casing = _casing(scene, basis, bodies[-1].coordinates.stop if bodies else n)
+    size = casing["elongation"].shape[1]
+    excited = _excitation(scene, basis, bodies, loads, forced, table, size)
+    placed = _places(scene, basis, bodies, surfaces, loads, size)
+    mass, holds = _mass(bodies, size), _holding(scene, loads)
+    contacts = _contacts(scene, Law(scene.contact, basis, mass), bodies, surfaces, excited["load"][:, :n])
+    rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
+    units = _columns([*contacts, *rubbing], size)
+    sliders = len(casing["tangential"])
+    massive = slice(size - sliders)
+    # rows of sliders are not to be small beside others
+    pulled = (casing["elongation"][:, :n] ** 2).sum(axis=1)
+    mobility = (units["J"][:, massive] ** 2 / mass[massive]).sum(axis=1)
+    mass[massive.stop :] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
+    stiffness, damping = _stiffness(scene, basis, bodies, loads, placed["floor"], size)
+    response = np.zeros(size)
+    response[:n] = forced
+    system = System(
+        modes=n, bodies=len(bodies), contacts=len(contacts), mass=mass, stiffness=stiffness, damping=damping,
+        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, squares=basis.stiffness,
+        viscous=basis.damping, response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
+        period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
+        restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
+        two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
+    )  # fmt: skip
+    return _with_scales(system)
 
-    casing = [interface_row(basis, damper.at or at, f"friction_damper[{i}].at")
-              for i, damper in enumerate(scene.friction_damper)]  # fmt: skip
-    grip = np.array([coefficient(damper.friction) * damper.normal_force for damper in scene.friction_damper])
-    spring = np.array([np.inf if damper.stiffness is None else damper.stiffness for damper in scene.friction_damper])
+
+# parts of a system by the names of its fields; n modes, N = size coordinates, b bodies
+
+
+def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
+    """Return the friction dampers. first: number of the first slider's coordinate."""
+    dampers, at = scene.friction_damper, forced_label(scene)
+    rows = [
+        interface_row(basis, damper.at or at, f"friction_damper[{number}].at") for number, damper in enumerate(dampers)
+    ]
+    grip = np.array([coefficient(damper.friction) * damper.normal_force for damper in dampers])
+    spring = np.array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])
     jenkins = np.flatnonzero((grip > 0.0) & np.isfinite(spring))
-    massive = bodies[-1].coordinates.stop if bodies else n
-    size = massive + len(jenkins)
-    on_casing = np.zeros((len(casing), size))
-    on_casing[:, :n] = np.reshape(casing, (len(casing), n))
-    elongation = on_casing[jenkins]
-    elongation[:, massive:] = -np.eye(len(jenkins))
+    casing = np.zeros((len(rows), first + len(jenkins)))
+    casing[:, : len(basis.stiffness)] = np.reshape(rows, (len(rows), len(basis.stiffness)))
+    elongation = casing[jenkins]
+    elongation[:, first:] = -np.eye(len(jenkins))
+    return {
+        "casing": casing, "grip": grip, "casing_spring": spring, "tangential": spring[jenkins],
+        "elongation": elongation,
+    }  # fmt: skip
 
-    mass, floor, turn, rise = np.ones(size), *np.zeros((3, len(bodies), size))
+
+def _excitation(
+    scene: Scene, basis: ModalBasis, bodies: list[Body], loads: BodyLoads, forced: np.ndarray, table: np.ndarray,
+    size: int,
+) -> dict[str, Any]:  # fmt: skip
+    """Return loads and weights. forced: (n,) functional of excitation.at; table: (e,) displacements of the base, m."""
+    n, base = len(basis.stiffness), base_acceleration(scene, basis)
+    load, weight = np.zeros((len(table), size), complex), np.zeros(size)
+    amplitude = force_amplitude(scene, basis, forced)
+    load[:, :n] = force_shapes(scene, basis, forced) * -1j * amplitude - base @ basis.base.T
+    floors = [surface_labels(scene, _cavity(scene, body))[2] for body in bodies]
+    accelerated = base @ np.reshape([basis.directions[label] for label in floors], (-1, 3)).T
+    for body, label in zip(bodies, floors, strict=True):
+        k, x, mass = body.number, body.x, body.damper.mass
+        load[:, x] = loads.gradient[k] * table - mass * accelerated[:, k]
+        weight[x] = mass * loads.along[k]
+        if body.shape.extended:
+            weight[x + 1] = -mass * float(loads.across[k])
+            normal = basis.across(label)
+            if normal is not None:
+                load[:, x + 1] = -mass * (base @ normal)
+    return {"load": load, "weight": weight, "alike": bool(np.all(accelerated == accelerated[:, :1]))}
+
+
+def _places(
+    scene: Scene, basis: ModalBasis, bodies: list[Body], surfaces: list[tuple[Surface, ...]], loads: BodyLoads,
+    size: int,
+) -> dict[str, Any]:  # fmt: skip
+    """Return where the bodies are, and how their cavities move."""
+    n, owner = len(basis.stiffness), [_cavity(scene, body) for body in bodies]
+    floor, turn, rise = np.zeros((3, len(bodies), size))
     for body, index in zip(bodies, owner, strict=True):
         ground = surfaces[index][FLOOR]
+        floor[body.number, :n] = ground.motion(0.0, body.b)[0] if body.b > 0.0 else ground.along
+        rise[body.number, :n], turn[body.number, :n] = ground.motion(body.centre, 0.0)[1], ground.turn
+    plays = [min(scene.cavity[index].gap, scene.cavity[index].play or np.inf) for index in owner]
+    shortening = [body.shape.shortening(body.a, body.b) for body in bodies]
+    return {
+        "along": np.array([body.x for body in bodies], np.int64),
+        "tilt": np.array([body.x + 2 if body.shape.extended else -1 for body in bodies], np.int64),
+        "floor": floor, "turn": turn, "rise": rise, "height": np.array([body.b for body in bodies]),
+        "cavity": np.array(owner, np.int64),
+        "neglected": np.array([short / play for short, play in zip(shortening, plays, strict=True)]),
+    }  # fmt: skip
+
+
+def _mass(bodies: list[Body], size: int) -> np.ndarray:
+    """Return the masses (N,) of the coordinates; those of sliders are still open."""
+    mass = np.ones(size)
+    for body in bodies:
         mass[body.coordinates] = body.damper.mass
         if body.shape.extended:
             mass[body.x + 2] = body.damper.moment_of_inertia
-        floor[body.number, :n] = ground.motion(0.0, body.b)[0] if body.b > 0.0 else ground.along
-        rise[body.number, :n], turn[body.number, :n] = ground.motion(body.centre, 0.0)[1], ground.turn
-    load, weight = np.zeros((len(shares), size), complex), np.zeros(size)
-    load[:, :n] = force
-    accelerated = _load_bodies(scene, basis, bodies, owner, base, table, loads, load, weight)
+    return mass
 
-    law = Law(scene.contact, basis, mass)
-    contacts = [unit for index, cavity in enumerate(scene.cavity) for unit in contacts_of(
-        law, cavity, surfaces[index], [body for body in bodies if owner[body.number] == index]
-    )]  # fmt: skip
-    start = abs(scene.initial.displacement) + (abs(scene.initial.velocity) / np.sqrt(basis.stiffness[0]) if n else 0.0)
-    contacts += stops_of(scene, law, np.abs(force).sum(axis=0) / basis.stiffness, start)
-    check_friction(contacts, mass)
-    holds = _holding(scene, loads)
-    sliders = dict(zip(jenkins.tolist(), np.eye(size)[massive:], strict=True))
-    units = [*contacts, *friction_elements(scene, bodies, floor, holds, on_casing, grip, sliders)]
-    u = len(units)
-    J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * u, size))
 
+def _contacts(
+    scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], force: np.ndarray
+) -> list[Unit]:
+    """Return the contacts: cavity by cavity, then the stops. force: (e, n) on the modes. Raises InputError."""
+    contacts: list[Unit] = []
+    for index, cavity in enumerate(scene.cavity):
+        inside = [body for body in bodies if body.damper.cavity == cavity.name]
+        contacts += contacts_of(law, cavity, surfaces[index], inside)
+    squares, begun = law.basis.stiffness, scene.initial
+    start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
+    contacts += stops_of(scene, law, np.abs(force).sum(axis=0) / squares, start)
+    check_friction(contacts, law.mass)
+    return contacts
+
+
+def _columns(units: list[Unit], size: int) -> dict[str, Any]:
+    """Return the units as arrays."""
+    elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
+    J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
+    kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
+    kinds |= dict.fromkeys(("body", "other", "surface", "corner"), np.int64)
+    return {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()} | {
+        "J": J, "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
+    }  # fmt: skip
+
+
+def _stiffness(
+    scene: Scene, basis: ModalBasis, bodies: list[Body], loads: BodyLoads, floor: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return stiffness and damping (N, N) of structure and bodies on springs, dashpots and tracks."""
+    n = len(basis.stiffness)
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(basis.stiffness), basis.damping
     for body, pull, drag in zip(bodies, *binding(scene, loads), strict=True):
@@ -112,36 +208,12 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
             stiffness += pull * np.outer(own, own)
             damping += drag * np.outer(own, own)
         stiffness[body.x, body.x] -= loads.gradient[body.number]
-    elements = np.reshape([unit.element for unit in units], (u, 3)).astype(float)
-    # rows of sliders are not to be small beside others
-    pulled = (elongation[:, :n] ** 2).sum(axis=1)
-    mobility = (J[:, :massive] ** 2 / mass[:massive]).sum(axis=1)
-    mass[massive:] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
+    return stiffness, damping
 
-    def column(name: str, kind: type = float) -> np.ndarray:
-        return np.array([getattr(unit, name) for unit in units], kind)
 
-    response = np.zeros(size)
-    response[:n] = forced
-    system = System(
-        modes=n, bodies=len(bodies), contacts=len(contacts),
-        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, mass=mass,
-        stiffness=stiffness, damping=damping, squares=basis.stiffness, viscous=basis.damping, load=load, weight=weight,
-        alike=bool(np.all(accelerated == accelerated[:, :1])), response=response, table=table,
-        frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0, J=J,
-        rest=column("rest"),
-        delassus=(J / mass) @ J.T, friction=column("friction"), limit=column("limit"), restitution=elements[:, 0],
-        restitution_at=law_address(scene.contact, elements[: len(contacts), 0]), spring=elements[:, 1],
-        dashpot=elements[:, 2], tangential=spring[jenkins], elongation=elongation,
-        two_phases=scene.contact.two_phases, play=column("play"), body=column("body", np.int64),
-        other=column("other", np.int64), surface=column("surface", np.int64), corner=column("corner", np.int64),
-        along=np.array([body.x for body in bodies], np.int64),
-        tilt=np.array([body.x + 2 if body.shape.extended else -1 for body in bodies], np.int64),
-        floor=floor, turn=turn, rise=rise, height=np.array([body.b for body in bodies]),
-        cavity=np.array(owner, np.int64), holds=holds, neglected=_neglected(scene, bodies, owner),
-        casing=on_casing, grip=grip, casing_spring=spring,
-    )  # fmt: skip
-    return _with_scales(system)
+def _cavity(scene: Scene, body: Body) -> int:
+    """Return the number of a body's cavity."""
+    return [cavity.name for cavity in scene.cavity].index(body.damper.cavity)
 
 
 def at_frequency(system: System, frequency: float) -> System:
@@ -189,33 +261,6 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int, bodies: list[Body]) -
     name = scene.cavity[index].name
     high = any(body.b > 0.0 for body in bodies if body.damper.cavity == name)
     return surfaces_of(scene, basis, index) if high or scene.planar else walls_and_floor(scene, basis, index)
-
-
-def _load_bodies(
-    scene: Scene, basis: ModalBasis, bodies: list[Body], owner: list[int], base: np.ndarray, table: np.ndarray,
-    loads: BodyLoads, load: np.ndarray, weight: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Set the loads (e, N) and weights (N,) of the bodies. Return the base's accelerations along them (e, b)."""
-    floors = [surface_labels(scene, index)[2] for index in owner]
-    accelerated = base @ np.reshape([basis.directions[label] for label in floors], (-1, 3)).T
-    for body, label in zip(bodies, floors, strict=True):
-        k, x, mass = body.number, body.x, body.damper.mass
-        load[:, x] = loads.gradient[k] * table - mass * accelerated[:, k]
-        weight[x] = mass * loads.along[k]
-        if body.shape.extended:
-            weight[x + 1] = -mass * float(loads.across[k])
-            normal = basis.across(label)
-            if normal is not None:
-                load[:, x + 1] = -mass * (base @ normal)
-    return accelerated
-
-
-def _neglected(scene: Scene, bodies: list[Body], owner: list[int]) -> np.ndarray:
-    """Return the shortening (b,) of each body over the smallest play, per square of its tilt; nan for sliders."""
-    plays = [min(scene.cavity[index].gap, scene.cavity[index].play or np.inf) for index in owner]
-    return np.array([
-        body.shape.shortening(body.a, body.b) / play for body, play in zip(bodies, plays, strict=True)
-    ])  # fmt: skip
 
 
 def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:

@@ -223,13 +223,11 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
 
 
 def friction_elements(
-    scene: Scene, bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray,
-    sliders: dict[int, np.ndarray],
-) -> Iterator[Unit]:  # fmt: skip
+    scene: Scene, bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray
+) -> Iterator[Unit]:
     """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, then Jenkins elements.
 
-    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System; sliders: rows (N,) of the coordinates of the
-    Jenkins elements' sliders by the number of the friction damper. Elements without a limit are none.
+    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System. Elements without a limit are none.
     """
     none = np.zeros(floor.shape[1])
     for body in bodies:
@@ -237,9 +235,14 @@ def friction_elements(
             slip = -floor[body.number]
             slip[body.x] += 1.0
             yield Unit(none, slip, body=body.number, surface=FLOOR, limit=float(holds[body.number]))
-    for number in sorted(range(len(scene.friction_damper)), key=sliders.__contains__):
-        if grip[number] > 0.0:
-            yield Unit(none, sliders.get(number, casing[number]), body=number, limit=float(grip[number]))
+    rubbing = np.flatnonzero(grip > 0.0)
+    jenkins = [number for number in rubbing if scene.friction_damper[number].stiffness is not None]
+    for number in rubbing:
+        if number not in jenkins:
+            yield Unit(none, casing[number], body=int(number), limit=float(grip[number]))
+    sliders = np.eye(len(none))[len(none) - len(jenkins) :]
+    for number, slider in zip(jenkins, sliders, strict=True):
+        yield Unit(none, slider, body=int(number), limit=float(grip[number]))
 
 
 def coefficient(friction: float) -> float:
