@@ -48,7 +48,7 @@ def test_a_block_that_leans_within_its_friction_cones_stays(mu):
 def test_a_block_that_leans_almost_upright_stays(slim):
     """One corner almost above the other: its contacts' rows depend on each other but for the share a/b.
 
-    In each of three periods T it may creep by a share of 1e-13 of what the load moves a free body, g T^2/2.
+    In each of three periods T it may creep by a share of 1e-12 of what the load moves a free body, g T^2/2.
     """
     play = 1e-4 * slim
     table = still_table(10.0)
@@ -63,7 +63,7 @@ def test_a_block_that_leans_almost_upright_stays(slim):
     }
     run = planar_run(table, block | {"tilt": play / (2 * slim * B)}, periods=3, play=play)
     assert run.status is Status.OK
-    np.testing.assert_allclose(run.state.q, [0.0, play / 2, play / (2 * slim * B)], rtol=1e-9, atol=1.5e-14)
+    np.testing.assert_allclose(run.state.q, [0.0, play / 2, play / (2 * slim * B)], rtol=1e-9, atol=1.5e-13)
     assert np.count_nonzero(run.state.state != OPEN) == 2
 
 
