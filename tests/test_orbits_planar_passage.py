@@ -8,7 +8,7 @@ import pytest
 
 from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
-from tests.tools.planar import planar_scene
+from tests.tools.planar import initial_motion, planar_scene
 from tests.tools.planar_laws import scene_of, tables
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
@@ -22,7 +22,7 @@ from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, initial_motion
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.report.branch_charts import branches_figure
 

@@ -15,9 +15,10 @@ from benchmarks.methods.peers import PeerRun
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.run import Arc, IvpRun
 from vanedamp.coupling.response.records import new_records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import line_system
 
 if TYPE_CHECKING:
     from sksundae.cvode import CVODEResult
@@ -32,7 +33,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     options = Options(rtol=setting, steps_per_period=_STEPS)
     options.check_samples(samples)
     records = new_records(system, periods, samples)
-    job = CvodeRun(system, *line_start(scene, system), options, records, False)
+    job = CvodeRun(system, line_system(system), start_of(scene, system), options, records, False)
     started = time.thread_time()
     status = job.advance_to(periods)
     seconds = time.thread_time() - started

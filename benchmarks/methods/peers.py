@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.methods.scenes import charted
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
@@ -121,8 +121,9 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    system, initial = line_start(scene, assemble(scene))
-    return Coupled(system, time_grid(system, steps), start(system, initial))
+    whole = assemble(scene)
+    system = line_system(whole)
+    return Coupled(system, time_grid(system, steps), start(system, start_of(scene, whole)))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:

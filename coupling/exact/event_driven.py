@@ -29,14 +29,16 @@ from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import restart_state
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.system import System
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 #: imbalance of the ledger above which a response is not to be used: ordinary runs stay ten thousand times below
 _OPEN_LEDGER = 1e-6
+#: parts of a system that decide its subsystems (exact.subsystem_assembly.Subsystem)
+_OF_SUBSYSTEMS = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
 
 
 @dataclass
@@ -62,21 +64,20 @@ def is_common(system: LineSystem, modes: int) -> bool:
 class EngineRun:
     """The mutable state of one run and the subsystems it has met.
 
-    whole: the scene's system; system: its rows; known: subsystems that earlier runs have met, of this system or of one
-    that differs by its frequency only; new ones are added.
+    whole: the scene's system; system: its rows; known: subsystems that it has met, and those of `reuse`.
     """
 
     def __init__(
-        self, whole: System, system: LineSystem, initial: InitialMotion, records: Records, events: bool,
-        max_events: int, known: dict[bytes, Subsystem] | None = None,
+        self, whole: System, system: LineSystem, start: RestartState, records: Records, events: bool,
+        max_events: int,
     ) -> None:  # fmt: skip
         self.whole, self.system, self.records, self.max_events = whole, system, records, max_events
-        self.known = {} if known is None else known
+        self.known: dict[bytes, Subsystem] = {}
         self.begun, self.ended = False, False
         self.flows = empty_flows(system)
         self.log = _Log(events, [])
         modes = self.flows.eigenvalue.shape[1]
-        self.state = new_state(system, modes, initial)
+        self.state = new_state(system, modes, start)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
         self._advance_compiled = automaton.advance
@@ -84,6 +85,12 @@ class EngineRun:
             self._advance_compiled = automaton.advance.sized(
                 system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
             )
+
+    def reuse(self, earlier: EngineRun) -> None:
+        """Take over the subsystems that an earlier run has met, if its system has the same, at whatever frequency."""
+        pairs = ((getattr(self.whole, name), getattr(earlier.whole, name)) for name in _OF_SUBSYSTEMS)
+        if all(one is other or np.array_equal(one, other) for one, other in pairs):
+            self.known = earlier.known
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Return the code of numerics.codes.
@@ -135,11 +142,17 @@ class EngineRun:
         """Return the state at the end of the periods done; None for a run that ended within one."""
         if self.ended:
             return None
-        state, s, n = self.state, int(self.state.counters[FLOW]), self.system.modes
+        state, system, s = self.state, self.system, int(self.state.counters[FLOW])
+        n, b, dampers = system.modes, system.bodies, slice(system.bodies, system.friction_rows)
         awake = slice(state.counters[AWAKE])
         y = (state.amplitude[awake] @ self.flows.shape[s, awake]).real
         y[: len(state.constant)] += state.constant
-        return restart_state(self.system, InitialMotion(y[:n], y[n:], state.displacement, state.velocity))
+        elongation = np.where(np.isfinite(system.spring), state.displacement, 0.0)[dampers]
+        parts = (
+            system.scale * y[:n], system.scale * y[n:], state.displacement[:b], state.velocity[:b], elongation,
+            self.whole.travels,
+        )  # fmt: skip
+        return RestartState(*map(frozen, parts))
 
     def outcome(self) -> Outcome:
         """Return the results of the run."""

@@ -25,10 +25,10 @@ from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Whole
 
@@ -57,10 +57,10 @@ class Options(PenaltyOptions):
         return self.steps_per_period * self.substeps
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
     options: Any = scene.solver
-    line, initial = line_start(scene, system)
+    line = line_system(system)
     loads = line_loads(scene, line)
     times = time_grid(line, options.steps_per_period, loads)
     soft, slow = with_penalty(line, times, options)
@@ -76,7 +76,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
         )  # fmt: skip
 
     rows = rows_of_line(system)
-    return SteppedRun(system, rows, march, start(soft, initial), records, events, options.smallest_steps)
+    return SteppedRun(system, rows, march, start(soft, begun), records, events, options.smallest_steps)
 
 
 def cosimulation_matrices(

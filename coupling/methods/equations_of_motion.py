@@ -8,9 +8,10 @@ import numpy as np
 
 from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, loads_of
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.system import System
 
 
@@ -79,11 +80,12 @@ def time_grid(system: LineSystem | System, steps: int, loads: Loads | None = Non
     )  # fmt: skip
 
 
-def start(system: LineSystem, initial: InitialMotion) -> Motion:
+def start(system: LineSystem, begun: RestartState) -> Motion:
     """Return the motion at time zero."""
-    size, r, b = len(system.mass), len(system.J), system.bodies
-    q = np.concatenate([initial.p, initial.displacement[:b] + system.floor @ initial.p])
-    v = np.concatenate([initial.p_rate, initial.velocity[:b] + system.floor @ initial.p_rate])
+    size, r = len(system.mass), len(system.J)
+    p, rate = begun.displacement / system.scale, begun.velocity / system.scale
+    q = np.concatenate([p, begun.slip + system.floor @ p])
+    v = np.concatenate([rate, begun.slip_velocity + system.floor @ rate])
     return Motion(
         q=q, v=v, half=np.zeros(size), force=np.zeros(r), elongation=np.zeros(system.friction_rows),
         active=np.zeros(r, np.int64), speed=np.zeros(r), begun=np.zeros(r), impulse=np.zeros(r), deepest=np.zeros(1),

@@ -36,10 +36,10 @@ from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
@@ -63,12 +63,12 @@ class Options(SteppingOptions, PlanarOptions):
     """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
     """Return a run. Raises InputError for bodies that overlap at the start."""
     options: Any = scene.solver
     if scene.planar:
-        return _begin_planar(scene, system, options, records, events)
-    line, initial = line_start(scene, system)
+        return _begin_planar(scene, system, options, records, events, begun)
+    line = line_system(system)
     times, theta, problem = line_grid(scene, line, options.steps_per_period), options.theta, new_problem(len(line.J))
     matrices = moreau_matrices(line, times, theta)
     budget, deepest = options.max_events, options.penetration
@@ -77,15 +77,17 @@ def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
         return march_moreau(line, times, motion, records, log, problem, *matrices, theta, until, budget, deepest)
 
     rows = rows_of_line(system)
-    return SteppedRun(system, rows, march, start(line, initial), records, events, options.smallest_steps)
+    return SteppedRun(system, rows, march, start(line, begun), records, events, options.smallest_steps)
 
 
-def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
+def _begin_planar(
+    scene: Scene, whole: System, options: Any, records: Records, events: bool, begun: RestartState
+) -> Run:
     """Return a run of bodies in the plane."""
     from vanedamp.coupling.methods.planar import moreau as planar  # its kernels are loaded when they are wanted
     from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
 
-    system, initial, times = planar_start(scene, whole, options.steps_per_period)
+    system, initial, times = planar_start(scene, whole, options.steps_per_period, begun)
     theta, budget, deepest = options.theta, options.max_events, options.penetration
     matrices = planar.step_matrices(system, times.step, theta)
 

@@ -19,9 +19,10 @@ from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError, Real
 
@@ -55,7 +56,7 @@ class Options(PenaltyOptions, PlanarOptions):
         return self
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
     """Return a run.
 
     Raises InputError for a rigid contact of restitution 0, and in the plane for implicit schemes and for bodies that
@@ -63,8 +64,8 @@ def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
     """
     options: Any = scene.solver
     if scene.planar:
-        return _begin_planar(scene, system, options, records, events)
-    line, initial = line_start(scene, system)
+        return _begin_planar(scene, system, options, records, events, begun)
+    line = line_system(system)
     times = line_grid(scene, line, options.steps_per_period)
     soft, slow = with_penalty(line, times, options)
     budget, deepest = options.max_events, options.penetration
@@ -84,10 +85,12 @@ def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
             return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, until, budget, deepest)
 
     rows = rows_of_line(system)
-    return SteppedRun(system, rows, march, start(soft, initial), records, events, options.smallest_steps)
+    return SteppedRun(system, rows, march, start(soft, begun), records, events, options.smallest_steps)
 
 
-def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
+def _begin_planar(
+    scene: Scene, whole: System, options: Any, records: Records, events: bool, begun: RestartState
+) -> Run:
     """Return a run of bodies in the plane."""
     from vanedamp.coupling.methods.planar import penalty as planar  # its kernels are loaded when they are wanted
     from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
@@ -97,7 +100,7 @@ def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, e
             f'solver.scheme: "{options.scheme}" takes sliders only; bodies with extent, stiffness or dashpot take '
             '"central_difference"'
         )
-    system, initial, times = planar_start(scene, whole, options.steps_per_period)
+    system, initial, times = planar_start(scene, whole, options.steps_per_period, begun)
     forces, inverse = planar.penalty_forces(system, times.step, options), planar.step_matrix(system, times.step)
     budget, deepest = options.max_events, options.penetration
 

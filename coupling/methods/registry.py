@@ -10,7 +10,7 @@ from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed
+from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
@@ -57,8 +57,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     records = new_records(
         system, most_periods(scene), samples_per_period, isinstance(scene.structure, Rom), deflects(scene, system)
     )
-    further = {} if start is None else {"start": at_speed_of(scene, start)}
-    return method.begin(scene, system, records, events, **further)
+    return method.begin(scene, system, records, events, start_of(scene, system, start))
 
 
 def _check_bodies(scene: Scene, method: Method) -> None:
@@ -89,8 +88,6 @@ def _check_bodies(scene: Scene, method: Method) -> None:
 
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
-    if scene.planar and not scene.contact.rigid:
-        return "runs of bodies in the plane whose contacts are springs leave no state for another"
     return _why_not(scene.solver.method, "RESTARTS")
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from vanedamp.coupling.numerics.codes import STICK
 from vanedamp.coupling.orbits.planar_names import UnitNames
 from vanedamp.coupling.planar.contact_flow import ContactFlows
-from vanedamp.coupling.planar.restart import planar_restart_state
+from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.assembly import Motion, assemble
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 
@@ -43,7 +43,7 @@ class Frame:
 
     def restart_at(self, q: np.ndarray, v: np.ndarray) -> RestartState:
         """Return the restart state of coordinates (N,) and their rates."""
-        return planar_restart_state(self.system, q, v)
+        return state_at(self.system, Motion(q, v))
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) of a restart state."""

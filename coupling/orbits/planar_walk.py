@@ -21,7 +21,6 @@ from vanedamp.coupling.numerics.codes import (
     BOUNDED,
     CLOSES,
     EVENTS,
-    LEAVING,
     OPEN,
     PARTS,
     PERIOD,
@@ -38,10 +37,10 @@ from vanedamp.coupling.orbits.planar_segment import Guard, Segment, acceleration
 from vanedamp.coupling.orbits.saltation import saltation
 from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.planar.planar_run import PlanarRun
-from vanedamp.coupling.planar.restart import planar_restart
 from vanedamp.coupling.response.event_log import WIDTH
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import fitted, motion_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.assembly import Motion
 
@@ -80,17 +79,12 @@ class Walk:
         self.given[:, len(begun) - len(frame.drawn) :][:, np.abs(elongation) > most] = 0.0
         elongation[:] = np.clip(elongation, -most, most)
         motion = Motion(*np.split(frame.from_state @ begun, 2))
-        gap, speed = frame.gaps(motion.q), frame.system.J[: len(frame.system.rest)] @ motion.v
+        gap = frame.gaps(motion.q)
         yields = np.isfinite(self.system.spring)
         if np.any((gap < -_NOTHING * self.system.play)[~yields & (np.arange(len(gap)) < self.system.contacts)]):
             self._worsen(PassageStatus.GRAZING)  # a body that would begin in a wall is put beside it
-            motion = planar_restart(frame.system, start)
+            motion = motion_of(frame.system, fitted(frame.system, start))
         self.run = PlanarRun(frame.system, motion, new_records(frame.system, periods, 0), True, 0)
-        # a spring that is compressed pushes, or lags behind the body that leaves it
-        inside = yields & (gap < -SIMULTANEOUS * self.system.play)
-        stiffness = np.where(yields, self.system.spring, 0.0)
-        pushes = stiffness * gap + self.system.dashpot * speed < 0.0
-        self.run.state.state[inside] = np.where(pushes, SLIP_RIGHT, LEAVING)[inside]
         if frame.flows:
             self.run.flows = frame.flows[0]
         self.middle: Segment  # in which half of the first period is over

@@ -9,13 +9,13 @@ from vanedamp.coupling.exact.state import State
 from vanedamp.coupling.numerics.codes import CLOSED, STICK, TOUCHING
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.system.line_system import InitialMotion
+from vanedamp.coupling.system.line_system import row_motion
 
 #: a force this close to its bound, as a share of its terms, is at it
 _NEAR = 1e-9
 
 
-def clipped(dynamics: SliderDynamics, start: RestartState, initial: InitialMotion) -> np.ndarray:
+def clipped(dynamics: SliderDynamics, start: RestartState, initial: RestartState) -> np.ndarray:
     """Return the derivative (k, k) of the state that a run begins with: bodies in walls are moved out of them.
 
     Springs of friction dampers are unloaded to their bounds.
@@ -23,14 +23,16 @@ def clipped(dynamics: SliderDynamics, start: RestartState, initial: InitialMotio
     system = dynamics.system
     n, b = system.modes, system.bodies
     kept = np.eye(dynamics.k)
-    moved = np.flatnonzero(initial.displacement[dynamics.springs] != start.elongation[dynamics.springs - b])
+    moved = np.flatnonzero((initial.elongation != start.elongation)[dynamics.springs - b])
     kept[2 * (n + b) + moved, 2 * (n + b) + moved] = 0.0
-    pushed = np.flatnonzero(initial.displacement[:b] != start.slip)
+    pushed = np.flatnonzero(initial.slip != start.slip)
     if len(pushed):
         # gaps of bodies that were pushed and are closed now stay closed
         gap, slips = dynamics.place @ dynamics.from_state, 2 * n + np.arange(b)
         rows = np.arange(system.friction_rows, len(system.J))
-        shut = np.abs(initial.displacement[rows]) <= SIMULTANEOUS * system.free_travel[rows]
+        p = initial.displacement / system.scale
+        places, _ = row_motion(system, initial.slip, initial.slip_velocity, p, 0.0 * p, initial.elongation)
+        shut = np.abs(places[rows]) <= SIMULTANEOUS * system.free_travel[rows]
         rows = rows[shut & np.any(gap[np.ix_(rows, slips[pushed])] != 0.0, axis=1)]
         follow = -np.linalg.pinv(gap[np.ix_(rows, slips[pushed])]) @ gap[rows]
         follow[:, slips[pushed]] = 0.0

@@ -32,7 +32,7 @@ from vanedamp.coupling.orbits.slider_event import Across, Before, Untrusted, acr
 from vanedamp.coupling.orbits.slider_names import RowNames
 from vanedamp.coupling.orbits.slider_start import clipped, loose
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, new_records
-from vanedamp.coupling.response.restart import restart_from
+from vanedamp.coupling.response.restart import fitted
 from vanedamp.coupling.response.restart_state import RestartState
 
 #: events a period after which a passage gives up: each is a step of Python
@@ -61,7 +61,7 @@ class Walk:
         self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int, flows: list[Flows]
     ) -> None:
         self._dynamics, self._names, self._periods, self._start = dynamics, names, periods, start
-        self._initial = restart_from(dynamics.system, start)
+        self._initial = fitted(dynamics.whole, start)
         self._budget = EVENTS_A_PERIOD * periods
         records = new_records(dynamics.whole, periods, 0)
         self.run = EngineRun(dynamics.whole, dynamics.system, self._initial, records, True, self._budget)
@@ -143,10 +143,10 @@ class Walk:
         """Return state and derivative after the decision of the initial state."""
         dynamics, initial, b = self._dynamics, self._initial, self._dynamics.system.bodies
         given = dynamics.from_state @ np.concatenate([
-            dynamics.scale * initial.p, dynamics.scale * initial.p_rate, initial.displacement[:b],
-            initial.velocity[:b], initial.displacement[dynamics.springs],
+            initial.displacement, initial.velocity, initial.slip, initial.slip_velocity,
+            initial.elongation[dynamics.springs - b],
         ])  # fmt: skip
-        moved = np.abs(dynamics.scale * initial.p - self._start.displacement)
+        moved = np.abs(initial.displacement - self._start.displacement)
         if np.any(moved > SIMULTANEOUS * dynamics.sizes[: len(moved)]):
             self._status = PassageStatus.GRAZING  # the structure would begin beyond a stop
         u, hit = self._state(), np.flatnonzero(self.run.scratch.impulse)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from vanedamp.coupling.exact.complex_modes import IllConditioned
@@ -20,27 +22,18 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
-from vanedamp.coupling.planar.restart import planar_restart, planar_restart_state
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, initial_motion
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
 _OPEN_LEDGER = 1e-6
-
-
-def begin_run(
-    scene: Scene, system: System, records: Records, events: bool, max_events: int, start: RestartState | None = None
-) -> PlanarRun:
-    """Return a run of a scene at time zero, from its initial motion or the state of another run. Raises InputError."""
-    initial = initial_motion(scene, system) if start is None else planar_restart(system, start)
-    return PlanarRun(system, initial, records, events, max_events, getattr(scene.solver, "linearisation", 0.01))
 
 
 class PlanarRun:
@@ -58,6 +51,11 @@ class PlanarRun:
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
         self.chunks: list[np.ndarray] = []
         self.begun = False
+
+    def reuse(self, earlier: PlanarRun) -> None:
+        """Take over the flows that an earlier run has met, if it is one of the same system."""
+        if all(map(partial(np.array_equal, equal_nan=True), self.system, earlier.system)):
+            self.flows = earlier.flows
 
     def advance_to(self, periods: int) -> Status:
         """Continue to the end of `periods`, or to what ends the run."""
@@ -100,4 +98,4 @@ class PlanarRun:
         """Return the state at the end of the periods done; None for a run that ended within one."""
         if self.ended:
             return None
-        return planar_restart_state(self.system, self.state.q, self.state.v)
+        return state_at(self.system, Motion(self.state.q, self.state.v))

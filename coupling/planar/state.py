@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
-from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
+from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.response.records import ENERGIES, Records
@@ -109,12 +110,15 @@ class Scratch(NamedTuple):
 
 
 def new_state(system: System, modes: int, initial: Motion, records: Records) -> PlanarState:
-    """Return the state at time zero."""
+    """Return the state at time zero. A spring that is compressed pushes, or lags behind the body that leaves it."""
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
-    samples = len(records.samples)
+    samples, sprung = len(records.samples), np.isfinite(system.spring)
+    gap, speed = system.rest + system.J[:u] @ initial.q, system.J[:u] @ initial.v
+    pushes = np.where(sprung, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
+    state = np.where(sprung & (gap < -SIMULTANEOUS * system.play), np.where(pushes, SLIP_RIGHT, LEAVING), OPEN)
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
-        state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
+        state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),

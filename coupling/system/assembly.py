@@ -1,4 +1,4 @@
-"""From a scene to its system, and to the motion that it begins with."""
+"""From a scene to its system."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
-from vanedamp.coupling.system.shapes import shape_of
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
-from vanedamp.coupling.system.system import FLOOR, STOP, SURFACES, System
+from vanedamp.coupling.system.system import FLOOR, System
 from vanedamp.coupling.system.units import (
     Body,
     Law,
@@ -30,12 +29,9 @@ from vanedamp.coupling.system.units import (
     friction_elements,
     stops_of,
 )
-from vanedamp.files.toml_input import InputError
 
 #: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
-#: relative tolerance of the play by which a contact may overlap at the start
-_ROUND_OFF = 1e-12
 
 #: loads (k, N) on the coordinates of a system, N, at angles omega t (k,) in [0, 2 pi)
 Loads = Callable[[np.ndarray], np.ndarray]
@@ -285,40 +281,3 @@ def with_sine(scene: Scene) -> Scene:
     """Return the scene with a sine in place of its waveform."""
     plain = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
     return replace(scene, excitation=plain)
-
-
-def initial_motion(scene: Scene, system: System) -> Motion:
-    """Return the motion that a scene begins with. Raises InputError for what would overlap a surface or a stop."""
-    n, size = system.modes, len(system.mass)
-    q, v = np.zeros(size), np.zeros(size)
-    # an initial state is that of a rigid structure: others have none
-    q[:n], v[:n] = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
-    for k, damper in enumerate(scene.damper):
-        x, shape = system.along[k], shape_of(damper)
-        q[x] = damper.position + system.floor[k] @ q
-        v[x] = damper.velocity + system.floor[k] @ v
-        if shape.extended:
-            # a tilted block stands on its corner unless it is lifted higher
-            lifted = damper.lift + shape.rise(damper.half_extent[0], damper.tilt)
-            q[x + 1 : x + 3] = lifted + system.rise[k] @ q, damper.tilt + system.turn[k] @ q
-            v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
-    place_sliders(system, q, np.zeros(len(system.tangential)))
-    gaps = system.rest + system.J[: len(system.rest)] @ q
-    for unit in range(system.contacts):
-        if gaps[unit] < -_ROUND_OFF * system.play[unit]:
-            if system.surface[unit] == STOP:
-                raise InputError(
-                    f"initial.displacement: the structure would begin {-gaps[unit]:.3g} m beyond "
-                    f"stop[{system.body[unit]}]"
-                )
-            raise InputError(
-                f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
-                f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
-            )
-    return Motion(q, v)
-
-
-def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:
-    """Place the sliders of Jenkins elements in q (N,) so that their springs have an elongation (j,), m."""
-    sliders = slice(len(q) - len(elongation), None)
-    q[sliders] += system.elongation @ q - elongation

@@ -13,9 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, Part, System
-from vanedamp.files.toml_input import InputError
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -74,11 +72,6 @@ class LineSystem(NamedTuple):
         return self.friction_rows - self.bodies
 
     @property
-    def travels(self) -> np.ndarray:
-        """Free travel (c,) of each gap, m."""
-        return self.free_travel[self.friction_rows :]
-
-    @property
     def order(self) -> np.ndarray:
         """Multiples (e,) of omega that the harmonics are."""
         return np.rint(self.frequency / self.omega).astype(int)
@@ -132,29 +125,6 @@ def line_system(system: System) -> LineSystem:
         right_body=np.r_[np.full(b + d, -1), right],
         moves_with_floor=contact & on_bodies.any(axis=1) & alike,
     )  # fmt: skip
-
-
-class InitialMotion(NamedTuple):
-    """Motion at time zero: modal coordinates (n,) and their rates, displacements (r,) and velocities of the rows."""
-
-    p: np.ndarray
-    p_rate: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-
-
-def initial_motion(scene: Scene, system: LineSystem) -> InitialMotion:
-    """Return the motion that a scene begins with. Raises InputError for a structure that begins beyond a stop."""
-    n, initial = system.modes, scene.initial
-    p, p_rate = np.full(n, initial.displacement / system.scale), np.full(n, initial.velocity / system.scale)
-    slip = np.array([damper.position for damper in scene.damper])
-    speed = np.array([damper.velocity for damper in scene.damper])
-    unloaded = np.zeros(system.friction_rows - system.bodies)
-    motion = InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
-    for index, gap in enumerate(motion.displacement[len(system.J) - len(scene.stop) :]):
-        if gap < 0.0:
-            raise InputError(f"initial.displacement: the structure would begin {-gap:g} m beyond stop[{index}]")
-    return motion
 
 
 def row_motion(

@@ -129,11 +129,18 @@ class System(NamedTuple):
 
     @property
     def travels(self) -> np.ndarray:
-        """Free travel (c,) of each gap along a cavity, from left to right, and of each stop, m."""
-        along = np.isin(self.surface[: self.contacts], (LEFT, RIGHT, BODY, STOP))
-        pairs = np.column_stack([self.surface[: self.contacts], self.body[: self.contacts]])[along]
-        first = np.sort(np.unique(pairs, axis=0, return_index=True)[1])
-        return np.asarray(self.play[: self.contacts][along][first])
+        """Free travel (contacts,) of each contact, m: along its cavity or across it."""
+        return self.play[: self.contacts]
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether it has more than bodies that slide: extent, springs or tracks of bodies, or impacts of two phases.
+
+        Then it has no rows in a line (system.line_system).
+        """
+        own = slice(self.modes, None)
+        bound = self.stiffness[own].any() or self.damping[own].any()
+        return bool(self.two_phases or bound or (self.tilt >= 0).any())
 
     @property
     def order(self) -> np.ndarray:

@@ -9,10 +9,11 @@ from pydantic import Field
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import motion_of
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PERIOD_SECONDS, PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.assembly import initial_motion
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.system import System, on_structure
 from vanedamp.files.toml_input import Positive, Real, Whole
 
@@ -41,13 +42,13 @@ class Options(SteppingOptions, PlanarOptions):
         return PERIOD_SECONDS + _STEP_SECONDS * self.steps_per_period
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
-    """Return a run. Raises InputError for bodies in the plane that overlap at the start."""
+def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
+    """Return a run."""
     options: Any = scene.solver
     if scene.planar:  # kernels are loaded when they are wanted
         from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
 
-        return PlanarIvpRun(on_structure(system), options, initial_motion(scene, system), records, events)
+        return PlanarIvpRun(on_structure(system), options, motion_of(system, start), records, events)
     from vanedamp.coupling.methods.scipy_ivp.run import IvpRun
 
-    return IvpRun(system, *line_start(scene, system), options, records, events)
+    return IvpRun(system, line_system(system), start, options, records, events)

@@ -32,7 +32,8 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.line_system import LineSystem, row_motion
 from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
@@ -47,15 +48,16 @@ class IvpRun(EventLoop):
     AT_ONCE = COLLAPSE
 
     def __init__(
-        self, whole: System, system: LineSystem, initial: InitialMotion, options: Options, records: Records,
+        self, whole: System, system: LineSystem, start: RestartState, options: Options, records: Records,
         events: bool,
     ) -> None:  # fmt: skip
         self.system = system
         self.unforced = u = Unforced(system)
         record = Recorder(u, records, options.steps_per_period, events)
         super().__init__(whole, rows_of_line(whole), options, record, np.zeros(u.size + record.count))
-        self.y[u.p], self.y[u.d] = initial.p, initial.displacement
-        self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
+        p, rate = start.displacement / system.scale, start.velocity / system.scale
+        self.y[u.p], self.y[u.p_rate] = p, rate
+        self.y[u.d], self.y[u.s] = row_motion(system, start.slip, start.slip_velocity, p, rate, start.elongation)
         self.problem = new_problem(u.r)
         self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
         nothing = np.zeros(u.r, int)
