@@ -8,10 +8,13 @@ import numpy as np
 
 from vanedamp.coupling.exact import automaton
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.exact.segments import event_of, segment_of
 from vanedamp.coupling.exact.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.exact.subsystem_assembly import Subsystem, add_flow, empty_flows
 from vanedamp.coupling.numerics.codes import (
     AWAKE,
+    BOUNDED,
+    CARRIED,
     DONE,
     EVALUATIONS,
     EVENTS,
@@ -27,9 +30,10 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
@@ -75,7 +79,7 @@ class EngineRun:
         self.known: dict[bytes, Subsystem] = {}
         self.begun, self.ended = False, False
         self.flows = empty_flows(system)
-        self.log = _Log(events, [])
+        self.log, self._since = _Log(events, []), START
         modes = self.flows.eigenvalue.shape[1]
         self.state = new_state(system, modes, start)
         self.event_functions = new_event_functions(system, modes)
@@ -137,6 +141,23 @@ class EngineRun:
         code = self.advance(periods, self.max_events) if code == DONE else code
         self.ended = code != DONE
         return STATUS_OF[code]
+
+    @property
+    def counters(self) -> np.ndarray:
+        """Counters of the run (numerics.codes)."""
+        return self.state.counters
+
+    def segment(self) -> Segment:
+        """Return the motion from the present state on (response.segment.EventRun)."""
+        st = self.state
+        self._since = Begun(float(st.time[0]), len(self.log.chunks), float(st.ledger[IMPACT_LOSS]))
+        self.event_functions.status[int(st.counters[CARRIED]) :] = BOUNDED  # roots of other segments are none of this
+        return segment_of(self.whole, self.system, self.flows, st)
+
+    def event(self) -> tuple[float, Event]:
+        """Return the last event and the time since the last `segment`, s."""
+        log = self.log.chunks[self._since.chunks :]
+        return event_of(self.whole, self.system, self.state, self.event_functions, self.scratch, log, self._since)
 
     def final(self) -> RestartState | None:
         """Return the state at the end of the periods done; None for a run that ended within one."""

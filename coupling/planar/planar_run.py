@@ -8,6 +8,7 @@ import numpy as np
 
 from vanedamp.coupling.exact.complex_modes import IllConditioned
 from vanedamp.coupling.numerics.codes import (
+    BOUNDED,
     DONE,
     EVALUATIONS,
     EVENTS,
@@ -22,13 +23,15 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
+from vanedamp.coupling.planar.segments import event_of, segment_of
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
@@ -50,7 +53,7 @@ class PlanarRun:
         self.state, self.guards = new_state(system, modes, initial, records), new_guards(system, modes)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
         self.chunks: list[np.ndarray] = []
-        self.begun = False
+        self.begun, self._since = False, START
 
     def reuse(self, earlier: PlanarRun) -> None:
         """Take over the flows that an earlier run has met, if it is one of the same system."""
@@ -82,6 +85,23 @@ class PlanarRun:
             elif code != PAUSED:
                 self.ended = code != DONE
                 return STATUS_OF[int(code)]
+
+    @property
+    def counters(self) -> np.ndarray:
+        """Counters of the run (numerics.codes)."""
+        return self.state.counters
+
+    def segment(self) -> Segment:
+        """Return the motion from the present state on (response.segment.EventRun)."""
+        st = self.state
+        self._since = Begun(float(st.time[0]), len(self.chunks), float(st.ledger[IMPACT_LOSS]))
+        self.guards.status[:] = BOUNDED  # roots of other segments are none of this
+        return segment_of(self.system, self.flows, st)
+
+    def event(self) -> tuple[float, Event]:
+        """Return the last event and the time since the last `segment`, s."""
+        log = self.chunks[self._since.chunks :]
+        return event_of(self.system, self.state, self.guards, self.scratch, log, self._since)
 
     def outcome(self) -> Outcome:
         """Return the results of the run."""

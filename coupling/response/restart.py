@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
 from vanedamp.coupling.system.shapes import shape_of
@@ -47,7 +47,7 @@ def fitted(system: System, state: RestartState) -> RestartState:
 
 def motion_of(system: System, state: RestartState) -> Motion:
     """Return the coordinates (N,) of a state, and their rates."""
-    n, sliders = system.modes, len(system.tangential)
+    n = system.modes
     parts = (
         (state.displacement, state.slip, state.lift, state.tilt),
         (state.velocity, state.slip_velocity, state.lift_velocity, state.tilt_rate),
@@ -60,7 +60,7 @@ def motion_of(system: System, state: RestartState) -> Motion:
             q[x] = slip[b] + floor[b]
             if system.tilt[b] >= 0:
                 q[x + 1], q[x + 2] = lift[b] + rise[b], tilt[b] + turn[b]
-    motion.q[len(motion.q) - sliders :] = system.elongation @ motion.q - state.elongation[_drawn(system)]
+    place_sliders(system, motion.q, state.elongation[_drawn(system)])
     return motion
 
 

@@ -281,3 +281,8 @@ def with_sine(scene: Scene) -> Scene:
     """Return the scene with a sine in place of its waveform."""
     plain = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
     return replace(scene, excitation=plain)
+
+
+def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:
+    """Place the sliders of Jenkins elements in q (N,) so that their springs have an elongation (j,), m."""
+    q[len(q) - len(elongation) :] += system.elongation @ q - elongation

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
-from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, Part, System
+from vanedamp.coupling.system.system import BODY, FLOOR, LEFT, RIGHT, Part, System
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -125,6 +125,13 @@ def line_system(system: System) -> LineSystem:
         right_body=np.r_[np.full(b + d, -1), right],
         moves_with_floor=contact & on_bodies.any(axis=1) & alike,
     )  # fmt: skip
+
+
+def rows_of_units(system: System) -> np.ndarray:
+    """Return the row (u,) of line_system that each unit is: the gap of a contact, the slip of a friction element."""
+    unit, first = np.arange(len(system.rest)), system.bodies + system.dampers
+    elements = system.body + np.where(system.surface == FLOOR, 0, system.bodies)
+    return np.where(unit < system.contacts, first + unit, elements)
 
 
 def row_motion(
