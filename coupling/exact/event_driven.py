@@ -34,7 +34,7 @@ from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -79,7 +79,7 @@ class EngineRun:
         self.known: dict[bytes, Subsystem] = {}
         self.begun, self.ended = False, False
         self.flows = empty_flows(system)
-        self.log, self._since = _Log(events, []), START
+        self.log, self._since, self._rows = _Log(events, []), START, rows_of_units(whole)
         modes = self.flows.eigenvalue.shape[1]
         self.state = new_state(system, modes, start)
         self.event_functions = new_event_functions(system, modes)
@@ -92,6 +92,8 @@ class EngineRun:
 
     def reuse(self, earlier: EngineRun) -> None:
         """Take over the subsystems that an earlier run has met, if its system has the same, at whatever frequency."""
+        if self.whole is earlier.whole:
+            self.flows = earlier.flows
         pairs = ((getattr(self.whole, name), getattr(earlier.whole, name)) for name in _OF_SUBSYSTEMS)
         if all(one is other or np.array_equal(one, other) for one, other in pairs):
             self.known = earlier.known
@@ -152,12 +154,13 @@ class EngineRun:
         st = self.state
         self._since = Begun(float(st.time[0]), len(self.log.chunks), float(st.ledger[IMPACT_LOSS]))
         self.event_functions.status[int(st.counters[CARRIED]) :] = BOUNDED  # roots of other segments are none of this
-        return segment_of(self.whole, self.system, self.flows, st)
+        return segment_of(self.whole, self.system, self._rows, self.flows, st)
 
     def event(self) -> tuple[float, Event]:
         """Return the last event and the time since the last `segment`, s."""
         log = self.log.chunks[self._since.chunks :]
-        return event_of(self.whole, self.system, self.state, self.event_functions, self.scratch, log, self._since)
+        work = self.state, self.event_functions, self.scratch
+        return event_of(self.whole, self.system, self._rows, *work, log, self._since)
 
     def final(self) -> RestartState | None:
         """Return the state at the end of the periods done; None for a run that ended within one."""

@@ -57,7 +57,8 @@ class PlanarRun:
 
     def reuse(self, earlier: PlanarRun) -> None:
         """Take over the flows that an earlier run has met, if it is one of the same system."""
-        if all(map(partial(np.array_equal, equal_nan=True), self.system, earlier.system)):
+        alike = map(partial(np.array_equal, equal_nan=True), self.system, earlier.system)
+        if self.system is earlier.system or all(alike):
             self.flows = earlier.flows
 
     def advance_to(self, periods: int) -> Status:
@@ -94,7 +95,8 @@ class PlanarRun:
     def segment(self) -> Segment:
         """Return the motion from the present state on (response.segment.EventRun)."""
         st = self.state
-        self._since = Begun(float(st.time[0]), len(self.chunks), float(st.ledger[IMPACT_LOSS]))
+        loss, reduced = float(st.ledger[IMPACT_LOSS]), int(st.counters[REDUCED])
+        self._since = Begun(float(st.time[0]), len(self.chunks), loss, reduced)
         self.guards.status[:] = BOUNDED  # roots of other segments are none of this
         return segment_of(self.system, self.flows, st)
 
