@@ -14,7 +14,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.orbits.dynamics import Dynamics, Flow, presses
-from vanedamp.coupling.orbits.jump import Jump, Untrusted, impact, stopped
+from vanedamp.coupling.orbits.jump import Jump, Untrusted, impact
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.response.segment import Event, Segment
@@ -82,12 +82,12 @@ class Derivative:
     status: what is wrong with it so far, if anything.
     """
 
-    def __init__(self, dynamics: Dynamics, start: Start, scale: np.ndarray) -> None:
-        self.dynamics, self.system, self._start, self._scale = dynamics, dynamics.system, start, scale
+    def __init__(self, dynamics: Dynamics, start: Start) -> None:
+        self.dynamics, self.system, self._start, self._scale = dynamics, dynamics.system, start, dynamics.scale
         self.status, self._to_sizes = PassageStatus.OK, np.abs(dynamics.from_state)
         #: size of each coordinate so far, at least that by which it is compared, and largest derivative of each
-        self._size = _LEAST * self._to_sizes @ scale
-        self._reach = np.abs(dynamics.from_state * scale).max(axis=1)
+        self._size = _LEAST * self._to_sizes @ self._scale
+        self._reach = np.abs(dynamics.from_state * self._scale).max(axis=1)
         #: the last event that matters: its time, and how derivatives shift it (k,), by parts of the system
         self._last: tuple[float, dict[int, np.ndarray]] = (-np.inf, {})
 
@@ -189,7 +189,9 @@ class Derivative:
         known = len(np.unique(event.struck)) == len(event.struck)
         known = known and self._agrees(at(follow @ (root * jump.v)), at(left))
         if np.any(np.abs(self.dynamics.rows @ (left - u[rates])) > _CAUGHT * new.speed):  # a chatter has been completed
-            held = follow @ (root[:, None] * stopped(system, new.v, self._start.closed(new), new.speed) / root)
+            still = self._start.closed(new), np.abs(system.J @ new.v).reshape(2, -1) <= _ROUND_OFF * new.speed
+            stuck = still[0] & still[1][1] & (system.friction > 0.0)
+            held = follow @ dynamics.held(still[0] & still[1][0], stuck)[rates, rates]
             derivative, kick = held @ derivative, u[rates] - u_before[rates]
             known = known and self._agrees(at(held @ left), at(u[rates]))
         if not known or not self._agrees(at(u[rates]), u):
@@ -221,16 +223,20 @@ class Derivative:
         for part, shift in shifts.items():
             moved = moved - np.multiply.outer(np.where(owner == part, kick, 0.0), shift)
         matters = event.impulse.any() or self._largest(moved - jump @ M) > _NOTHING * max(self._largest(M), 1.0)
-        closing = self._closing(before, new)
-        if len(closing) > 1:
-            moved = self._closings(before, new, closing)
-        if closing:  # friction stops the slips of neighbours at once where this motion has none
+        yields = np.isfinite(self.system.spring)
+        if event.what == codes.CLOSES and yields[event.unit]:
+            begun = np.flatnonzero((before.segment.state == codes.OPEN) & presses(new.state) & yields)
+            if len(begun) > 1:
+                moved = self._closings(before, new, sorted(begun.tolist(), key=lambda c: c != event.unit))
+            # friction stops the slips of neighbours at once where this motion has none
             moved = dynamics.begun(new.state, presses(new.state)) @ moved
         if not matters:
             return moved
         if any(guard.tangential for guard in guards):
             self.worsen(PassageStatus.GRAZING)
-        if self._ends_chatter(before, guards, event):
+        ends = event.what == codes.CLOSES and len(guards) > 1 and not event.after.any()
+        if ends and np.all(self.system.tilt < 0):
+            # sliders that come to rest at several contacts: nothing is left of gaps and speeds, in any order
             moved = dynamics.held(self._start.closed(new), np.zeros(len(new.state), bool)) @ jump @ M
         elif self._meets(M, guards, shifts, new.start):
             self.worsen(PassageStatus.COINCIDENT)
@@ -242,11 +248,6 @@ class Derivative:
     def _largest(self, M: np.ndarray) -> float:
         """Return the largest entry of a derivative (2N, k) in units of the sizes of states."""
         return float(np.abs(self.dynamics.to_state @ M / self._scale[:, None]).max(initial=0.0))
-
-    def _ends_chatter(self, before: Before, guards: list[Guard], event: Event) -> bool:
-        """Return whether sliders come to rest at several contacts: nothing is left of gaps and speeds, in any order."""
-        slides = np.all(self.system.tilt < 0)
-        return bool(slides and len(guards) > 1 and event.what == codes.CLOSES and not event.after.any())
 
     def _meets(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> bool:
         """Return whether another event takes place at the instant of one, but not in motions beside this one."""
@@ -260,14 +261,6 @@ class Derivative:
                 return True
         return False
 
-    def _closing(self, before: Before, new: Segment) -> list[int]:
-        """Return the contacts that yield and begin at an event by which one closes, that first."""
-        r = before.event.unit
-        if before.event.what != codes.CLOSES or not np.isfinite(self.system.spring[r]):
-            return []
-        begun = (before.segment.state == codes.OPEN) & presses(new.state) & np.isfinite(self.system.spring)
-        return [r, *(c for c in np.flatnonzero(begun).tolist() if c != r)]
-
     def _closings(self, before: Before, new: Segment, closing: list[int]) -> np.ndarray:
         """Return the derivative after contacts that yield have begun at one instant, each by its own gap."""
         dynamics, k, ways = self.dynamics, self.dynamics.one, []
@@ -278,7 +271,7 @@ class Derivative:
                 after = dynamics.flow(state, before.segment.open_force)
                 gradient, rate = dynamics.gap[c, :k], float(dynamics.gap[c] @ flow.X @ before.z)
                 kick = ((after.X - flow.X) @ before.z)[:k]
-                moved, flow = moved - np.multiply.outer(kick, gradient @ moved) / -rate, after
+                moved, flow = moved + np.multiply.outer(kick / rate, gradient @ moved), after
             ways.append(moved)
         if self._largest(ways[0] - ways[1]) > _ONE_INSTANT * self._largest(ways[0]):
             self.worsen(PassageStatus.COINCIDENT)

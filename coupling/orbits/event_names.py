@@ -12,12 +12,8 @@ from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, Syste
 _ALIKE = {int(codes.HELD): int(codes.STICK), int(codes.TOUCHING): int(codes.CLOSED)}
 #: what could happen at a unit, for event functions that stay above zero
 _COULD = {
-    int(code): verb
-    for verb, several in (
-        ("impact", [codes.CLOSES]), ("leaves", [codes.PARTS, codes.OPENS]), ("sticks", [codes.STOPS]),
-        ("slips", [codes.AT_LOW, codes.AT_HIGH]), ("presses", [codes.RECLOSES]),
-    )
-    for code in several
+    int(codes.CLOSES): "impact", int(codes.PARTS): "leaves", int(codes.STOPS): "sticks", int(codes.AT_LOW): "slips",
+    int(codes.AT_HIGH): "slips", int(codes.OPENS): "leaves", int(codes.RECLOSES): "presses",
 }  # fmt: skip
 _WAYS = {int(codes.SLIP_LEFT): " left", int(codes.SLIP_RIGHT): " right"}
 

@@ -69,7 +69,8 @@ class Start:
         if len(pushed):
             # gaps of bodies that were pushed and are closed now stay closed
             gap = system.J[: len(system.rest)] @ self.frame.from_state[: len(system.mass)]
-            shut = self.closed(segment) & np.any(gap[:, slips[pushed]] != 0.0, axis=1)
+            shut = np.abs(system.rest + system.J[: len(gap)] @ segment.q) <= _SHUT * system.play
+            shut &= np.any(gap[:, slips[pushed]] != 0.0, axis=1) & (np.arange(len(gap)) < system.contacts)
             follow = -np.linalg.pinv(gap[np.ix_(shut, slips[pushed])]) @ gap[shut]
             follow[:, slips[pushed]] = 0.0
             kept[slips[pushed]] = follow

@@ -37,7 +37,7 @@ class PassageWalk:
         self.run = engine_run(system, start, new_records(system, periods, 0), True, _EVENTS_A_PERIOD * periods)
         if earlier is not None:
             self.run.reuse(earlier)
-        self._derivative = Derivative(dynamics, Start(frame, dynamics, state), dynamics.scale)
+        self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
         self._crossings: list[Crossing] = []
         self._clearance = (np.inf, "")
         self.half_way: np.ndarray | None = None
