@@ -8,13 +8,14 @@ from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.system import System
 
 
 def engine_run(
     system: System, start: RestartState, records: Records, events: bool, max_events: int, linearisation: float = 0.01
-) -> Run:  # fmt: skip
+) -> EventRun:  # fmt: skip
     """Return a run of the engine that takes all of a system: of sliders, or for bodies in the plane.
 
     linearisation: largest shortening of a tilted body over its play for a status ok. Kernels are loaded when they are

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.response.restart import before_stops, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.excitation import Excitation
@@ -36,8 +35,6 @@ def table_of(scene: Scene) -> RingDownTable:
         raise InputError('ring_down: a prescribed motion does not ring down; take structure.model = "rigid" or "rom"')
     if scene.solver.method != "exact":
         raise InputError(f'ring_down: is for solver.method "exact", not "{scene.solver.method}"')
-    if reason := why_no_restart(scene):
-        raise InputError(f"ring_down: {reason}")
     if table.at is not None and not isinstance(scene.structure, Rom):
         raise InputError("ring_down.at: a structure of one mode has no interface labels; leave it out")
     if table.start != "steady":
