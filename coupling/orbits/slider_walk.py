@@ -116,7 +116,7 @@ class Walk:
                 self._middle = flow, u, time
             # what is left there of other segments is no root of this one
             run.event_functions.status[int(st.counters[CARRIED]) :] = BOUNDED
-            run.log.chunks.clear()
+            run.chunks.clear()
             loss = float(st.ledger[IMPACT_LOSS])
             code = run.advance(int(st.counters[PERIOD]) + 1, int(st.counters[EVENTS]) + 1)
             if code not in (DONE, EVENT_BUDGET) or st.counters[EVENTS] > self._budget:
@@ -166,7 +166,7 @@ class Walk:
         collides = before.order == POSITION and before.meaning == CLOSES and rigid
         impulse = self.run.scratch.impulse if collides else np.zeros(len(before.state))
         after = self._agreed(before.u + dynamics.kick(impulse))
-        met = {int(e[2]): float(e[3]) for chunk in self.run.log.chunks for e in chunk if e[1] == IMPACT}
+        met = {int(e[2]): float(e[3]) for chunk in self.run.chunks for e in chunk if e[1] == IMPACT}
         moment, hit = int(st.counters[PERIOD]) * period + before.time, np.flatnonzero(impulse)
         begins = moment <= SIMULTANEOUS * period
         if begins:
