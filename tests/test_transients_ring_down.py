@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import tomli_w
+from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 import vanedamp as vd
@@ -14,7 +15,9 @@ from tests.test_studies_report import charts
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.segment import Walk
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, bins, cycles, without_rebounds
 from vanedamp.coupling.transients.ring_down_segments import Energy, Followed
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
@@ -235,6 +238,35 @@ def test_energies_of_a_block_are_those_of_the_ledger():
     assert found.status is Status.OK and found.impacts.sum() > 50
     # the block is at rest before the blow
     assert found.energies["initial"] == pytest.approx(0.3**2 / 2, rel=1e-9)
+
+
+def test_a_block_on_springs_against_an_independent_integration():
+    """Turning points of a structure with a block between elastic walls, floor and ceiling: DOP853 on their springs."""
+    block = {"cavity": "c", "mass": 0.1, "shape": "block", "length": 0.012, "height": 0.01, "tilt": 2e-3, "lift": 2e-5}
+    tables = {"cavity": [CAVITY | {"gap": 4e-4, "play": 1e-4}], "damper": [block | {"restitution": 1.0}]}
+    tables |= {"contact": {"law": "compliant", "stiffness": 2e4}, "gravity": {"orientation_deg": 20.0}}
+    data = oscillator(0.01, ring_down=pull(5e-4, 4), **tables)
+    found = vd.ring_down(data)
+    free = free_scene(data, table_of(data))
+    system = assemble(free)
+    u, (q, v) = system.contacts, motion_of(system, blown_or_pulled(data, table_of(data)))
+    J, rest, spring = system.J[:u], system.rest[:u], system.spring[:u]
+
+    def motion(t, y):
+        at, rate = np.split(y, 2)
+        push = spring * np.maximum(-(rest + J @ at), 0.0)
+        force = system.weight - system.stiffness @ at - system.damping @ rate + push @ J
+        return np.r_[rate, force / system.mass]
+
+    turns = lambda t, y: y[len(q)]  # noqa: E731
+    options = {"rtol": 1e-12, "atol": 1e-16, "max_step": 1e-4, "events": turns}
+    other = solve_ivp(motion, (0.0, found.duration), np.r_[q, v], "DOP853", **options)
+    later = other.t_events[0] > 0.0  # the pull turns, too
+    times, x = other.t_events[0][later], other.y_events[0][later, 0] * system.response[0]
+    assert found.status is Status.OK and found.impacts.sum() > 20 and found.energy_residual < 1e-11
+    assert len(x) > 6
+    assert found.time[1:] == pytest.approx(times, rel=1e-7)
+    assert found.displacement[1:] == pytest.approx(x, abs=1e-7 * np.abs(x).max())
 
 
 RHO = 2 / np.pi * 0.3 / 1.7
