@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, set_forces, set_rows
-from vanedamp.coupling.methods.step_records import close_step, copy, open_step, product, record_start
+from vanedamp.coupling.methods.step_records import close_step, multiply, open_step, record_start
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.system.system import System
@@ -27,7 +27,7 @@ def central_difference_matrix(system: System, step: float) -> Sparse:
 def march_central_difference(system, times, motion, records, log, inverse, laws, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
     size, h, steps, half = len(motion.q), times.step, len(times.phase) - 1, motion.half
-    rhs, change, place, old = motion.coordinates[0], motion.coordinates[1], motion.rows[0], motion.rows[1]
+    rhs, change = motion.coordinates[0], motion.coordinates[1]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, laws)
@@ -36,17 +36,17 @@ def march_central_difference(system, times, motion, records, log, inverse, laws,
     while motion.counters[STEPS] < until:
         k = motion.counters[STEPS] % steps
         open_step(system, times, motion, records, k)
-        copy(motion.force, old)
         for i in range(size):
             motion.q[i] += h * half[i]
-        set_rows(system, motion, motion.q, half, place, motion.before)
-        set_forces(system, laws, motion, place, motion.before, motion.q)
-        for row in range(len(old)):
-            motion.impulse[row] = 0.5 * h * (old[row] + motion.force[row])
-        for i in range(size):
-            rhs[i] = net_load(system, times, motion, motion.q, half, k + 1, i)
-        for i in range(size):
-            change[i] = product(inverse, i, rhs)
+        set_rows(system, motion, motion.q, half)
+        for a in range(len(motion.live)):
+            motion.impulse[motion.live[a]] = motion.force[motion.live[a]]
+        set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before)
+        for a in range(len(motion.live)):
+            row = motion.live[a]
+            motion.impulse[row] = 0.5 * h * (motion.impulse[row] + motion.force[row])
+        net_load(system, times, motion, motion.q, half, k + 1, rhs)
+        multiply(inverse, rhs, change)
         for i in range(size):
             motion.v[i] = half[i] + 0.5 * h * change[i]
             half[i] += h * change[i]

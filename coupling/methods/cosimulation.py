@@ -18,7 +18,7 @@ from scipy.linalg import expm
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, loads_at, start, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, penalty_laws, set_forces
-from vanedamp.coupling.methods.step_records import close_step, copy, open_step, record_start
+from vanedamp.coupling.methods.step_records import close_step, copy, open_step, record_start, set_gaps
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
@@ -127,8 +127,8 @@ def march_cosimulation(
         k = motion.counters[STEPS] // substeps % steps
         open_step(system, times, motion, records, k)
         _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k)
-        for row in range(rows):
-            place, rate, bend = 0.0, 0.0, 0.0
+        for a in range(len(motion.live)):
+            row, place, rate, bend = motion.live[a], 0.0, 0.0, 0.0
             motion.before[row], mean[row] = row_speed(system, row, v), 0.0
             for i in range(n):
                 place += system.J[row, i] * q[i]
@@ -156,7 +156,8 @@ def _structure(system, times, motion, matrix, excited, known, force, older, hold
     for i in range(n):
         known[i], known[n + i] = motion.start[0, i], motion.start[1, i]
         constant, slope = 0.0, 0.0
-        for row in range(len(system.J)):
+        for a in range(len(motion.live)):
+            row = motion.live[a]
             constant += system.J[row, i] * force[row]
             if hold == 1:
                 slope += system.J[row, i] * (force[row] - older[row]) / h
@@ -177,27 +178,30 @@ def _bodies(system, times, motion, loads, laws, substeps, k, place, rate):
     motion.rows: displacement, speed and acceleration (2u,) of the rows by the structure's motion, and the mean forces.
     place, rate: (2u,) scratch.
     """
-    n, size, rows = system.modes, len(motion.q), len(system.J)
-    small, mean = times.step / substeps, motion.rows[3]
+    n, size, small, mean = system.modes, len(motion.q), times.step / substeps, motion.rows[3]
     for j in range(substeps):
         t = (j + 1) * small
         for i in range(n, size):
             motion.q[i] += small * motion.half[i]
-        for row in range(rows):
+        for a in range(len(motion.live)):
+            row = motion.live[a]
             speed, bend = motion.rows[1, row], motion.rows[2, row]
             place[row], rate[row] = motion.rows[0, row] + t * (speed + 0.5 * t * bend), speed + t * bend
             for i in range(n, size):
                 place[row] += system.J[row, i] * motion.q[i]
                 rate[row] += system.J[row, i] * motion.half[i]
             mean[row] += 0.5 * motion.force[row] / substeps
-        set_forces(system, laws, motion, place, rate, motion.q)
-        for row in range(rows):
-            mean[row] += 0.5 * motion.force[row] / substeps
+        for r in range(system.contacts):
+            place[r] += system.rest[r]
+        set_forces(system, laws, motion, place, place, rate)
+        for a in range(len(motion.live)):
+            mean[motion.live[a]] += 0.5 * motion.force[motion.live[a]] / substeps
         for i in range(n, size):
             force = system.weight[i] + loads[(k * substeps + j + 1) % len(loads), i]
-            for row in range(rows):
-                force += system.J[row, i] * motion.force[row]
+            for a in range(len(motion.live)):
+                force += system.J[motion.live[a], i] * motion.force[motion.live[a]]
             change = small * force / system.mass[i]
             motion.v[i] = motion.half[i] + 0.5 * change
             motion.half[i] += change
     motion.counters[STEPS] += substeps - 1
+    set_gaps(system, motion)

@@ -16,10 +16,10 @@ from vanedamp.coupling.system.system import System, on_structure
 
 @record
 class Sparse(NamedTuple):
-    """A square matrix (N, N) without its zeros: k entries in each row, padded with zeros in column 0."""
+    """A square matrix (N, N) without its zeros: up to k entries in each row, the others zeros in column 0."""
 
-    column: np.ndarray  # (N, k) int
-    value: np.ndarray  # (N, k)
+    column: np.ndarray  # (k, N) unsigned: no place from the end
+    value: np.ndarray  # (k, N)
 
 
 @record
@@ -54,6 +54,7 @@ class Motion(NamedTuple):
 
     # constant
     spring: np.ndarray  # (u,) stiffness of contacts, N/m; 0: rigid
+    live: np.ndarray  # int: rows that may carry a force
 
     # changes with the contacts
     active: np.ndarray  # (u,) int: contacts that carry force
@@ -64,22 +65,24 @@ class Motion(NamedTuple):
 
     # of a step
     start: np.ndarray  # (2, N) coordinates and velocities as it begins
+    response: np.ndarray  # (2,) displacement and velocity of the response then
     before: np.ndarray  # (2u,) speeds of the rows then
+    gap: np.ndarray  # (2, u) gaps of the contacts as it ends, and as it began, m
     impulse: np.ndarray  # (2u,) of the rows
     slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
 
     # scratch, named where each method takes it
-    coordinates: np.ndarray  # (4, N)
+    coordinates: np.ndarray  # (7, N)
     rows: np.ndarray  # (4, 2u)
 
 
 def sparse(matrix: np.ndarray) -> Sparse:
     """Return a square matrix without its zeros."""
-    most = max(int((matrix != 0.0).sum(axis=1).max(initial=0)), 1)
-    column, value = np.zeros((len(matrix), most), np.int64), np.zeros((len(matrix), most))
+    most = int((matrix != 0.0).sum(axis=1).max(initial=0))
+    column, value = np.zeros((most, len(matrix)), np.uint64), np.zeros((most, len(matrix)))
     for i, row in enumerate(matrix):
         found = np.flatnonzero(row)
-        column[i, : len(found)], value[i, : len(found)] = found, row[found]
+        column[: len(found), i], value[: len(found), i] = found, row[found]
     return Sparse(column, value)
 
 
@@ -109,12 +112,14 @@ def start(scene: Scene, system: System, records: Records, spring: np.ndarray) ->
     """
     initial = initial_motion(scene, system)
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
-    samples = len(records.samples)
+    contact, samples = np.arange(u) < system.contacts, len(records.samples)
     return on_structure(system), Motion(
         q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
         counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
         tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies), sampled=np.zeros((samples, size)),
-        shut=np.zeros((samples, u), np.int8), spring=spring, active=np.zeros(u, np.int64), speed=np.zeros(u),
-        begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)), before=np.zeros(2 * u),
-        impulse=np.zeros(2 * u), slowest=np.zeros(1), coordinates=np.zeros((4, size)), rows=np.zeros((4, 2 * u)),
+        shut=np.zeros((samples, u), np.int8), spring=spring,
+        live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
+        speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
+        response=np.zeros(2), before=np.zeros(2 * u), gap=np.zeros((2, u)), impulse=np.zeros(2 * u),
+        slowest=np.zeros(1), coordinates=np.zeros((7, size)), rows=np.zeros((4, 2 * u)),
     )  # fmt: skip

@@ -28,15 +28,15 @@ from vanedamp.coupling.methods.step_problem import (
 from vanedamp.coupling.methods.step_records import (
     close_step,
     drag_sliders,
-    load_at,
+    multiply,
     open_step,
-    product,
     record_start,
+    set_gaps,
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import elongation, gap, is_rigid, row_speed, rubs
+from vanedamp.coupling.planar.contact_decisions import elongation, is_rigid, row_speed, rubs
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
@@ -57,9 +57,8 @@ _TOLERANCE, _AT_REST = 1e-13, 1e-10
 _HALVINGS, _GAIN = 40, 1e-10
 #: share of the play by which round-off may open a gap
 _ROUND_OFF = 1e-12
-#: rows of Motion.coordinates, and of Motion.rows by units (u,)
-_FREE, _LOADS, _AHEAD = range(3)
-_CLOSED, _APPROACH = range(2)
+#: row of Motion.coordinates: velocities at the step's end; rows of Motion.rows, by units
+_FREE, _CLOSED, _APPROACH = 0, 0, 1
 
 
 class Options(SteppingOptions, PlanarOptions):
@@ -105,8 +104,8 @@ def moreau_matrices(system: System, step: float, theta: float) -> tuple[Sparse, 
 def march_moreau(system, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
     size, h, steps = len(motion.q), times.step, len(times.phase) - 1
-    q, v, free = motion.start[0], motion.start[1], motion.coordinates[_FREE]
-    load, ahead = motion.coordinates[_LOADS], motion.coordinates[_AHEAD]
+    q, v, scratch, free = motion.start[0], motion.start[1], motion.coordinates, motion.coordinates[_FREE]
+    load, ahead, drag, pull = scratch[1], scratch[2], scratch[3], scratch[4]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
     while motion.counters[STEPS] < until:
@@ -114,24 +113,28 @@ def march_moreau(system, times, motion, records, log, problem, inverse, turned, 
         open_step(system, times, motion, records, k)
         for i in range(size):
             ahead[i] = q[i] + h * theta * v[i]
+        multiply(times.damping, v, drag)
+        multiply(times.stiffness, ahead, pull)
         for i in range(size):
-            mean = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
-            load[i] = h * (mean - product(times.damping, i, v) - product(times.stiffness, i, ahead))
+            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
+            load[i] = h * (system.weight[i] + mean - drag[i] - pull[i])
+        multiply(inverse, load, free)
         for i in range(size):
-            free[i] = v[i] + product(inverse, i, load)
+            free[i] += v[i]
         if not _impulses(system, motion, problem, turned, h, theta):
             return UNDECIDED
         for i in range(size):
             motion.v[i] = free[i]
             motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
         drag_sliders(system, motion.q)
+        set_gaps(system, motion)
         code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code
     return DONE
 
 
-@kernel
+@inlined
 def _impulses(system, motion, problem, turned, h, theta):
     """Set the impulses of a step and the velocities that they leave. Returns False if undecided.
 
@@ -147,7 +150,7 @@ def _impulses(system, motion, problem, turned, h, theta):
         if r < system.contacts:
             motion.before[r] = row_speed(system, r, motion.v)
             if is_rigid(system, r):
-                ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
+                ahead = motion.gap[0, r] + 0.5 * h * motion.before[r]
                 closed[r] = 1.0 if ahead <= _ROUND_OFF * system.play[r] else 0.0
                 shut = shut or closed[r] > 0.0
     fastest = _speeds(system, motion) if shut or problem.solver == GAUSS_SEIDEL else 0.0
@@ -261,17 +264,20 @@ def _list_rows(system, motion, problem, h, theta, turn):
             list_row(problem, count, u + r, now, low, high, soft)
             count += 1
             continue
+        rigid = is_rigid(system, r)
+        if rigid and motion.rows[_CLOSED, r] == 0.0:
+            continue
         now = row_speed(system, r, free)
-        if is_rigid(system, r):
+        if rigid:
             before = motion.before[r] if turn == 0 and not system.two_phases else now
-            if motion.rows[_CLOSED, r] == 0.0 or (turn < _TURNS - 1 and before > slowest and now > -slowest):
+            if turn < _TURNS - 1 and before > slowest and now > -slowest:
                 continue
             list_row(problem, count, r, now, 0.0, math.inf, 0.0)
             if not system.two_phases:
                 problem.asked[count] = restitution_at(system, r, -before) * min(before, 0.0)
             bound, had = 0.0, 0.0
         else:
-            opened = gap(system, r, motion.q)
+            opened = motion.gap[0, r]
             if opened + h * min(motion.before[r], now) > 0.0:
                 continue
             now, soft = _on_spring(
@@ -295,7 +301,7 @@ def _on_spring(h, theta, spring, dashpot, stretched, before, impulse, now):
     return now + begun / stiff + soft * impulse, soft
 
 
-@kernel
+@inlined
 def _rebound(system, motion, problem, count, turn, tolerance):
     """Find the impulses of a turn, in the plane with the largest factor of the coefficients that brings no energy.
 

@@ -19,10 +19,10 @@ from vanedamp.coupling.methods.step_records import (
     close_step,
     copy,
     drag_sliders,
-    load_at,
+    multiply,
     open_step,
-    product,
     record_start,
+    set_gaps,
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
@@ -48,27 +48,28 @@ def march_newmark(
 ):
     """Step until this many steps are done. Return the code of numerics.codes."""
     alpha, beta, gamma = parameters[0], parameters[1], parameters[2]
-    size, u, h, steps = len(motion.q), len(system.rest), times.step, len(times.phase) - 1
-    rhs, accel, ahead, fast = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
-    q, v, old = motion.start[0], motion.start[1], motion.rows[1]
+    size, h, steps = len(motion.q), times.step, len(times.phase) - 1
+    scratch, q, v = motion.coordinates, motion.start[0], motion.start[1]
+    rhs, accel, ahead, fast, last, pull = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, laws)
     while motion.counters[STEPS] < until:
         k = motion.counters[STEPS] % steps
         open_step(system, times, motion, records, k)
-        copy(motion.force, old)
+        copy(motion.force, motion.impulse)
         for i in range(size):
             a = motion.half[i]
             ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
             fast[i] = v[i] + h * (1.0 - gamma) * a
+        if alpha != 0.0:
+            net_load(system, times, motion, q, v, k, last)
+        multiply(times.damping, fast, rhs)
+        multiply(times.stiffness, ahead, pull)
         for i in range(size):
-            new = load_at(system, times, k + 1, i) - product(times.damping, i, fast)
-            rhs[i] = (1.0 + alpha) * (new - product(times.stiffness, i, ahead))
-            if alpha != 0.0:
-                rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
-        for i in range(size):
-            accel[i] = product(inverse, i, rhs)
+            new = times.load[k + 1, i] + system.weight[i] - rhs[i] - pull[i]
+            rhs[i] = (1.0 + alpha) * new - alpha * last[i]
+        multiply(inverse, rhs, accel)
         for i in range(size):
             ahead[i] += beta * h * h * accel[i]
             fast[i] += gamma * h * accel[i]
@@ -77,7 +78,7 @@ def march_newmark(
             motion.counters[SOLVES] += 1
             if not solve_rows(problem, count, 0.0, 0.0):
                 return UNDECIDED
-        for row in range(2 * u):
+        for row in range(len(motion.force)):
             motion.force[row] = 0.0
         for a in range(count):
             motion.force[problem.row[a]] = problem.box.force[a]
@@ -89,10 +90,11 @@ def march_newmark(
             motion.q[i] = ahead[i] + beta * h * h * change
             motion.v[i] = fast[i] + gamma * h * change
         drag_sliders(system, motion.q)
+        set_gaps(system, motion)
         for r in range(system.contacts):
             motion.before[r] = row_speed(system, r, v)
-        for row in range(2 * u):
-            motion.impulse[row] = 0.5 * h * (old[row] + motion.force[row])
+        for row in range(len(motion.force)):
+            motion.impulse[row] = 0.5 * h * (motion.impulse[row] + motion.force[row])
         code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code

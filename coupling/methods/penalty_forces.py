@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from vanedamp.coupling.methods.step_records import load_at, product
+from vanedamp.coupling.methods.step_records import multiply, set_gaps
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.contact_decisions import row_speed, rubs
@@ -82,23 +82,24 @@ def contact_spring(reduced: float, restitution: float, step: float, options: Pen
 
 
 @inlined
-def set_forces(system, laws, motion, place, rate, q):
-    """Set the forces of all rows by their laws, at places (2u,) and rates (2u,) of the rows.
+def set_forces(system, laws, motion, gap, drawn, rate):
+    """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows.
 
-    Sliders of Jenkins elements follow in q, where their springs would go beyond their bounds.
+    drawn: (2u,) displacement of what draws the sliders of Jenkins elements, by their rows. They follow in motion.q
+    where their springs would go beyond their bounds.
     """
-    u, sliders = len(system.rest), len(system.tangential)
+    u, sliders, q = len(system.rest), len(system.tangential), motion.q
     for j in range(sliders):
         row, at, spring = 2 * u - sliders + j, len(q) - sliders + j, system.tangential[j]
         most = system.limit[u - sliders + j] / spring
-        stretched = min(max(place[row] - q[at], -most), most)
-        q[at], motion.force[row] = place[row] - stretched, -spring * stretched
+        stretched = min(max(drawn[row] - q[at], -most), most)
+        q[at], motion.force[row] = drawn[row] - stretched, -spring * stretched
     for r in range(u - sliders):
         bound = system.limit[r]
         if r < system.contacts:
-            gap, push = system.rest[r] + place[r], 0.0
-            if gap < 0.0:
-                push = max(-laws.spring[r] * gap - laws.dashpot[r] * rate[r], 0.0)
+            push = 0.0
+            if gap[r] < 0.0:
+                push = max(-laws.spring[r] * gap[r] - laws.dashpot[r] * rate[r], 0.0)
             motion.force[r], bound = push, system.friction[r] * push
         if bound == 0.0:
             motion.force[u + r] = 0.0
@@ -114,32 +115,42 @@ def set_forces(system, laws, motion, place, rate, q):
 
 
 @inlined
-def set_rows(system, motion, q, v, place, rate):
-    """Set displacements and speeds (2u,) of the rows that may have forces, at coordinates q and velocities v."""
+def set_rows(system, motion, q, v):
+    """Set gaps and speeds (motion.before) of the rows that may have forces, at coordinates q and velocities v.
+
+    motion.rows[0]: displacements of what draws the sliders of Jenkins elements.
+    """
     u = len(system.rest)
+    set_gaps(system, motion)
     for r in range(u):
         if r < system.contacts:
-            place[r], rate[r] = row_speed(system, r, q), row_speed(system, r, v)
+            motion.before[r] = row_speed(system, r, v)
         if rubs(system, r):
-            rate[u + r] = row_speed(system, u + r, v)
+            motion.before[u + r] = row_speed(system, u + r, v)
         if r >= u - len(system.tangential):
-            place[u + r] = row_speed(system, u + r, q)
+            motion.rows[0, u + r] = row_speed(system, u + r, q)
 
 
 @kernel
 def first_forces(system, times, motion, laws):
     """Set the forces as a run begins, and the accelerations (motion.half) that they and the loads give."""
-    set_rows(system, motion, motion.q, motion.v, motion.rows[0], motion.before)
-    set_forces(system, laws, motion, motion.rows[0], motion.before, motion.q)
+    set_rows(system, motion, motion.q, motion.v)
+    set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before)
+    net_load(system, times, motion, motion.q, motion.v, 0, motion.half)
     for i in range(len(motion.q)):
-        motion.half[i] = net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
+        motion.half[i] /= system.mass[i]
 
 
 @inlined
-def net_load(system, times, motion, q, v, k, i):
-    """Return the sum of the forces on coordinate i at step k of the period."""
-    force = load_at(system, times, k, i) - product(times.damping, i, v) - product(times.stiffness, i, q)
-    for row in range(len(motion.force)):
+def net_load(system, times, motion, q, v, k, load):
+    """Set the sum (N,) of the forces on the coordinates at step k of the period."""
+    drag, pull = motion.coordinates[5], motion.coordinates[6]
+    multiply(times.damping, v, drag)
+    multiply(times.stiffness, q, pull)
+    for i in range(len(q)):
+        load[i] = times.load[k, i] + system.weight[i] - drag[i] - pull[i]
+    for a in range(len(motion.live)):
+        row = motion.live[a]
         if motion.force[row] != 0.0:
-            force += system.J[row, i] * motion.force[row]
-    return force
+            for i in range(len(q)):
+                load[i] += system.J[row, i] * motion.force[row]

@@ -26,18 +26,13 @@ _BOUND = 1e30
 
 
 @inlined
-def product(matrix, i, vector):
-    """Return entry i of the product of a sparse matrix (equations_of_motion.Sparse) and a vector."""
-    total = 0.0
-    for a in range(matrix.column.shape[1]):
-        total += matrix.value[i, a] * vector[matrix.column[i, a]]
-    return total
-
-
-@inlined
-def load_at(system, times, k, i):
-    """Return the load on coordinate i at step k of the period, weight included, N."""
-    return times.load[k, i] + system.weight[i]
+def multiply(matrix, vector, result):
+    """Set result (N,) = matrix vector; the matrix is an equations_of_motion.Sparse."""
+    for i in range(len(result)):
+        result[i] = 0.0
+    for a in range(len(matrix.value)):
+        for i in range(len(result)):
+            result[i] += matrix.value[a, i] * vector[matrix.column[a, i]]
 
 
 @inlined
@@ -57,13 +52,22 @@ def drag_sliders(system, q):
         q[len(q) - sliders + j] += stretched - min(max(stretched, -most), most)
 
 
+@inlined
+def set_gaps(system, motion):
+    """Set the gaps at the end of a step; those of the last one are where it began."""
+    for r in range(system.contacts):
+        motion.gap[1, r] = motion.gap[0, r]
+        motion.gap[0, r] = gap(system, r, motion.q)
+
+
 @kernel
 def record_start(system, motion, records):
     """Record section, energies and ledger at the start of a period, those of all springs included."""
     springs = 0.0
     for r in range(system.contacts):
+        motion.gap[0, r] = gap(system, r, motion.q)
         if motion.spring[r] > 0.0:
-            springs += 0.5 * motion.spring[r] * min(gap(system, r, motion.q), 0.0) ** 2
+            springs += 0.5 * motion.spring[r] * min(motion.gap[0, r], 0.0) ** 2
     for j in range(len(system.tangential)):
         springs += 0.5 * system.tangential[j] * elongation(system, j, motion.q) ** 2
     record_section(system, motion, records, springs)
@@ -74,16 +78,17 @@ def open_step(system, times, motion, records, k):
     """Keep the state at the start of step k of the period in motion.start; take a sample."""
     copy(motion.q, motion.start[0])
     copy(motion.v, motion.start[1])
+    if k == 0:
+        motion.response[0], motion.response[1] = _response(system, times, k, motion.q, motion.v)
     each = len(records.samples) // max(len(records.peak) - 1, 1)
     if each > 0 and k % ((len(times.phase) - 1) // each) == 0:
         row = motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)
-        x, _ = _response(system, times, k, motion.q, motion.v)
-        put_sample(system, motion, records, row, x, motion.q, motion.active, 0)
+        put_sample(system, motion, records, row, motion.response[0], motion.q, motion.active, 0)
 
 
 @inlined
 def close_step(system, times, motion, records, log, k, budget, deepest):
-    """Follow contacts and account for step k of the period, with motion.impulse; close the period if it is the last.
+    """Follow contacts and account for step k of the period, with motion.impulse and gap; close the last one's period.
 
     Returns DONE, DIVERGED, PENETRATION or EVENT_BUDGET.
     """
@@ -111,28 +116,32 @@ def _response(system, times, k, q, v):
     return x, rate
 
 
-@kernel
+@inlined
 def _account(system, times, motion, records, k, deepest):
     """Account for step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
     h, p, q, v = times.step, motion.counters[PERIOD], motion.start[0], motion.start[1]
     x1 = _record_response(system, times, motion, records, k)
-    size, deep = abs(x1), 0.0
+    size, deep, hit = abs(x1), 0.0, False
+    work, viscous = 0.0, 0.0
     for i in range(len(q)):
-        moved = motion.q[i] - q[i]
+        moved, drag = motion.q[i] - q[i], 0.0
         size = max(size, abs(motion.v[i]))
-        motion.ledger[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
-        drag = 0.5 * (product(times.damping, i, v) + product(times.damping, i, motion.v))
-        motion.ledger[VISCOUS] += drag * moved
-    hit = _collided(system, motion)
-    for r in range(len(system.rest)):
-        loss = _loss(system, motion, h, r, hit)
-        if r < system.contacts:
-            now = gap(system, r, motion.q)
-            deep = max(deep, -now / times.travel[r])
-            if motion.spring[r] > 0.0:
-                stored = min(now, 0.0) ** 2 - min(gap(system, r, q), 0.0) ** 2
-                motion.ledger[CONTACT] -= 0.5 * motion.spring[r] * stored
-        motion.lost[r] += loss
+        for a in range(len(times.damping.value)):
+            j = times.damping.column[a, i]
+            drag += times.damping.value[a, i] * (v[j] + motion.v[j])
+        work += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
+        viscous += 0.5 * drag * moved
+    motion.ledger[EXCITATION] += work
+    motion.ledger[VISCOUS] += viscous
+    for r in range(system.contacts):
+        now = motion.gap[0, r]
+        deep = max(deep, -now / times.travel[r])
+        if motion.spring[r] > 0.0:
+            stored = min(now, 0.0) ** 2 - min(motion.gap[1, r], 0.0) ** 2
+            motion.ledger[CONTACT] -= 0.5 * motion.spring[r] * stored
+        elif motion.impulse[r] > 0.0 and motion.before[r] < -motion.slowest[0]:
+            hit = True
+    _account_forces(system, motion, h, hit)
     for j in range(len(system.tangential)):
         stored = elongation(system, j, motion.q) ** 2 - elongation(system, j, q) ** 2
         motion.ledger[FRICTION] -= 0.5 * system.tangential[j] * stored
@@ -150,9 +159,10 @@ def _account(system, times, motion, records, k, deepest):
 @inlined
 def _record_response(system, times, motion, records, k):
     """Record peak, mean square, harmonic and momentum of step k of the period. Return the response at its end."""
-    h, p, q, v = times.step, motion.counters[PERIOD], motion.start[0], motion.start[1]
-    x0, rate0 = _response(system, times, k, q, v)
+    h, p, v = times.step, motion.counters[PERIOD], motion.start[1]
+    x0, rate0 = motion.response[0], motion.response[1]
     x1, rate1 = _response(system, times, k + 1, motion.q, motion.v)
+    motion.response[0], motion.response[1] = x1, rate1
     c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
     note_step(records, p, h, x0, x1, rate0, rate1)
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
@@ -166,22 +176,16 @@ def _record_response(system, times, motion, records, k):
 
 
 @inlined
-def _collided(system, motion):
-    """Whether a rigid contact that approached has pushed in this step: what contacts take is then an impact's loss."""
-    hit = False
-    for r in range(system.contacts):
-        pushed = motion.impulse[r] > 0.0 and motion.spring[r] == 0.0
-        hit = hit or (pushed and motion.before[r] < -motion.slowest[0])
-    return hit
+def _account_forces(system, motion, h, hit):
+    """Enter what the forces of the rows take. hit: whether rigid contacts that approached have pushed in this step.
 
-
-@inlined
-def _loss(system, motion, h, unit, hit):
-    """Enter what the forces of a unit take into the ledger, and return it."""
-    u, lost = len(system.rest), 0.0
-    for row in (unit, u + unit):
+    What contacts take is then an impact's loss.
+    """
+    u = len(system.rest)
+    for a in range(len(motion.live)):
+        row = motion.live[a]
         if motion.impulse[row] != 0.0:
-            moved = 0.0
+            moved, unit = 0.0, row - u if row >= u else row
             for i in range(len(motion.q)):
                 moved += system.J[row, i] * (motion.q[i] - motion.start[0, i])
             loss = -motion.impulse[row] / h * moved
@@ -190,8 +194,7 @@ def _loss(system, motion, h, unit, hit):
             else:
                 entry = IMPACT_LOSS if hit and unit < system.contacts else FRICTION
             motion.ledger[entry] += loss
-            lost += loss
-    return lost
+            motion.lost[unit] += loss
 
 
 @inlined
@@ -203,7 +206,7 @@ def _stands(system, motion, b):
     return False
 
 
-@kernel
+@inlined
 def _follow_contacts(system, times, motion, records, log, k):
     """Count contacts that begin to carry force, and log those that have ended, as planar.impacts.log_event does."""
     u, p = len(system.rest), motion.counters[PERIOD]
