@@ -34,12 +34,13 @@ class Rows(NamedTuple):
 
 
 def rows_of_units(system: System) -> Rows:
-    """Return the rows of a log by units, whose speeds are those of gaps."""
+    """Return the rows of a log by units: speeds are those of gaps in the plane, and of bodies along their line."""
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    return Rows(places, system.other, np.ones(len(places)), system.spring)
+    turned = np.isin(system.surface, (RIGHT, BODY)) & (not system.in_plane)
+    return Rows(places, system.other, np.where(turned, -1.0, 1.0), system.spring)
 
 
 def rows_of_line(system: System) -> Rows:
@@ -48,10 +49,9 @@ def rows_of_line(system: System) -> Rows:
     floors = [(body, SURFACES[FLOOR], -1) for body in range(system.bodies)]
     dampers = [(number, "casing", -1) for number in range(system.dampers)]
     first = len(floors) + len(dampers)
-    sign = np.where(np.isin(system.surface[:c], (RIGHT, BODY)), -1.0, 1.0)
     return Rows(
         [*floors, *dampers, *units.places[:c]], np.r_[np.full(first, -1), system.other[:c]],
-        np.r_[np.ones(first), sign], np.r_[np.full(first, np.inf), system.spring[:c]],
+        np.r_[np.ones(first), units.sign[:c]], np.r_[np.full(first, np.inf), system.spring[:c]],
     )  # fmt: skip
 
 

@@ -82,7 +82,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         viscous=basis.damping, response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
         period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
-        two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
+        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
     return _with_scales(system)
 

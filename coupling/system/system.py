@@ -78,6 +78,7 @@ class System(NamedTuple):
     dashpot: np.ndarray  # (u,) N s/m
     tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
     elongation: np.ndarray  # (j, N) of these springs
+    in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body, the left one of two; of a stop or a friction damper its own
