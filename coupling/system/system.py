@@ -136,6 +136,16 @@ class System(NamedTuple):
         return np.asarray(self.play[: self.contacts][along][first])
 
     @property
+    def in_plane(self) -> bool:
+        """Whether it has more than bodies that slide: extent, springs or tracks of bodies, or impacts of two phases.
+
+        Then it has no rows in a line (system.line_system).
+        """
+        own = slice(self.modes, None)
+        bound = self.stiffness[own].any() or self.damping[own].any()
+        return bool(self.two_phases or bound or (self.tilt >= 0).any())
+
+    @property
     def order(self) -> np.ndarray:
         """Multiples (e,) of omega that the harmonics are."""
         return np.rint(self.frequency / self.omega).astype(int)
