@@ -75,9 +75,9 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
-        extended = self.contact & (system.surface != STOP)
-        extended[extended] = system.tilt[system.body[extended]] >= 0
-        near, self._relative = np.where(extended[:, None], _TOUCH_EXTENDED, _TOUCH).T
+        self.extends = self.contact & (system.surface != STOP)  # whether a unit is of a body with extent
+        self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
+        near, self._relative = np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T
         self._near = near * np.where(self.contact, system.play, 0.0)
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ NODES = (1 - np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)) / 2
 _SHORTEST = 1e-14
 #: coefficients below this share of the function's size in the step are round-off
 _ROUND_OFF = 1e-14
+_TINY = float(np.finfo(float).tiny)
 
 
 def _from_samples(nodes: np.ndarray) -> np.ndarray:
@@ -49,7 +50,7 @@ def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | No
     coefficients = np.where(zero[:, None], samples / _PLACES ** order[:, None] @ _DEFLATED, samples @ _WHOLE)
     # one that is not positive there begins with round-off
     near = np.flatnonzero(~(coefficients.min(axis=1) > 0))
-    coefficients[zero, 0] = np.maximum(coefficients[zero, 0], np.finfo(float).tiny)
+    coefficients[zero, 0] = np.maximum(coefficients[zero, 0], _TINY)
     for k in near:
         own = coefficients[k]
         limit = 1.0 if found is None else found[0]

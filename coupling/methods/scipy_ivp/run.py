@@ -17,7 +17,16 @@ from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact, impact
-from vanedamp.coupling.methods.scipy_ivp.motion import NEVER, OPEN, ROUND_OFF, STICK, Motion, States, Unforced
+from vanedamp.coupling.methods.scipy_ivp.motion import (
+    LOOSE,
+    NEVER,
+    OPEN,
+    ROUND_OFF,
+    STICK,
+    Motion,
+    States,
+    Unforced,
+)
 from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Outcome
@@ -34,8 +43,11 @@ _STANDING = 100
 _OPEN_LEDGER, _LEAST = 1e3, 1e-9
 #: the shortest first step, as a fraction of a period
 _SHORTEST = 1e-26
-#: fraction of a period without events in which events happen at once: impacts are the end of a collapse
-_AT_ONCE = 1e-13
+#: fraction of a period without events in which events happen at once: impacts are the end of a collapse; fraction of a
+#: period for which gaps of sliders are known beyond the round-off of places, after a collision
+_AT_ONCE, _FRESH = 1e-13, 1e-9
+#: gaps above this fraction of the play are taken from the coordinates again
+_FAR = 1e-6
 #: speeds below this fraction of the run's largest are none
 _STILL = 1e-11
 #: flights shorter than this fraction of a period, and all that follow them, are the end of a chatter; of elastic
@@ -54,7 +66,8 @@ class IvpRun:
         self.system, self.options, self.steps = system, options, options.steps_per_period
         self.free = free = Unforced(system)
         self.record = record = Recorder(free, records, self.steps, events)
-        self.y = np.concatenate([initial.q, initial.v, np.zeros(3 * free.u + record.count)])
+        zeros = np.zeros(2 * free.u + record.count)
+        self.y = np.concatenate([initial.q, initial.v, free.gaps(initial.q), zeros])
         self.sizes = record.sizes()
         self.absolute = options.rtol * self.sizes
         self.time, self.step = 0.0, system.period / self.steps
@@ -62,7 +75,7 @@ class IvpRun:
         self.begun = False
         self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
         self.motion: Motion
-        self.guard, self.order = np.zeros((0, free.extent)), np.zeros(0, int)
+        self.guard, self.order, self.watched = np.zeros((0, free.extent)), np.zeros(0, int), np.zeros(0, int)
         self.motions = lru_cache(_KEPT)(lambda states: Motion(free, states))
         self.linear = lru_cache(_KEPT)(self._linear)
 
@@ -119,6 +132,9 @@ class IvpRun:
             return self._end_period()
         self.events += 1
         self.standing = self.standing + 1 if arc.duration < _AT_ONCE * self.system.period else 0
+        unit, instead = self.motion.wrong[self.watched[arc.event]]
+        if self.state[unit] == OPEN or (self.state[unit] == LOOSE and instead == OPEN):
+            self.y[self.free.d][unit] = 0.0
         return Status.OK if self.standing <= _STANDING and self._decide() else Status.UNDECIDED
 
     def _end_period(self) -> Status:
@@ -167,11 +183,14 @@ class IvpRun:
         self.record.turning(self.time, self.y)
         self.sizes[: free.size] = np.maximum(self.sizes[: free.size], np.abs(self.y[: free.size]))
         self.fastest = max(self.fastest, float((np.abs(system.J) @ np.abs(v)).max(initial=0.0)))
-        slow, gaps, touch = _STILL * self.fastest, free.gaps(q), free.touch(self.sizes[free.q])
-        closed = np.flatnonzero(free.rigid & ((self.state != OPEN) | (gaps <= touch)))
+        slow, gaps = _STILL * self.fastest, free.gaps(q)
+        fresh = self.time - self.struck < _FRESH * system.period
+        touch = np.where(fresh & ~free.extends, 0.0, free.touch(self.sizes[free.q]))
+        d = self.y[free.d] = np.where(gaps > _FAR * system.play, gaps, self.y[free.d])
+        closed = np.flatnonzero(free.rigid & ((self.state != OPEN) | (d <= touch)))
         self._bring(q, free.normal[closed], gaps[closed])
-        gaps[closed] = 0.0
-        self.y[free.d] = np.where(np.abs(gaps) <= touch, 0.0, gaps)
+        d[closed] = 0.0
+        self.y[free.d] = np.where(np.abs(d) <= touch, 0.0, d)
         for _ in range(_STANDING):
             if not np.any(free.normal[closed] @ v < -slow):
                 break
@@ -195,8 +214,8 @@ class IvpRun:
         if chosen is None:
             return False
         self.motion, order = chosen
-        self.state, watched = self.motion.state, order != NEVER
-        self.guard, self.order = self.motion.guard[watched], order[watched]
+        self.state, self.watched = self.motion.state, np.flatnonzero(order != NEVER)
+        self.guard, self.order = self.motion.guard[self.watched], order[self.watched]
         self.matrix = self.linear(tuple(self.state.tolist()))
         self.found = np.empty(free.extent + len(self.matrix) - free.size)
         self.record.turning(self.time, self.y)
@@ -249,9 +268,9 @@ class IvpRun:
             self._stop(v, step)
 
     def _short_step(self, v: np.ndarray, closed: np.ndarray) -> Impact | None:
-        """Return the impulses of a step of Moreau's scheme of length _CHATTER, without restitution.
+        """Return the impulses of a step of Moreau's scheme, without restitution, of half a flight.
 
-        A chatter takes 1/(1 - k) times its next flight.
+        That takes _CHATTER with those that follow: a chatter takes 1/(1 - k) times its next flight.
         """
         free, system = self.free, self.system
         z = self.y[: free.size].copy()
@@ -266,7 +285,7 @@ class IvpRun:
         leaving = closed[free.normal[closed] @ v > 0.0]
         rebounds = restitutions_at(system, leaving, free.normal[leaving] @ v)
         last = np.maximum(1.0 - rebounds, _ELASTIC).min(initial=1.0)
-        ahead = v + last * _CHATTER * system.period * (accelerations + free.respond @ forces)
+        ahead = v + 0.5 * last * _CHATTER * system.period * (accelerations + free.respond @ forces)
         if np.all(free.normal[closed] @ ahead >= 0.0):
             return Impact(np.zeros(2 * free.u), ahead, np.zeros(free.u, int))
         return impact(free, ahead, closed.tolist(), np.zeros(free.u))
