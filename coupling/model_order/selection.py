@@ -137,14 +137,14 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
     if warning is not None:
         estimate |= warning
         sentences.append(warning["sentence"])
-    if any(damper.shape != "slider" for damper in scene.damper):
+    if any(damper.form.planar for damper in scene.damper):
         sentences.append("bodies with extent count as sliders")
     return Selected(scene, estimate | {"sentence": "; ".join(sentences)})
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """Return the warnings of a scene without open choices: of its method, impact laws on several modes, and loads."""
-    rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
+    rubs = any(damper.form.planar and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
     return (
         *([] if warning is None else [f"solver.method: {warning}"]),

@@ -24,8 +24,8 @@ def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray
     slip, speed = section[:, 3 : 3 + b], section[:, 3 + b :]
     still = np.abs(speed).max(axis=0) <= _STILL * (scale[1] + scale[3 + b :])
     same = still & (np.ptp(slip, axis=0) <= _STILL * scale[3 : 3 + b])
-    shapes = np.array([damper.shape for damper in scene.damper], object)
-    held = (system.holds > 0.0) & (shapes != "disc")
+    rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
+    held = (system.holds > 0.0) & ~rolls
     moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.response).max(initial=0.0)
     held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
     c = system.contacts

@@ -218,7 +218,7 @@ class Scene(Displayed):
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
         play = {cavity.name: cavity.play for cavity in self.cavity}
         for index, damper in enumerate(self.damper):
-            if damper.shape != "slider" and play[damper.cavity] is None:
+            if damper.form.planar and play[damper.cavity] is None:
                 number = [cavity.name for cavity in self.cavity].index(damper.cavity)
                 raise ValueError(
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
@@ -249,8 +249,8 @@ class Scene(Displayed):
             raise ValueError(f"{key}.{error}") from None
 
     def _check_load(self, index: int, damper: Damper) -> None:
-        extended = damper.shape != "slider"  # has a ceiling to fall on
-        if extended or damper.normal_load is not None or damper.friction == 0:
+        # a body with extent has a ceiling to fall on
+        if damper.form.planar or damper.normal_load is not None or damper.friction == 0:
             return
         if self.speed:
             number = [cavity.name for cavity in self.cavity].index(damper.cavity)

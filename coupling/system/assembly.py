@@ -17,7 +17,6 @@ from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
-from vanedamp.coupling.system.shapes import shape_of
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
 from vanedamp.coupling.system.system import FLOOR, STOP, SURFACES, System
 from vanedamp.coupling.system.units import (
@@ -148,7 +147,7 @@ def _places(
         floor[body.number, :n] = ground.motion(0.0, body.b)[0] if body.b > 0.0 else ground.along
         rise[body.number, :n], turn[body.number, :n] = ground.motion(body.centre, 0.0)[1], ground.turn
     plays = [min(scene.cavity[index].gap, scene.cavity[index].play or np.inf) for index in owner]
-    shortening = [body.shape.shortening(body.a, body.b) for body in bodies]
+    shortening = [body.shape.shortening(body.damper) for body in bodies]
     return {
         "along": np.array([body.x for body in bodies], np.int64),
         "tilt": np.array([body.x + 2 if body.shape.extended else -1 for body in bodies], np.int64),
@@ -294,12 +293,12 @@ def initial_motion(scene: Scene, system: System) -> Motion:
     # an initial state is that of a rigid structure: others have none
     q[:n], v[:n] = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
     for k, damper in enumerate(scene.damper):
-        x, shape = system.along[k], shape_of(damper)
+        x, form = system.along[k], damper.form
         q[x] = damper.position + system.floor[k] @ q
         v[x] = damper.velocity + system.floor[k] @ v
-        if shape.extended:
+        if form.extended:
             # a tilted block stands on its corner unless it is lifted higher
-            lifted = damper.lift + shape.rise(damper.half_extent[0], damper.tilt)
+            lifted = damper.lift + form.rise(damper, damper.tilt)
             q[x + 1 : x + 3] = lifted + system.rise[k] @ q, damper.tilt + system.turn[k] @ q
             v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
     place_sliders(system, q, np.zeros(len(system.tangential)))

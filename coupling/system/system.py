@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record
-from vanedamp.coupling.system.surfaces import SIDES
+from vanedamp.coupling.scene.shapes.shape import SIDES
 
 #: names of what a unit touches
 SURFACES = (*SIDES, "body", "stop", "casing")

@@ -18,8 +18,8 @@ import numpy as np
 from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.shapes.shape import Shape, common_heights
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
-from vanedamp.coupling.system.shapes import Slider, common_heights, shape_of
 from vanedamp.coupling.system.surfaces import Surface, flexibility
 from vanedamp.coupling.system.system import BODY, CASING, CEILING, FLOOR, LEFT, RIGHT, STOP, SURFACES
 from vanedamp.files.toml_input import InputError
@@ -62,9 +62,9 @@ class Body(NamedTuple):
     centre: float
 
     @property
-    def shape(self) -> Slider:
+    def shape(self) -> Shape:
         """Its shape."""
-        return shape_of(self.damper)
+        return self.damper.form
 
     @property
     def coordinates(self) -> slice:
@@ -120,7 +120,7 @@ def _at_wall(
 ) -> Iterator[Unit]:
     """Yield the contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign, moving = 1.0 if surface == LEFT else -1.0, surfaces[surface]
-    for corner, a, b in body.shape.points(body.a, body.b, surface):
+    for corner, a, b in body.shape.points(body.damper, surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(wall, body.b + b)
         # a slider without a height meets the wall where the wall's motion is known
@@ -137,7 +137,7 @@ def _at_floor(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: Bod
     """Yield the contacts with floor or ceiling."""
     below, play, moving = surface == FLOOR, cavity.play or 0.0, surfaces[surface]
     sign = 1.0 if below else -1.0
-    for corner, a, b in body.shape.points(body.a, body.b, surface):
+    for corner, a, b in body.shape.points(body.damper, surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(body.centre + a, 0.0 if below else 2 * body.b + play)
         along[: len(moved_along)] -= moved_along
@@ -168,9 +168,10 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
             f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
             "no height at which they could touch: give it a shape"
         )
-    heights, size = common_heights(left.damper, right.damper), len(law.mass)
+    faces = [item.shape.face(item.damper) for item in (right, left)]
+    heights, size = common_heights(*faces), len(law.mass)
     if not heights:
-        spans = [" to ".join(f"{height:g}" for height in item.shape.face(item.a, item.b)) for item in (right, left)]
+        spans = [" to ".join(f"{height:g}" for height in face) for face in faces]
         raise InputError(
             f"damper[{right.number}].shape: touches a neighbour in cavity '{cavity.name}' from {spans[0]} m above the "
             f"floor, and damper[{left.number}] from {spans[1]} m: neighbours must have a height in common"

@@ -60,6 +60,7 @@ class History:
         struck = np.where(values.get("event_side", "") == "stop", -1, values.get("event_damper", -1))
         energy = json.loads(attributes.pop("energy", "{}"))
         begin = attributes.get("transient", 0) / attributes["frequency"]
+        scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
         return cls(
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
@@ -68,10 +69,10 @@ class History:
             struck=frozen(np.atleast_1d(struck)[kinds] if len(kinds) else [], int),
             plane=samples_in_plane(values),
             hits=hits_in_plane(values),
-            by_place=impacts_by_place(values, begin),
+            by_place=impacts_by_place(values, begin, scene),
             measures=attributes | {"energy": energy},
             provenance=provenance,
-            scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
+            scene=scene,
         )
 
     @classmethod
@@ -182,7 +183,7 @@ def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
         return []
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
     if history.scene is not None:
-        discs = np.array([damper.radius is not None for damper in history.scene.damper])
+        discs = np.array([damper.form.rolls for damper in history.scene.damper])
         if np.isfinite(tilt[:, ~discs]).any():  # beside the turns of discs, tilts would not show
             tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
