@@ -35,9 +35,9 @@ class OpenRecord:
             return table
         if "added" in table:
             raise ValueError("added: unknown key")
-        names = {key for key in table if key not in cls.__dataclass_fields__}
-        types = cls.keys_added() if names else {}
-        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in names if key in types}
+        further = [key for key in table if key not in cls.__dataclass_fields__]
+        types = cls.keys_added() if further else {}
+        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in further if key in types}
         if not schemas:
             return table
         own = {key: table[key] for key in schemas}

@@ -85,7 +85,7 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
         if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
-            if scene.stop:
+            if any(element.on_structure for _, _, element in scene.elements):
                 raise InputError(
                     'structure.modes: "auto" weighs collisions of bodies, not those of stops; give a number of modes'
                 )
@@ -168,7 +168,8 @@ def _of_rotation(scene: Scene) -> tuple[str, ...]:
 
 
 def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
-    if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
+    hits = scene.damper or any(not element.yields for _, _, element in scene.elements)
+    if not (isinstance(scene.structure, Rom) and scene.contact.rigid and hits):
         return ()
     size = reduced_model(scene.structure, scene.speed).size
     if size == 1:

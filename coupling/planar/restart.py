@@ -7,7 +7,7 @@ import numpy as np
 from vanedamp.coupling.response.restart import before_stops, check_size
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.assembly import Motion, place_sliders
-from vanedamp.coupling.system.system import STOP, System
+from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 
 #: share of the play by which a contact may overlap
@@ -32,13 +32,13 @@ def planar_restart(system: System, start: RestartState) -> Motion:
     """Return the motion at the start of a run of another scene, whose cavities may be smaller.
 
     There bodies, all of a cavity by the same share, go back to where they lie flat in the middle, as far as it takes.
-    A structure beyond a stop is moved to it, and springs of friction dampers are unloaded to the limits of their
+    A structure beyond a constraint of its own is moved to it, and springs of friction dampers are unloaded to the limits of their
     sliders. Raises InputError for a scene of another size.
     """
     check_size(system, start, planar=True)
     size, n = len(system.mass), system.modes
     rest, v = np.zeros(size), np.zeros(size)
-    stops = np.flatnonzero((system.surface == STOP) & np.isinf(system.spring))
+    stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
     rest[:n] = before_stops(system.J[stops, :n], system.rest[stops], start.displacement / system.scale)
     v[:n] = start.velocity / system.scale
     _from_cavities(system, v, v, start.slip_velocity, start.lift_velocity, start.tilt_rate)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, System
+from vanedamp.coupling.system.system import System
 
 #: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
 #: scales, and motions of floors relative to that of the response, that are none
@@ -30,7 +30,7 @@ def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray
     held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
     c = system.contacts
     gaps = (system.rest[:c] + slip @ system.of_bodies.J[:c].T).max(axis=0)
-    along = np.isin(system.surface[:c], (LEFT, RIGHT, BODY)) & np.isinf(system.spring[:c])
+    along = ~system.across & ~system.without_body[:c] & np.isinf(system.spring[:c])
     contacts = np.flatnonzero(along & (gaps <= _CLOSED * system.play[:c]))
     for _ in range(b):  # from the walls inwards
         for unit in contacts:

@@ -9,6 +9,7 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.assembly import check_start
 from vanedamp.coupling.system.line_system import InitialMotion, LineSystem, initial_motion, line_system, row_motion
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
@@ -20,10 +21,14 @@ from vanedamp.files.toml_input import InputError
 def line_start(scene: Scene, system: System, start: RestartState | None = None) -> tuple[LineSystem, InitialMotion]:
     """Return the rows of a scene whose bodies only slide, and its motion at time zero: its own or that of a state.
 
-    Raises InputError for a state of a scene of another size.
+    Raises InputError for bodies or a structure that begin beyond a contact, or a state of a scene of another size.
     """
     line = line_system(system)
-    return line, initial_motion(scene, line) if start is None else restart_from(line, start)
+    if start is not None:
+        return line, restart_from(line, start)
+    motion = initial_motion(scene, line)
+    check_start(system, motion.displacement[line.friction_rows :])
+    return line, motion
 
 
 def restart_state(system: LineSystem, last: InitialMotion) -> RestartState:

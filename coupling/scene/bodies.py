@@ -1,9 +1,9 @@
-"""Cavities, the bodies in them, friction dampers, and stops."""
+"""Cavities, the bodies in them, and friction dampers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, GetJsonSchemaHandler
 from pydantic.dataclasses import dataclass
@@ -198,23 +198,3 @@ class FrictionDamper:
     """tangential stiffness in series with the contact, unloaded at time zero (default: rigid Coulomb) [N/m]"""
     at: str | None = None
     """interface label of a reduced model where it acts (default: excitation.at)"""
-
-
-@dataclass(frozen=True, config=STRICT)
-class Stop:
-    """Contact of the structure with the ground, or with itself."""
-
-    side: Literal["left", "right"]
-    """side of the structure: a stop on the right limits positive displacement"""
-    gap: NonNegative
-    """distance at rest [m]"""
-    restitution: Fraction = 1.0
-    """coefficient of restitution [-]"""
-    at: str | None = None
-    """interface label of a reduced model that touches the stop (default: excitation.at)"""
-    to: str | None = None
-    """interface label of a reduced model that the stop is at and moves with (default: the ground)"""
-
-    def __post_init__(self) -> None:
-        if self.to is not None and self.to == self.at:
-            raise ValueError(f"to: a point ('{self.to}') does not touch itself; name another, or leave it out")

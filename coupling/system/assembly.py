@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.scene.elements.element import Unit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.scene.waveform import Waveform
@@ -18,16 +19,16 @@ from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_la
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
-from vanedamp.coupling.system.system import FLOOR, STOP, SURFACES, System
+from vanedamp.coupling.system.system import FLOOR, SURFACES, System, surface_code
 from vanedamp.coupling.system.units import (
     Body,
+    ElementParts,
     Law,
-    Unit,
     check_friction,
     coefficient,
     contacts_of,
+    element_units,
     friction_elements,
-    stops_of,
 )
 from vanedamp.files.toml_input import InputError
 
@@ -67,9 +68,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     excited = _excitation(scene, basis, bodies, loads, forced, table, size)
     placed = _places(scene, basis, bodies, surfaces, loads, size)
     mass, holds = _mass(bodies, size), _holding(scene, loads)
-    contacts = _contacts(scene, Law(scene.contact, basis, mass), bodies, surfaces, excited["load"][:, :n])
+    law = Law(scene.contact, basis, mass)
+    contacts, own = _contacts(scene, law, bodies, surfaces, placed, excited["load"][:, :n])
     rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
-    units = _columns([*contacts, *rubbing], size)
+    units = _columns([*contacts, *own, *rubbing], size)
     sliders = len(casing["tangential"])
     massive = slice(size - sliders)
     # rows of sliders are not to be small beside others
@@ -168,18 +170,25 @@ def _mass(bodies: list[Body], size: int) -> np.ndarray:
 
 
 def _contacts(
-    scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], force: np.ndarray
-) -> list[Unit]:
-    """Return the contacts: cavity by cavity, then the stops. force: (e, n) on the modes. Raises InputError."""
+    scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], placed: dict[str, Any],
+    force: np.ndarray,
+) -> tuple[list[Unit], list[Unit]]:  # fmt: skip
+    """Return the contacts, cavity by cavity, then those of elements; and friction elements of these.
+
+    placed: where the bodies are; force: (e, n) on the modes. Raises InputError.
+    """
     contacts: list[Unit] = []
     for index, cavity in enumerate(scene.cavity):
         inside = [body for body in bodies if body.damper.cavity == cavity.name]
         contacts += contacts_of(law, cavity, surfaces[index], inside)
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
-    contacts += stops_of(scene, law, np.abs(force).sum(axis=0) / squares, start)
+    reach = np.abs(force).sum(axis=0) / squares
+    parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"])
+    own = list(element_units(scene, parts))
+    contacts += [unit for unit in own if unit.normal.any()]
     check_friction(contacts, law.mass)
-    return contacts
+    return contacts, [unit for unit in own if not unit.normal.any()]
 
 
 def _columns(units: list[Unit], size: int) -> dict[str, Any]:
@@ -187,9 +196,9 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
-    kinds |= dict.fromkeys(("body", "other", "surface", "corner"), np.int64)
+    kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
     return {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()} | {
-        "J": J, "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
+        "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J, "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
     }  # fmt: skip
 
 
@@ -303,18 +312,19 @@ def initial_motion(scene: Scene, system: System) -> Motion:
             v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
     place_sliders(system, q, np.zeros(len(system.tangential)))
     gaps = system.rest + system.J[: len(system.rest)] @ q
-    for unit in range(system.contacts):
-        if gaps[unit] < -_ROUND_OFF * system.play[unit]:
-            if system.surface[unit] == STOP:
-                raise InputError(
-                    f"initial.displacement: the structure would begin {-gaps[unit]:.3g} m beyond "
-                    f"stop[{system.body[unit]}]"
-                )
-            raise InputError(
-                f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
-                f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
-            )
+    check_start(system, gaps[: system.contacts])
     return Motion(q, v)
+
+
+def check_start(system: System, gaps: np.ndarray) -> None:
+    """Raise InputError where a contact begins overlapped. gaps: (contacts,) m."""
+    for unit in np.flatnonzero(gaps < -_ROUND_OFF * system.play[: len(gaps)]):
+        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
+        if system.without_body[unit]:
+            raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
+        raise InputError(
+            f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt"
+        )
 
 
 def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:

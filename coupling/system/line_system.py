@@ -14,8 +14,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, Part, System
-from vanedamp.files.toml_input import InputError
+from vanedamp.coupling.system.system import Part, System
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -103,9 +102,7 @@ def line_system(system: System) -> LineSystem:
     friction[:b, :n], friction[:b, n:] = -system.floor[:, :n], np.eye(b)
     friction[b:] = system.casing[:, :size]
     J = np.vstack([friction, system.J[contacts, :size]]) + 0.0
-    surface, body = system.surface[contacts], system.body[contacts]
-    right = np.where(surface == LEFT, body, np.where(surface == BODY, system.other[contacts], -1))
-    left = np.where((surface == RIGHT) | (surface == BODY), body, -1)
+    left, right = (_body_of(sign * system.J[contacts, n:size]) for sign in (-1.0, 1.0))
     on_structure, on_bodies = J[:, :n], J[:, n:]
     on_floors = on_bodies @ -system.floor[:, :n]
     alike = (np.abs(on_structure - on_floors) <= _ALIKE * np.abs(on_floors)).all(axis=1)
@@ -134,6 +131,11 @@ def line_system(system: System) -> LineSystem:
     )  # fmt: skip
 
 
+def _body_of(moved: np.ndarray) -> np.ndarray:
+    """Return which body (k,) widens each gap as it moves on, of rows (k, b) of the bodies; -1: none."""
+    return np.where((moved > 0.0).any(axis=1), (moved > 0.0).argmax(axis=1) if moved.shape[1] else -1, -1)
+
+
 class InitialMotion(NamedTuple):
     """Motion at time zero: modal coordinates (n,) and their rates, displacements (r,) and velocities of the rows."""
 
@@ -144,17 +146,13 @@ class InitialMotion(NamedTuple):
 
 
 def initial_motion(scene: Scene, system: LineSystem) -> InitialMotion:
-    """Return the motion that a scene begins with. Raises InputError for a structure that begins beyond a stop."""
+    """Return the motion that a scene begins with."""
     n, initial = system.modes, scene.initial
     p, p_rate = np.full(n, initial.displacement / system.scale), np.full(n, initial.velocity / system.scale)
     slip = np.array([damper.position for damper in scene.damper])
     speed = np.array([damper.velocity for damper in scene.damper])
     unloaded = np.zeros(system.friction_rows - system.bodies)
-    motion = InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
-    for index, gap in enumerate(motion.displacement[len(system.J) - len(scene.stop) :]):
-        if gap < 0.0:
-            raise InputError(f"initial.displacement: the structure would begin {-gap:g} m beyond stop[{index}]")
-    return motion
+    return InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
 
 
 def row_motion(

@@ -22,9 +22,16 @@ import numpy as np
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.scene.shapes.shape import SIDES
 
-#: names of what a unit touches
-SURFACES = (*SIDES, "body", "stop", "casing")
+#: names of what a unit meets, also those of the elements that have been assembled
+SURFACES = [*SIDES, "body", "stop", "casing"]
 LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
+
+
+def surface_code(name: str) -> int:
+    """Return the place of a name in SURFACES, where it is put if it is new."""
+    if name not in SURFACES:
+        SURFACES.append(name)
+    return SURFACES.index(name)
 
 
 class Part(NamedTuple):
@@ -80,7 +87,7 @@ class System(NamedTuple):
     elongation: np.ndarray  # (j, N) of these springs
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
-    body: np.ndarray  # (u,) number of the unit's body, the left one of two; of a stop or a friction damper its own
+    body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body that of its own table
     other: np.ndarray  # (u,) number of the body to its right; -1: none
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
     corner: np.ndarray  # (u,) int: 0 to 3, counterclockwise from the lower left one; -1: none
@@ -128,10 +135,23 @@ class System(NamedTuple):
         return len(self.casing)
 
     @property
+    def without_body(self) -> np.ndarray:
+        """Whether each unit (u,) moves no body: it is between places of the structure, or one of them and the ground."""
+        bodies = slice(self.modes, len(self.mass) - len(self.tangential))
+        moves: np.ndarray = self.J[:, bodies].any(axis=1).reshape(2, -1).any(axis=0)
+        return ~moves
+
+    @property
+    def across(self) -> np.ndarray:
+        """Whether each contact (contacts,) is one with a floor or a ceiling."""
+        return np.isin(self.surface[: self.contacts], (FLOOR, CEILING))
+
+    @property
     def travels(self) -> np.ndarray:
-        """Free travel (c,) of each gap along a cavity, from left to right, and of each stop, m."""
-        along = np.isin(self.surface[: self.contacts], (LEFT, RIGHT, BODY, STOP))
-        pairs = np.column_stack([self.surface[: self.contacts], self.body[: self.contacts]])[along]
+        """Free travel (c,) of each gap along a cavity, from left to right, and of each stop and other element, m."""
+        along, surface = ~self.across, self.surface[: self.contacts]
+        one = np.where(surface <= BODY, -1, np.arange(self.contacts))  # a face has several contacts, but one gap
+        pairs = np.column_stack([surface, self.body[: self.contacts], one])[along]
         first = np.sort(np.unique(pairs, axis=0, return_index=True)[1])
         return np.asarray(self.play[: self.contacts][along][first])
 

@@ -225,7 +225,7 @@ class _Drawing:
         contacts = [
             ContactMotion(place, self._points(number, bodies), light[:, number])
             for number, place in enumerate(self.plane.contacts)
-            if place[1] != "stop" and any(body.number == place[0] for body in bodies)
+            if place[1] in (*SIDES, "body") and any(body.number == place[0] for body in bodies)
         ]
         left, right = (
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
@@ -302,7 +302,7 @@ class _Drawing:
         if corner >= 0:
             return body.outline[:, corner]
         if side != "body":
-            return centre + np.array(_SIDES.get(side, (0.0, 0.0))) * body.half
+            return centre + np.array(_SIDES[side]) * body.half
         heights = common_heights(body.face, bodies[place + 1].face) or (body.half[1],)
         upper = sum(each == self.plane.contacts[number] for each in self.plane.contacts[:number])
         point = np.array([body.half[0], heights[upper] - body.half[1]])

@@ -13,6 +13,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.response.response import PlanarSamples, Response
+from vanedamp.coupling.scene.elements.registry import meets_body
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
@@ -57,7 +58,8 @@ class History:
         values, attributes = load(path, "response")
         provenance = json.loads(attributes.pop("provenance", "{}"))
         kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
-        struck = np.where(values.get("event_side", "") == "stop", -1, values.get("event_damper", -1))
+        on_body = [meets_body(str(side)) for side in np.atleast_1d(values.get("event_side", ""))]
+        struck = np.where(on_body, values.get("event_damper", -1), -1)
         energy = json.loads(attributes.pop("energy", "{}"))
         begin = attributes.get("transient", 0) / attributes["frequency"]
         scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
@@ -84,7 +86,7 @@ class History:
             displacement=frozen(response.displacement),
             bodies=frozen(response.body_displacement),
             impacts=frozen([event.time for event in impacts]),
-            struck=frozen([-1 if event.side == "stop" else event.damper for event in impacts], int),
+            struck=frozen([event.damper if meets_body(event.side) else -1 for event in impacts], int),
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
             by_place=[],

@@ -22,7 +22,7 @@ from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
-from vanedamp.coupling.system.system import STOP, System
+from vanedamp.coupling.system.system import SURFACES, System
 from vanedamp.files.toml_input import InputError
 
 
@@ -52,7 +52,7 @@ def penalty_forces(system: System, step: float, options: PenaltyOptions) -> Pena
         try:
             spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
         except InputError as error:
-            owner = "stop" if system.surface[r] == STOP else "damper"
+            owner = SURFACES[system.surface[r]] if system.without_body[r] else "damper"
             raise InputError(f"{owner}[{system.body[r]}].{error}") from None
     slow = np.full(u, np.nan if options.slip_velocity is None else options.slip_velocity)
     with np.errstate(divide="ignore"):
