@@ -117,7 +117,7 @@ def test_a_tether_throws_the_body_back(method):
 
 @pytest.mark.parametrize("method", ["exact", "solve_ivp"])
 def test_a_dashpot_in_the_tether_takes_energy(method):
-    """A half swing with damping ratio z leaves exp(-(pi - 2 a) tan a) of the speed, sin a = z: it ends at zero force."""
+    """A half swing of damping ratio z = sin a leaves exp(-(pi - 2 a) tan a) of the speed: it ends at zero force."""
     solver, _ = METHODS[method]
     ratio = 0.1
     dashpot = 2 * ratio * math.sqrt(STIFFNESS * MASS)
@@ -177,7 +177,9 @@ def test_the_period_map_has_the_derivative_of_differences():
         ends = [mapped(state + way * move) for way in (1, -1)]
         assert all(end.sequence == passage.sequence for end in ends)
         column = (ends[0].state - ends[1].state) / (2 * step * scale[j])
-        np.testing.assert_allclose(column / scale, passage.derivative[:, j] / scale, atol=1e-6 * np.abs(column / scale).max())
+        np.testing.assert_allclose(
+            column / scale, passage.derivative[:, j] / scale, atol=1e-6 * np.abs(column / scale).max()
+        )
 
 
 def test_it_rings_down():

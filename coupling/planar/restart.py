@@ -32,8 +32,8 @@ def planar_restart(system: System, start: RestartState) -> Motion:
     """Return the motion at the start of a run of another scene, whose cavities may be smaller.
 
     There bodies, all of a cavity by the same share, go back to where they lie flat in the middle, as far as it takes.
-    A structure beyond a constraint of its own is moved to it, and springs of friction dampers are unloaded to the limits of their
-    sliders. Raises InputError for a scene of another size.
+    A structure beyond a constraint of its own is moved to it, and springs of friction dampers are unloaded to the
+    limits of their sliders. Raises InputError for a scene of another size.
     """
     check_size(system, start, planar=True)
     size, n = len(system.mass), system.modes

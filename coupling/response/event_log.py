@@ -23,7 +23,8 @@ class Rows(NamedTuple):
     """What the rows (r,) of a log are.
 
     places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). without_body: (r,)
-    whether it is the latter. other: (r,) number of the body to the right, -1: none. sign: (r,) of the gap's speed in that of the body relative to what it meets.
+    whether it is the latter. other: (r,) number of the body to the right, -1: none. sign: (r,) of the gap's speed in
+    that of the body relative to what it meets.
     spring: (r,) stiffness of a contact, N/m; inf: rigid.
     """
 
@@ -55,7 +56,8 @@ def rows_of_line(system: System) -> Rows:
     sign[on_body] = np.sign(system.J[on_body, system.along[system.body[on_body]]])
     return Rows(
         [*floors, *dampers, *units.places[:c]],
-        np.r_[np.zeros(len(floors), bool), np.ones(len(dampers), bool), system.without_body[:c]], np.r_[np.full(first, -1), system.other[:c]],
+        np.r_[np.zeros(len(floors), bool), np.ones(len(dampers), bool), system.without_body[:c]],
+        np.r_[np.full(first, -1), system.other[:c]],
         np.r_[np.ones(first), sign], np.r_[np.full(first, np.inf), system.spring[:c]],
     )  # fmt: skip
 

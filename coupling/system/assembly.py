@@ -197,8 +197,10 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
     kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
-    return {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()} | {
-        "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J, "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
+    found = {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()}
+    return found | {
+        "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
+        "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
     }  # fmt: skip
 
 
@@ -322,9 +324,7 @@ def check_start(system: System, gaps: np.ndarray) -> None:
         body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
         if system.without_body[unit]:
             raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
-        raise InputError(
-            f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt"
-        )
+        raise InputError(f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt")
 
 
 def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:

@@ -136,7 +136,7 @@ class System(NamedTuple):
 
     @property
     def without_body(self) -> np.ndarray:
-        """Whether each unit (u,) moves no body: it is between places of the structure, or one of them and the ground."""
+        """Whether each unit (u,) moves no body: it is between places of the structure, or one and the ground."""
         bodies = slice(self.modes, len(self.mass) - len(self.tangential))
         moves: np.ndarray = self.J[:, bodies].any(axis=1).reshape(2, -1).any(axis=0)
         return ~moves

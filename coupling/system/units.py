@@ -210,7 +210,7 @@ class ElementParts(NamedTuple):
 
 
 def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
-    """Yield the units of the scene's elements, table by table. Raises TypeError for what an element does not declare."""
+    """Yield the units of the scene's elements. Raises TypeError for springs or friction that one does not declare."""
     for table, number, element in scene.elements:
         for unit in element.units(number, parts):
             springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid

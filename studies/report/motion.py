@@ -42,7 +42,7 @@ class BodyMotion:
     """A body as drawn in n frames, in units of the drawing, y upwards.
 
     form: as which it ran
-    outline: (n, k, 2) corners, of a slider those of a rectangle; (n, 2, 2) centre of a round body and a point of its rim
+    outline: (n, k, 2) corners, of a slider those of a rectangle; (n, 2, 2) centre and a point of the rim
     face: heights at which it touches a neighbour
     along, lift (m), tilt (rad): (n,) in the cavity, as sampled; nan of a slider
     """

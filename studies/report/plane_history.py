@@ -26,8 +26,8 @@ _SURFACES = {
 class ImpactsAtPlace:
     """The impacts of one contact in the evaluated periods.
 
-    body counts from 0 (of a stop: its number); four: whether its corners are those of a block; impulses (N s) are sums, of tangential ones of their sizes; loss: J, nan
-    for files that have none.
+    body counts from 0 (of a stop: its number); four: whether its corners are those of a block; impulses (N s) are sums,
+    of tangential ones of their sizes; loss: J, nan for files that have none.
     """
 
     body: int

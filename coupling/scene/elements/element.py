@@ -1,4 +1,4 @@
-"""The contract of elements: other code asks an entry of a scene's list of tables these questions, and never for its class."""
+"""The contract of elements, entries of lists of tables: other code asks them these questions, and never for a class."""
 
 from __future__ import annotations
 

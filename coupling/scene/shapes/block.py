@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 class Block(Polygon):
     """A rectangle, which touches with its corners."""
 
-    measures = {"length": "", "height": ""}
+    measures: ClassVar[Mapping[str, str]] = {"length": "", "height": ""}
     half_extent = Shape.half_extent
     inertia = Shape.inertia
 

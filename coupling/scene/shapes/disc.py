@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 from vanedamp.coupling.scene.shapes.shape import OUTWARDS, Point, Shape
 
@@ -14,7 +15,7 @@ class Disc(Shape):
     """A disc, which touches with the points of its rim that face the surfaces."""
 
     rolls = True
-    measures = {"radius": ""}
+    measures: ClassVar[Mapping[str, str]] = {"radius": ""}
 
     def half_extent(self, body: Damper) -> tuple[float, float]:
         """Return the radius, twice."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, Point, Shape
 
@@ -32,4 +33,4 @@ class Open(Slider):
     """A block or a slider, whichever is enough: a slider until that is chosen (model_order.choices)."""
 
     planar = True
-    measures = {"length": "", "height": ""}
+    measures: ClassVar[Mapping[str, str]] = {"length": "", "height": ""}
