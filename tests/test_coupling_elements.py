@@ -122,14 +122,15 @@ def test_a_dashpot_in_the_tether_takes_energy(method):
     ratio = 0.1
     dashpot = 2 * ratio * math.sqrt(STIFFNESS * MASS)
     tether = {"damper": 0, "slack": SLACK, "stiffness": STIFFNESS, "dashpot": dashpot}
-    response = simulate(tethered(solver, tether=[tether]), events=True)
+    response = simulate(tethered(solver, 2, tether=[tether]), events=True)
     speeds = np.abs([event.relative_velocity_before for event in response.event_list if event.kind == "impact"])
     angle = math.asin(ratio)
     left = math.exp(-(math.pi - 2 * angle) * math.tan(angle))
     assert speeds == pytest.approx(SPEED * left ** np.arange(len(speeds)), rel=1e-6) and len(speeds) > 2
-    # in a prescribed table nothing else takes energy
-    kinetic = 0.5 * MASS * SPEED**2
-    assert response.energy["contact"] == pytest.approx(kinetic * (1 - left ** (2 * (len(speeds)))), rel=1e-2)
+    # on such a table nothing else takes energy
+    swings = sum(event.kind == "detach" for event in response.event_list)
+    assert swings == len(speeds)
+    assert response.energy["contact"] == pytest.approx(0.5 * MASS * SPEED**2 * (1 - left ** (2 * swings)), rel=1e-6)
 
 
 SHAKEN = {
@@ -263,10 +264,12 @@ def test_shrouds_meet_by_their_relative_motion(method, engine, tmp_path):
         )
 
     place, speed = motion(first.time)
-    assert place == pytest.approx(GAP, rel=max(tolerance, 1e-8))
+    step = 0.2 / scene.solver.steps_per_period if method in ("moreau", "penalty") else 0.0
+    assert place == pytest.approx(GAP, rel=max(tolerance, 1e-8), abs=speed * step)
     assert abs(first.relative_velocity_before) == pytest.approx(speed, rel=max(tolerance, 1e-6))
-    reduced = 1 / (1 / 1.0 + 1 / 3.0)
-    assert first.impulse == pytest.approx(1.5 * reduced * speed, rel=max(tolerance, 2e-3))
+    if method != "penalty":  # whose contact lasts, while the force goes on
+        reduced = 1 / (1 / 1.0 + 1 / 3.0)
+        assert first.impulse == pytest.approx(1.5 * reduced * speed, rel=2e-2 if step else 1e-6)
 
 
 def test_shrouds_are_named_rightly(tmp_path):
