@@ -13,7 +13,7 @@ from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.contact_decisions import row_speed, rubs
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.system import STOP, System
+from vanedamp.coupling.system.system import SURFACES, System
 from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 
@@ -61,7 +61,7 @@ def penalty_laws(system: System, step: float, options: PenaltyOptions) -> Penalt
         try:
             spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
         except InputError as error:
-            owner = "stop" if system.surface[r] == STOP else "damper"
+            owner = SURFACES[system.surface[r]] if system.without_body[r] else "damper"
             raise InputError(f"{owner}[{system.body[r]}].{error}") from None
     slow = np.full(u, np.nan if options.slip_velocity is None else options.slip_velocity)
     with np.errstate(divide="ignore"):

@@ -76,12 +76,14 @@ def _check_bodies(scene: Scene, method: Method) -> None:
             f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
             f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(able)}'
         )
-    asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
+    asked = {"yields": scene.yields, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
     if not wanted <= set(taken):
         able = [other for other, known in laws.items() if known is not None and wanted <= set(known)]
+        tables = [table for table, _, element in scene.elements if element.yields and law.rigid]
+        source = f"{tables[0]}: springs" if tables else f'contact.law: "{law.law}"'
         raise InputError(
-            f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
+            f"{source} of bodies with extent, stiffness or dashpot, and of impacts in two phases, is "
             f"for solver.method {' or '.join(able)}, not {name}"
         )
 

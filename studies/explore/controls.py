@@ -175,7 +175,7 @@ def _gap_changes(scene: Scene, paths: tuple[str, ...], number: float) -> dict[st
 
 
 def _extended(scene: Scene) -> bool:
-    return any(damper.shape != "slider" for damper in scene.damper)
+    return any(damper.form.planar for damper in scene.damper)
 
 
 def _bodies(scene: Scene) -> Iterator[Control]:

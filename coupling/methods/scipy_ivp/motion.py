@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.system import STOP, System
+from vanedamp.coupling.system.system import System
 
 #: states of a unit; a closed contact without friction slips to the right; LOOSE: a spring is compressed without force
 OPEN, STICK, LEFT, RIGHT, LOOSE = range(5)
@@ -75,7 +75,7 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
-        self.extends = self.contact & (system.surface != STOP)  # whether a unit is of a body with extent
+        self.extends = self.contact & ~system.without_body  # whether a unit is of a body with extent
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
         near, self._relative = np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T
         self._near = near * np.where(self.contact, system.play, 0.0)

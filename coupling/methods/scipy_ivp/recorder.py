@@ -22,7 +22,7 @@ from vanedamp.coupling.response.records import (
     VISCOUS,
     Records,
 )
-from vanedamp.coupling.system.system import FLOOR, STOP
+from vanedamp.coupling.system.system import FLOOR
 
 #: the integrals; behind them, of each contact that yields, its impulses, along and across, and its loss
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(10)
@@ -120,7 +120,7 @@ class Recorder:
     def sizes(self) -> np.ndarray:
         """Return typical sizes of state and integrals (size + count,), for a motion through the smallest gap."""
         system, n, omega = self.system, self.system.modes, float(self.system.omega)
-        gaps = np.where(system.surface == STOP, system.rest, system.play)[: system.contacts]
+        gaps = np.where(system.without_body, system.rest, system.play)[: system.contacts]
         lengths = np.r_[gaps, system.limit[self.free.sprung] / system.tangential]
         static = np.abs(system.J[:, :n]) @ (np.abs(system.load[:, :n]).sum(axis=0) / system.squares)
         reach = float(lengths[lengths > 0].min(initial=np.inf))

@@ -1,0 +1,36 @@
+"""Bodies that only move along their cavity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, Point, Shape
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.scene.bodies import Damper
+
+
+class Slider(Shape):
+    """A body that only moves along its cavity; its height, if it is known, says how high its centre is."""
+
+    planar = extended = False
+
+    def points(self, body: Damper, surface: int) -> tuple[Point, ...]:
+        """Return its centre, for walls."""
+        return () if surface in (FLOOR, CEILING) else ((-1, 0.0, 0.0),)
+
+    def face(self, body: Damper) -> tuple[float, float]:
+        """Return the floor: sliders touch whatever their heights."""
+        return 0.0, 0.0
+
+    def shortening(self, body: Damper) -> float:
+        """Return nan: it never tilts."""
+        return float("nan")
+
+
+class Open(Slider):
+    """A block or a slider, whichever is enough: a slider until that is chosen (model_order.choices)."""
+
+    planar = True
+    measures: ClassVar[Mapping[str, str]] = {"length": "", "height": ""}
