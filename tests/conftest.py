@@ -25,7 +25,10 @@ def pytest_report_header(config):
 
 def pytest_terminal_summary(terminalreporter):
     if "skipped" in terminalreporter.stats:
-        terminalreporter.write_line("Skipped tests: `make setup` installs what they lack, unless they name a command.")
+        terminalreporter.write_line(
+            "Skipped tests: `make setup` installs what they lack (`make setup-browser setup-peers setup-docs`), "
+            "unless they name a command."
+        )
 
 
 @pytest.fixture
