@@ -25,6 +25,7 @@ from vanedamp.coupling.numerics.codes import (
     SEGMENTS,
     UNDECIDED,
 )
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
@@ -34,9 +35,6 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
-
-#: imbalance of the ledger above which a response is not to be used: ordinary runs stay ten thousand times below
-_OPEN_LEDGER = 1e-6
 
 
 @dataclass
@@ -145,7 +143,7 @@ class EngineRun:
         """Return the results of the run."""
         counters = self.state.counters
         return Outcome(
-            self.whole, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER,
+            self.whole, self.records, int(counters[PERIOD]), int(counters[EVENTS]), OPEN_LEDGER,
             {
                 "impacts": int(counters[IMPACTS]),
                 "segments": int(counters[SEGMENTS]),

@@ -17,6 +17,7 @@ from vanedamp.coupling.numerics.codes import (
     REDUCED,
     SEGMENTS,
 )  # fmt: skip
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
@@ -30,9 +31,6 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Motion, initial_motion
 from vanedamp.coupling.system.system import System
-
-#: imbalance of the ledger above which a response is not to be used
-_OPEN_LEDGER = 1e-6
 
 
 def begin_run(
@@ -92,7 +90,7 @@ class PlanarRun:
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
         return Outcome(
-            self.system, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
+            self.system, self.records, int(counters[PERIOD]), int(counters[EVENTS]), OPEN_LEDGER, found, self.chunks,
             rows_of_units(self.system), plane=plane_of(self.system, self.state, self.linearisation),
         )  # fmt: skip
 
