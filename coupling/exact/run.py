@@ -20,15 +20,13 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     SEGMENTS,
 )
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
 from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.system import System
-
-#: imbalance of the ledger above which a response is not to be used: ordinary runs stay ten thousand times below
-_OPEN_LEDGER = 1e-6
 
 
 class EventDrivenRun(ABC):
@@ -122,7 +120,7 @@ class EventDrivenRun(ABC):
         found = {name: int(self.counters[place]) for name, place in self.NUMBERS.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
         return Outcome(
-            self.whole, self.records, int(self.counters[PERIOD]), int(self.counters[EVENTS]), _OPEN_LEDGER, found,
+            self.whole, self.records, int(self.counters[PERIOD]), int(self.counters[EVENTS]), OPEN_LEDGER, found,
             self.chunks, self.rows_of(self.whole), plane=self._plane(),
         )  # fmt: skip
 

@@ -36,7 +36,7 @@ from vanedamp.coupling.methods.step_records import (
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import elongation, is_rigid, row_speed, rubs
+from vanedamp.coupling.planar.unit_kinematics import elongation, has_friction, is_rigid, row_speed
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart_state import RestartState
@@ -146,7 +146,7 @@ def _impulses(system, motion, problem, turned, h, theta):
     u, free, closed, shut = len(system.rest), motion.coordinates[_FREE], motion.rows[_CLOSED], False
     for r in range(u):
         motion.impulse[r], motion.impulse[u + r], motion.before[r], closed[r] = 0.0, 0.0, 0.0, 0.0
-        if rubs(system, r):
+        if has_friction(system, r):
             motion.before[u + r] = row_speed(system, u + r, motion.v)
         if r < system.contacts:
             motion.before[r] = row_speed(system, r, motion.v)

@@ -26,7 +26,7 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
-from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed, rubs
+from vanedamp.coupling.planar.unit_kinematics import elongation, gap, has_friction, row_speed
 from vanedamp.coupling.system.system import System
 
 
@@ -122,7 +122,7 @@ def _list_rows(system, problem, laws, h, ahead, fast, beta, gamma):
             shift = (laws.spring[r] * opened + laws.dashpot[r] * row_speed(system, r, fast)) / stiff
             list_row(problem, count, r, shift, 0.0, math.inf, 1.0 / stiff)
             normal, count = count, count + 1
-        if rubs(system, r):
+        if has_friction(system, r):
             slow = laws.slow[r] / (system.limit[r] * gamma * h) if normal < 0 else 0.0
             list_row(problem, count, u + r, row_speed(system, u + r, fast) / (gamma * h), low, high, slow)
             if normal >= 0:

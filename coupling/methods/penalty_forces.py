@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from vanedamp.coupling.methods.step_records import multiply, set_gaps
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record
-from vanedamp.coupling.planar.contact_decisions import row_speed, rubs
+from vanedamp.coupling.planar.unit_kinematics import has_friction, row_speed
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.system import SURFACES, System
@@ -125,7 +125,7 @@ def set_rows(system, motion, q, v):
     for r in range(u):
         if r < system.contacts:
             motion.before[r] = row_speed(system, r, v)
-        if rubs(system, r):
+        if has_friction(system, r):
             motion.before[u + r] = row_speed(system, u + r, v)
         if r >= u - len(system.tangential):
             motion.rows[0, u + r] = row_speed(system, u + r, q)

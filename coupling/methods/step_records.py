@@ -15,8 +15,8 @@ from vanedamp.coupling.numerics.codes import (
     STEPS,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
+from vanedamp.coupling.planar.unit_kinematics import elongation, gap
 from vanedamp.coupling.response.recorder import note_step
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR

@@ -1,8 +1,8 @@
 """The motion between two events as a linear system: rates, forces and event functions.
 
 Between two events every unit keeps its state, and all is linear in the extended state (z, 1, cos, sin) of the
-excitation's harmonics. z = (q, v, d, s) holds coordinates and velocities, and again the gaps of the units and the speeds
-of all rows: what is zero at an event is zero to the last bit, and a gap grows from there with all its digits.
+excitation's harmonics. z = (q, v, d, s) holds coordinates and velocities, and again the gaps of the units and the
+speeds of all rows: what is zero at an event is zero to the last bit, and a gap grows from there with all its digits.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ class Motion:
         self._sizes = np.abs(self.guard)
 
     def judge(self, now: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, list[Wrong]]:
-        """Return the orders (k,) of the event functions at an extended state (extent,), and what turns negative at once.
+        """Return orders (k,) of the event functions at an extended state (extent,), and which turn negative at once.
 
         sizes: (extent,) of the state's terms, whose round-off is no value.
         """
