@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.methods.scenes import charted
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import start_of
+from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.assembly import Motion, assemble
 from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.files.toml_input import InputError
 
@@ -121,9 +121,9 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    whole = assemble(scene)
-    system = line_system(whole)
-    return Coupled(system, time_grid(system, steps), start(system, start_of(scene, whole)))
+    system = assemble(scene)
+    begun = motion_of(system, start_of(scene, system))
+    return Coupled(line_system(system), time_grid(scene, system, steps), begun)
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
@@ -135,7 +135,8 @@ def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> 
     slips = q[every] @ system.J[: system.bodies].T
     gaps = system.J @ q.T + system.rest[:, None]
     # no number is deeper than any
-    deep = float(np.nan_to_num((-gaps / times.travel[:, None]).max(initial=0.0), nan=np.inf))
+    travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
+    deep = float(np.nan_to_num((-gaps / travel[:, None]).max(initial=0.0), nan=np.inf))
     status = Status.OK if deep <= DEEPEST else Status.PENETRATION
     if not np.isfinite(q).all():
         status = Status.DIVERGED

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -30,7 +29,7 @@ def engine_run(
     return EngineRun(system, line_system(system), start, records, events, max_events)
 
 
-def reuse_subsystems(run: Any, earlier: Run | None) -> None:
+def reuse_subsystems(run: Any, earlier: Any) -> None:
     """Let a run take over the subsystems that an earlier one has met, where both are of one engine that can."""
     if type(earlier) is type(run) and hasattr(run, "reuse"):
         run.reuse(earlier)
