@@ -17,7 +17,7 @@ from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import Begun, Event, Segment
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -44,7 +44,7 @@ class EngineRun(EventDrivenRun):
         max_events: int,
     ) -> None:  # fmt: skip
         super().__init__(whole, records, events, max_events)
-        self.system, self.log = system, records.log
+        self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
         self.known: dict[bytes, Subsystem] = {}
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
@@ -59,6 +59,8 @@ class EngineRun(EventDrivenRun):
 
     def reuse(self, earlier: EngineRun) -> None:
         """Take over the subsystems that an earlier run has met, if its system has the same, at whatever frequency."""
+        if self.whole is earlier.whole:
+            self.flows = earlier.flows
         pairs = ((getattr(self.whole, name), getattr(earlier.whole, name)) for name in _OF_SUBSYSTEMS)
         if all(one is other or np.array_equal(one, other) for one, other in pairs):
             self.known = earlier.known
@@ -89,10 +91,11 @@ class EngineRun(EventDrivenRun):
     def _segment(self) -> Segment:
         # roots of other segments are none of this
         self.event_functions.status[int(self.counters[CARRIED]) :] = BOUNDED
-        return segment_of(self.whole, self.system, self.flows, self.state)
+        return segment_of(self.whole, self.system, self._rows, self.flows, self.state)
 
     def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
-        return event_of(self.whole, self.system, self.state, self.event_functions, self.scratch, log, since)
+        work = self.state, self.event_functions, self.scratch
+        return event_of(self.whole, self.system, self._rows, *work, log, since)
 
     def _left(self) -> RestartState:
         state, system, s = self.state, self.system, int(self.counters[FLOW])

@@ -18,6 +18,7 @@ from vanedamp.coupling.numerics.codes import (
     NEEDS_FLOW,
     PAUSED,
     PERIOD,
+    REDUCED,
     SEGMENTS,
 )
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
@@ -104,7 +105,8 @@ class EventDrivenRun(ABC):
     def segment(self) -> Segment:
         """Return the motion from the present state on (response.segment.EventRun)."""
         st = self.state
-        self._since = Begun(float(st.time[0]), len(self.chunks), float(st.ledger[IMPACT_LOSS]))
+        loss, reduced = float(st.ledger[IMPACT_LOSS]), int(self.counters[REDUCED])
+        self._since = Begun(float(st.time[0]), len(self.chunks), loss, reduced)
         return self._segment()
 
     def event(self) -> tuple[float, Event]:

@@ -25,18 +25,18 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
 from vanedamp.coupling.system.assembly import place_sliders
-from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.system import System
 
 
-def segment_of(system: System, line: LineSystem, flows: Flows, st: State) -> Segment:
-    """Return the motion from a state on."""
-    s, awake, rows = int(st.counters[FLOW]), slice(int(st.counters[AWAKE])), rows_of_units(system)
+def segment_of(system: System, line: LineSystem, rows: np.ndarray, flows: Flows, st: State) -> Segment:
+    """Return the motion from a state on. rows: (u,) of the units (rows_of_units)."""
+    s, awake = int(st.counters[FLOW]), slice(int(st.counters[AWAKE]))
     n, b, units, size = line.modes, line.bodies, len(rows), len(system.mass)
     amplitude, state = st.amplitude[awake].copy(), st.state[rows]
     modal = flows.shape[s, awake].T  # of (p, p')
     now = (modal @ amplitude).real
-    still = np.isin(st.state[:b], (STICK, HELD))
+    still = (st.state[:b] == STICK) | (st.state[:b] == HELD)
     q, v, bend = np.zeros(size), np.zeros(size), np.zeros(size)
     shape, rate_shape = np.zeros((2, size, len(amplitude)), complex)
     q[:n], v[:n], shape[:n], rate_shape[:n] = st.constant + now[:n], now[n:], modal[:n], modal[n:]
@@ -53,13 +53,14 @@ def segment_of(system: System, line: LineSystem, flows: Flows, st: State) -> Seg
     for part in (v, shape, rate_shape):
         part[size - len(follows) :] = follows @ part[:n]
     state[jenkins] = np.where(state[jenkins] == SPRUNG, STICK, state[jenkins])
-    closed = np.isin(st.state[rows], (STICK, CLOSED, SPRUNG))
+    own = st.state[rows]
+    closed = (own == STICK) | (own == CLOSED) | (own == SPRUNG)
     on = np.arange(units) + np.where(np.arange(units) < system.contacts, 0, units)
     force, open_force = np.zeros((2, 2 * units))
     force_shape = np.zeros((2 * units, len(amplitude)), complex)
     force[on] = np.where(closed, st.constant_force[rows], st.applied_force[rows])
     force_shape[on] = np.where(closed[:, None], flows.force[s, rows, awake], 0.0)
-    open_force[on] = np.where(np.isin(state, (HELD, TOUCHING)), st.applied_force[rows], 0.0)
+    open_force[on] = np.where((own == HELD) | (own == TOUCHING), st.applied_force[rows], 0.0)
     drive, driver = np.zeros((2, len(amplitude)), complex)
     for h, first, last in zip(range(len(line.frequency)), flows.driven[s], flows.driven[s, 1:], strict=False):
         drive[first:last], driver[first:last] = flows.load[s, first:last] * amplitude[h], flows.eigenvalue[s, h]
@@ -72,11 +73,11 @@ def segment_of(system: System, line: LineSystem, flows: Flows, st: State) -> Seg
 
 
 def event_of(
-    system: System, line: LineSystem, st: State, watched: EventFunctions, work: Scratch, log: list[np.ndarray],
-    since: Begun,
+    system: System, line: LineSystem, rows: np.ndarray, st: State, watched: EventFunctions, work: Scratch,
+    log: list[np.ndarray], since: Begun,
 ) -> tuple[float, Event]:  # fmt: skip
     """Return the last event and the time from the segment's begin to it. log: entries since then, in chunks."""
-    rows, unit, what, elapsed, hits = rows_of_units(system), -1, 0, 0.0, True
+    unit, what, elapsed, hits = -1, 0, 0.0, True
     if since is not START:
         roots = np.flatnonzero(watched.status == ROOT)
         k = int(roots[np.argmin(np.abs(watched.no_root_before[roots] - (st.time[0] - since.time)))])
@@ -89,7 +90,7 @@ def event_of(
     impulse = np.zeros(len(system.J))
     impulse[: system.contacts] = work.impulse[rows[: system.contacts]] * hits
     met = {int(entry[2]): float(entry[3]) for chunk in log for entry in chunk if entry[1] == IMPACT}
-    struck = [r for r in range(system.contacts) if impulse[r] != 0.0 or rows[r] in met]
+    struck = [r for r in range(system.contacts) if impulse[r] != 0.0 or (met and rows[r] in met)]
     return elapsed, no_event(system)._replace(
         unit=unit, what=what, impulse=impulse, struck=np.array(struck, int),
         before=np.array([met.get(int(rows[r]), 0.0) for r in struck]), after=st.velocity[rows[struck]],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.numerics.codes import FLOW, PERIOD, ROOT
+from vanedamp.coupling.numerics.codes import FLOW, PERIOD, REDUCED, ROOT
 from vanedamp.coupling.planar.contact_flow import ContactFlows
 from vanedamp.coupling.planar.state import Guards, PlanarState, Scratch
 from vanedamp.coupling.response.event_log import WIDTH
@@ -46,4 +46,5 @@ def event_of(
     return elapsed, no_event(system)._replace(
         unit=unit, what=what, impulse=impulse, compression=compression, struck=struck, before=hits[:, 3],
         after=hits[:, 4], loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
+        reduced=int(st.counters[REDUCED]) > since.reduced,
     )  # fmt: skip

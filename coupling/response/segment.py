@@ -13,7 +13,7 @@ A mode that a harmonic drives near its own frequency grows by drive_j times the 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class Event(NamedTuple):
     impulse: (2u,) N s on all rows, normals first; compression: (2u,) those of the first phase, of laws with two
     struck: (k,) units that an impact hits, rigid or not; before, after: (k,) m/s, speeds of their gaps
     loss: energy that impacts take, J
+    reduced: whether restitutions had to be smaller by one factor, so that they bring none
     """
 
     unit: int
@@ -44,7 +45,8 @@ class Event(NamedTuple):
     struck: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    loss: float
+    loss: float = 0.0
+    reduced: bool = False
 
 
 class Segment(NamedTuple):
@@ -124,15 +126,19 @@ def beyond_line(z: np.ndarray) -> np.ndarray:
 
 
 class Begun(NamedTuple):
-    """What a run was when its segment began: time in the period, s; chunks of its log; energy lost in impacts, J."""
+    """What a run was when its segment began: time in the period, s; chunks of its log; energy lost in impacts, J.
 
-    time: float
-    chunks: int
-    loss: float
+    reduced: impacts so far whose restitutions were smaller.
+    """
+
+    time: float = 0.0
+    chunks: int = 0
+    loss: float = 0.0
+    reduced: int = 0
 
 
 #: what it was before the start
-START = Begun(0.0, 0, 0.0)
+START = Begun()
 
 
 class EventRun(Run, Protocol):
@@ -151,11 +157,14 @@ class EventRun(Run, Protocol):
     def event(self) -> tuple[float, Event]:
         """Return the last event and the time since the last `segment`, s; before the first, the start of the run."""
 
+    def reuse(self, earlier: Any) -> None:
+        """Take over what an earlier run of the same engine has computed, as far as its system is the same."""
+
 
 def no_event(system: System) -> Event:
     """Return the end of an excitation period, at which nothing happens."""
     none, nobody = np.zeros(len(system.J)), np.zeros(0)
-    return Event(-1, 0, none, none, nobody.astype(int), nobody, nobody, 0.0)
+    return Event(-1, 0, none, none, nobody.astype(int), nobody, nobody)
 
 
 class Walk:
@@ -197,10 +206,3 @@ class Walk:
         """Advance by a number of events within the period that follows those done."""
         self.run.max_events = int(self.run.counters[EVENTS]) + events
         return self.run.advance_to(done + 1)
-
-    def finish(self) -> Status:
-        """Advance to the end without segments. Returns how that ended."""
-        self.run.max_events, self.status = self._budget, Status.OK
-        if self.run.counters[PERIOD] < self._periods:
-            self.status = self.run.advance_to(self._periods)
-        return self.status
