@@ -28,8 +28,8 @@ from vanedamp.coupling.methods.step_problem import (
 from vanedamp.coupling.methods.step_records import (
     close_step,
     drag_sliders,
-    multiply,
     open_step,
+    product,
     record_start,
     set_gaps,
 )
@@ -104,8 +104,8 @@ def moreau_matrices(system: System, step: float, theta: float) -> tuple[Sparse, 
 def march_moreau(system, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
     size, h, steps = len(motion.q), times.step, len(times.phase) - 1
-    q, v, scratch, free = motion.start[0], motion.start[1], motion.coordinates, motion.coordinates[_FREE]
-    load, ahead, drag, pull = scratch[1], scratch[2], scratch[3], scratch[4]
+    q, v, free = motion.start[0], motion.start[1], motion.coordinates[_FREE]
+    load, ahead = motion.coordinates[1], motion.coordinates[2]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
     while motion.counters[STEPS] < until:
@@ -113,14 +113,11 @@ def march_moreau(system, times, motion, records, log, problem, inverse, turned, 
         open_step(system, times, motion, records, k)
         for i in range(size):
             ahead[i] = q[i] + h * theta * v[i]
-        multiply(times.damping, v, drag)
-        multiply(times.stiffness, ahead, pull)
         for i in range(size):
-            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
-            load[i] = h * (system.weight[i] + mean - drag[i] - pull[i])
-        multiply(inverse, load, free)
+            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i] + system.weight[i]
+            load[i] = h * (mean - product(times.damping, i, v) - product(times.stiffness, i, ahead))
         for i in range(size):
-            free[i] += v[i]
+            free[i] = v[i] + product(inverse, i, load)
         if not _impulses(system, motion, problem, turned, h, theta):
             return UNDECIDED
         for i in range(size):
