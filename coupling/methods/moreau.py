@@ -222,11 +222,26 @@ def _two_phases(system, motion, problem, turned, tolerance):
                 return False
             _push(system, motion, problem, count, turned)
             for a in range(count):
-                r = problem.row[a]
                 problem.now[a] = box.acceleration[a]
-                if r < u and phase == 0:
-                    box.low[a] = restitution_at(system, r, approach[r]) * box.force[a]
+            if phase == 0:
+                _expand(system, problem, count, approach)
+                _push(system, motion, problem, count, turned)
     return True
+
+
+@inlined
+def _expand(system, problem, count, approach):
+    """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
+    box = problem.box
+    for a in range(count):
+        r = problem.row[a]
+        box.force[a] = restitution_at(system, r, approach[r]) * box.force[a] if r < len(system.rest) else 0.0
+    for a in range(count):
+        for c in range(count):
+            problem.now[a] += box.matrix[a, c] * box.force[c]
+        if problem.friction[a] > 0.0:
+            bound = problem.friction[a] * box.force[problem.normal[a]]
+            box.low[a], box.high[a] = -bound, bound
 
 
 @inlined
