@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, set_forces, set_rows
-from vanedamp.coupling.methods.step_records import close_step, multiply, open_step, record_start
+from vanedamp.coupling.methods.step_records import close_step, open_step, product, record_start
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.system.system import System
@@ -27,7 +27,7 @@ def central_difference_matrix(system: System, step: float) -> Sparse:
 def march_central_difference(system, times, motion, records, log, inverse, laws, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
     size, h, steps, half = len(motion.q), times.step, len(times.phase) - 1, motion.half
-    rhs, change = motion.coordinates[0], motion.coordinates[1]
+    rhs = motion.coordinates[0]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, laws)
@@ -39,17 +39,12 @@ def march_central_difference(system, times, motion, records, log, inverse, laws,
         for i in range(size):
             motion.q[i] += h * half[i]
         set_rows(system, motion, motion.q, half)
-        for a in range(len(motion.live)):
-            motion.impulse[motion.live[a]] = motion.force[motion.live[a]]
-        set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before)
-        for a in range(len(motion.live)):
-            row = motion.live[a]
-            motion.impulse[row] = 0.5 * h * (motion.impulse[row] + motion.force[row])
+        set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before, h)
         net_load(system, times, motion, motion.q, half, k + 1, rhs)
-        multiply(inverse, rhs, change)
         for i in range(size):
-            motion.v[i] = half[i] + 0.5 * h * change[i]
-            half[i] += h * change[i]
+            change = h * product(inverse, i, rhs)
+            motion.v[i] = half[i] + 0.5 * change
+            half[i] += change
         code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code

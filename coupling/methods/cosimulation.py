@@ -114,7 +114,7 @@ def march_cosimulation(
     forces; earlier ones; scratch.
     """
     n, size, rows, h, steps = system.modes, len(motion.q), len(system.J), times.step, len(times.phase) - 1
-    q, v, known, mean = motion.start[0], motion.start[1], memory[2], motion.rows[3]
+    q, v, known, impulse = motion.start[0], motion.start[1], memory[2], motion.rows[3]
     last_speed, last_force, older_force = memory[0, :n], memory[0, n : n + rows], memory[1, :rows]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
@@ -130,7 +130,7 @@ def march_cosimulation(
         _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k)
         for a in range(len(motion.live)):
             row, place, rate, bend = motion.live[a], 0.0, 0.0, 0.0
-            motion.before[row], mean[row] = row_speed(system, row, v), 0.0
+            motion.before[row], impulse[row] = row_speed(system, row, v), 0.0
             for i in range(n):
                 place += system.J[row, i] * q[i]
                 rate += system.J[row, i] * ((motion.q[i] - q[i]) / h if gauss_seidel and hold == 0 else v[i])
@@ -141,9 +141,8 @@ def march_cosimulation(
         copy(v, last_speed)
         _bodies(system, times, motion, loads, laws, substeps, k, memory[2, :rows], memory[2, rows : 2 * rows])
         copy(last_force, older_force)
-        copy(mean, last_force)
         for row in range(rows):
-            motion.impulse[row] = h * mean[row]
+            motion.impulse[row], last_force[row] = impulse[row], impulse[row] / h
         code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code
@@ -174,12 +173,12 @@ def _structure(system, times, motion, matrix, excited, known, force, older, hold
 
 @kernel
 def _bodies(system, times, motion, loads, laws, substeps, k, place, rate):
-    """Advance the bodies by a macro-step on walls of known motion; add up the mean forces of the rows.
+    """Advance the bodies by a macro-step on walls of known motion; add up the impulses of the rows.
 
-    motion.rows: displacement, speed and acceleration (2u,) of the rows by the structure's motion, and the mean forces.
+    motion.rows: displacement, speed and acceleration (2u,) of the rows by the structure's motion, and their impulses.
     place, rate: (2u,) scratch.
     """
-    n, size, small, mean = system.modes, len(motion.q), times.step / substeps, motion.rows[3]
+    n, size, small = system.modes, len(motion.q), times.step / substeps
     for j in range(substeps):
         t = (j + 1) * small
         for i in range(n, size):
@@ -191,12 +190,11 @@ def _bodies(system, times, motion, loads, laws, substeps, k, place, rate):
             for i in range(n, size):
                 place[row] += system.J[row, i] * motion.q[i]
                 rate[row] += system.J[row, i] * motion.half[i]
-            mean[row] += 0.5 * motion.force[row] / substeps
         for r in range(system.contacts):
             place[r] += system.rest[r]
-        set_forces(system, laws, motion, place, place, rate)
+        set_forces(system, laws, motion, place, place, rate, small)
         for a in range(len(motion.live)):
-            mean[motion.live[a]] += 0.5 * motion.force[motion.live[a]] / substeps
+            motion.rows[3, motion.live[a]] += motion.impulse[motion.live[a]]
         for i in range(n, size):
             force = system.weight[i] + loads[(k * substeps + j + 1) % len(loads), i]
             for a in range(len(motion.live)):

@@ -20,8 +20,8 @@ from vanedamp.coupling.system.system import System, on_structure
 class Sparse(NamedTuple):
     """A square matrix (N, N) without its zeros: up to k entries in each row, the others zeros in column 0."""
 
-    column: np.ndarray  # (k, N) unsigned: no place from the end
-    value: np.ndarray  # (k, N)
+    column: np.ndarray  # (N, k) unsigned: no place from the end
+    value: np.ndarray  # (N, k)
 
 
 @record
@@ -74,17 +74,17 @@ class Motion(NamedTuple):
     slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
 
     # scratch, named where each method takes it
-    coordinates: np.ndarray  # (7, N)
+    coordinates: np.ndarray  # (5, N)
     rows: np.ndarray  # (4, 2u)
 
 
 def sparse(matrix: np.ndarray) -> Sparse:
     """Return a square matrix without its zeros."""
     most = int((matrix != 0.0).sum(axis=1).max(initial=0))
-    column, value = np.zeros((most, len(matrix)), np.uint64), np.zeros((most, len(matrix)))
+    column, value = np.zeros((len(matrix), most), np.uint64), np.zeros((len(matrix), most))
     for i, row in enumerate(matrix):
         found = np.flatnonzero(row)
-        column[: len(found), i], value[: len(found), i] = found, row[found]
+        column[i, : len(found)], value[i, : len(found)] = found, row[found]
     return Sparse(column, value)
 
 
@@ -123,5 +123,5 @@ def start(system: System, begun: RestartState, records: Records, spring: np.ndar
         live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
         speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
         response=np.zeros(2), before=np.zeros(2 * u), gap=np.zeros((2, u)), impulse=np.zeros(2 * u),
-        slowest=np.zeros(1), coordinates=np.zeros((7, size)), rows=np.zeros((4, 2 * u)),
+        slowest=np.zeros(1), coordinates=np.zeros((5, size)), rows=np.zeros((4, 2 * u)),
     )  # fmt: skip

@@ -28,8 +28,8 @@ from vanedamp.coupling.methods.step_problem import (
 from vanedamp.coupling.methods.step_records import (
     close_step,
     drag_sliders,
-    multiply,
     open_step,
+    product,
     record_start,
     set_gaps,
 )
@@ -105,8 +105,8 @@ def moreau_matrices(system: System, step: float, theta: float) -> tuple[Sparse, 
 def march_moreau(system, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
     size, h, steps = len(motion.q), times.step, len(times.phase) - 1
-    q, v, scratch, free = motion.start[0], motion.start[1], motion.coordinates, motion.coordinates[_FREE]
-    load, ahead, drag, pull = scratch[1], scratch[2], scratch[3], scratch[4]
+    q, v, free = motion.start[0], motion.start[1], motion.coordinates[_FREE]
+    load, ahead = motion.coordinates[1], motion.coordinates[2]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
     while motion.counters[STEPS] < until:
@@ -114,14 +114,11 @@ def march_moreau(system, times, motion, records, log, problem, inverse, turned, 
         open_step(system, times, motion, records, k)
         for i in range(size):
             ahead[i] = q[i] + h * theta * v[i]
-        multiply(times.damping, v, drag)
-        multiply(times.stiffness, ahead, pull)
         for i in range(size):
-            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
-            load[i] = h * (system.weight[i] + mean - drag[i] - pull[i])
-        multiply(inverse, load, free)
+            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i] + system.weight[i]
+            load[i] = h * (mean - product(times.damping, i, v) - product(times.stiffness, i, ahead))
         for i in range(size):
-            free[i] += v[i]
+            free[i] = v[i] + product(inverse, i, load)
         if not _impulses(system, motion, problem, turned, h, theta):
             return UNDECIDED
         for i in range(size):
@@ -226,11 +223,26 @@ def _two_phases(system, motion, problem, turned, tolerance):
                 return False
             _push(system, motion, problem, count, turned)
             for a in range(count):
-                r = problem.row[a]
                 problem.now[a] = box.acceleration[a]
-                if r < u and phase == 0:
-                    box.low[a] = restitution_at(system, r, approach[r]) * box.force[a]
+            if phase == 0:
+                _expand(system, problem, count, approach)
+                _push(system, motion, problem, count, turned)
     return True
+
+
+@inlined
+def _expand(system, problem, count, approach):
+    """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
+    box = problem.box
+    for a in range(count):
+        r = problem.row[a]
+        box.force[a] = restitution_at(system, r, approach[r]) * box.force[a] if r < len(system.rest) else 0.0
+    for a in range(count):
+        for c in range(count):
+            problem.now[a] += box.matrix[a, c] * box.force[c]
+        if problem.friction[a] > 0.0:
+            bound = problem.friction[a] * box.force[problem.normal[a]]
+            box.low[a], box.high[a] = -bound, bound
 
 
 @inlined

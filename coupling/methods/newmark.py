@@ -19,8 +19,8 @@ from vanedamp.coupling.methods.step_records import (
     close_step,
     copy,
     drag_sliders,
-    multiply,
     open_step,
+    product,
     record_start,
     set_gaps,
 )
@@ -50,7 +50,7 @@ def march_newmark(
     alpha, beta, gamma = parameters[0], parameters[1], parameters[2]
     size, h, steps = len(motion.q), times.step, len(times.phase) - 1
     scratch, q, v = motion.coordinates, motion.start[0], motion.start[1]
-    rhs, accel, ahead, fast, last, pull = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
+    rhs, accel, ahead, fast, last = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
         first_forces(system, times, motion, laws)
@@ -64,13 +64,11 @@ def march_newmark(
             fast[i] = v[i] + h * (1.0 - gamma) * a
         if alpha != 0.0:
             net_load(system, times, motion, q, v, k, last)
-        multiply(times.damping, fast, rhs)
-        multiply(times.stiffness, ahead, pull)
         for i in range(size):
-            new = times.load[k + 1, i] + system.weight[i] - rhs[i] - pull[i]
-            rhs[i] = (1.0 + alpha) * new - alpha * last[i]
-        multiply(inverse, rhs, accel)
+            bound = product(times.damping, i, fast) + product(times.stiffness, i, ahead)
+            rhs[i] = (1.0 + alpha) * (times.load[k + 1, i] + system.weight[i] - bound) - alpha * last[i]
         for i in range(size):
+            accel[i] = product(inverse, i, rhs)
             ahead[i] += beta * h * h * accel[i]
             fast[i] += gamma * h * accel[i]
         count = _list_rows(system, problem, laws, h, ahead, fast, beta, gamma)

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from vanedamp.coupling.methods.step_records import multiply, set_gaps
+from vanedamp.coupling.methods.step_records import product, set_gaps
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.unit_kinematics import has_friction, row_speed
@@ -82,28 +82,29 @@ def contact_spring(reduced: float, restitution: float, step: float, options: Pen
 
 
 @inlined
-def set_forces(system, laws, motion, gap, drawn, rate):
-    """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows.
+def set_forces(system, laws, motion, gap, drawn, rate, h):
+    """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows, and their impulses.
 
     drawn: (2u,) displacement of what draws the sliders of Jenkins elements, by their rows. They follow in motion.q
-    where their springs would go beyond their bounds.
+    where their springs would go beyond their bounds. h: time since the last forces, s.
     """
     u, sliders, q = len(system.rest), len(system.tangential), motion.q
     for j in range(sliders):
         row, at, spring = 2 * u - sliders + j, len(q) - sliders + j, system.tangential[j]
         most = system.limit[u - sliders + j] / spring
         stretched = min(max(drawn[row] - q[at], -most), most)
-        q[at], motion.force[row] = drawn[row] - stretched, -spring * stretched
+        q[at] = drawn[row] - stretched
+        _put(motion, row, -spring * stretched, h)
     for r in range(u - sliders):
         bound = system.limit[r]
         if r < system.contacts:
             push = 0.0
             if gap[r] < 0.0:
                 push = max(-laws.spring[r] * gap[r] - laws.dashpot[r] * rate[r], 0.0)
-            motion.force[r], bound = push, system.friction[r] * push
-        if bound == 0.0:
-            motion.force[u + r] = 0.0
-        else:
+            _put(motion, r, push, h)
+            bound = system.friction[r] * push
+        drag = 0.0
+        if bound > 0.0:
             slip, slow = rate[u + r], laws.slow[r]
             if slow > 0.0:
                 drag = bound * slip / slow
@@ -111,7 +112,15 @@ def set_forces(system, laws, motion, gap, drawn, rate):
                 drag = bound * np.sign(slip)
             else:
                 drag = laws.drag[r] * slip
-            motion.force[u + r] = -min(max(drag, -bound), bound)
+        if has_friction(system, r):
+            _put(motion, u + r, -min(max(drag, -bound), bound), h)
+
+
+@inlined
+def _put(motion, row, force, h):
+    """Set the force of a row, and its impulse by the mean of that and the last one."""
+    motion.impulse[row] = 0.5 * h * (motion.force[row] + force)
+    motion.force[row] = force
 
 
 @inlined
@@ -135,7 +144,7 @@ def set_rows(system, motion, q, v):
 def first_forces(system, times, motion, laws):
     """Set the forces as a run begins, and the accelerations (motion.half) that they and the loads give."""
     set_rows(system, motion, motion.q, motion.v)
-    set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before)
+    set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before, 0.0)
     net_load(system, times, motion, motion.q, motion.v, 0, motion.half)
     for i in range(len(motion.q)):
         motion.half[i] /= system.mass[i]
@@ -144,11 +153,9 @@ def first_forces(system, times, motion, laws):
 @inlined
 def net_load(system, times, motion, q, v, k, load):
     """Set the sum (N,) of the forces on the coordinates at step k of the period."""
-    drag, pull = motion.coordinates[5], motion.coordinates[6]
-    multiply(times.damping, v, drag)
-    multiply(times.stiffness, q, pull)
     for i in range(len(q)):
-        load[i] = times.load[k, i] + system.weight[i] - drag[i] - pull[i]
+        bound = product(times.damping, i, v) + product(times.stiffness, i, q)
+        load[i] = times.load[k, i] + system.weight[i] - bound
     for a in range(len(motion.live)):
         row = motion.live[a]
         if motion.force[row] != 0.0:

@@ -26,13 +26,12 @@ _BOUND = 1e30
 
 
 @inlined
-def multiply(matrix, vector, result):
-    """Set result (N,) = matrix vector; the matrix is an equations_of_motion.Sparse."""
-    for i in range(len(result)):
-        result[i] = 0.0
-    for a in range(len(matrix.value)):
-        for i in range(len(result)):
-            result[i] += matrix.value[a, i] * vector[matrix.column[a, i]]
+def product(matrix, i, vector):
+    """Return entry i of the product of a matrix (equations_of_motion.Sparse) and a vector."""
+    total = 0.0
+    for a in range(matrix.value.shape[1]):
+        total += matrix.value[i, a] * vector[matrix.column[i, a]]
+    return total
 
 
 @inlined
@@ -124,13 +123,10 @@ def _account(system, times, motion, records, k, deepest):
     size, deep, hit = abs(x1), 0.0, False
     work, viscous = 0.0, 0.0
     for i in range(len(q)):
-        moved, drag = motion.q[i] - q[i], 0.0
+        moved = motion.q[i] - q[i]
         size = max(size, abs(motion.v[i]))
-        for a in range(len(times.damping.value)):
-            j = times.damping.column[a, i]
-            drag += times.damping.value[a, i] * (v[j] + motion.v[j])
         work += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
-        viscous += 0.5 * drag * moved
+        viscous += 0.5 * (product(times.damping, i, v) + product(times.damping, i, motion.v)) * moved
     motion.ledger[EXCITATION] += work
     motion.ledger[VISCOUS] += viscous
     for r in range(system.contacts):
