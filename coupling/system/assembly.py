@@ -197,7 +197,9 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
     kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
-    found = {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()}
+    found: dict[str, Any] = {
+        name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()
+    }
     return found | {
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
         "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],

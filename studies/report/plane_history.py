@@ -58,11 +58,11 @@ def impacts_by_place(values: Mapping[str, Any], begin: float, scene: Scene | Non
     names = np.asarray(values["event_damper"]), np.asarray(values["event_side"]), np.asarray(values["event_corner"])
     places = set(zip(*(name[counted].tolist() for name in names), strict=True))
     found = []
-    for place in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
-        here = counted & np.logical_and.reduce([name == part for name, part in zip(names, place, strict=True)])
+    for body, side, corner in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
+        here = counted & (names[0] == body) & (names[1] == side) & (names[2] == corner)
         found.append(
             ImpactsAtPlace(
-                *place, _four(scene, place[0]), int(here.sum()),
+                body, side, corner, _four(scene, body), int(here.sum()),
                 normal_impulse=float(values["event_impulse"][here].sum()),
                 tangential_impulse=float(np.abs(values["event_tangential_impulse"][here]).sum()),
                 loss=float(values["event_loss"][here].sum()) if "event_loss" in values else np.nan,
