@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases.projection import Factorize, superlu
-from vanedamp.rom.bases.registry import Structure, basis_named
+from vanedamp.rom.basis import Structure, basis_named
 from vanedamp.rom.error_estimate import Rung, frf_errors
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel

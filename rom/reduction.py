@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases.projection import Factorize, superlu
-from vanedamp.rom.bases.registry import Structure, basis_named
+from vanedamp.rom.basis import Structure, basis_named
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 

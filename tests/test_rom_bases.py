@@ -11,7 +11,7 @@ from tests.tools.reduction_errors import full_receptance, receptance_errors, sta
 from tests.tools.small_structures import rod, truss
 from vanedamp.modal.matrices import Patch
 from vanedamp.rom.bases.projection import ReductionError
-from vanedamp.rom.bases.registry import BASES, ReductionBasis, register
+from vanedamp.rom.basis import BASES, ReductionBasis, register
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, patch_motions
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.reduction import reduce

@@ -9,7 +9,7 @@ from scipy import linalg
 from tests.tools.reduction_errors import full_receptance, receptance_errors
 from tests.tools.small_structures import rod, truss
 from vanedamp.rom import error_estimate as ladder
-from vanedamp.rom.bases.registry import BASES
+from vanedamp.rom.basis import BASES
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel

@@ -237,7 +237,7 @@ class Scene(OpenRecord, Displayed):
     def keys_added(cls) -> Mapping[str, Any]:
         """Return the tables of elements that are no fields."""
         names = [name for name in ELEMENTS.names() if name not in cls.__dataclass_fields__]
-        return {name: tuple[ELEMENTS.part(name), ...] for name in names}
+        return {name: tuple.__class_getitem__((ELEMENTS.part(name), ...)) for name in names}
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""

@@ -32,7 +32,7 @@ from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, 
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
-from vanedamp.rom.bases.registry import basis_named
+from vanedamp.rom.basis import basis_named
 from vanedamp.rom.basis_ladder import BLOCKS, basis_ladder, basis_model, rich_model
 from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors, worst_rungs
 from vanedamp.rom.interface import (

@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Real, Whole, read_toml, validate
-from vanedamp.rom.bases.registry import basis_named
+from vanedamp.rom.basis import basis_named
 
 #: what the stages write into the folder of the results, beside a file for every sweep
 CALIBRATION, TUNED_CASE, RIGID_SCENE, MODES, REDUCED = (

@@ -58,9 +58,8 @@ def impacts_by_place(values: Mapping[str, Any], begin: float, scene: Scene | Non
     names = np.asarray(values["event_damper"]), np.asarray(values["event_side"]), np.asarray(values["event_corner"])
     places = set(zip(*(name[counted].tolist() for name in names), strict=True))
     found = []
-    for place in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
-        body, side, corner = place
-        here = counted & np.logical_and.reduce([name == part for name, part in zip(names, place, strict=True)])
+    for body, side, corner in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
+        here = counted & (names[0] == body) & (names[1] == side) & (names[2] == corner)
         found.append(
             ImpactsAtPlace(
                 body, side, corner, _four(scene, body), int(here.sum()),

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from vanedamp.coupling.scene.contact_laws.law import Element
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.scene.scene import Scene
 
 
 class Unit(NamedTuple):
@@ -70,7 +67,7 @@ class SceneElement:
         """Return the interface labels that it names, by their keys."""
         return {}
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Any) -> None:
         """Raise ValueError, whose message begins with the key, for a scene that it does not fit."""
 
     def units(self, number: int, parts: Parts) -> Iterator[Unit]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -11,9 +11,6 @@ from pydantic.dataclasses import dataclass
 from vanedamp.coupling.scene.elements.element import Parts, SceneElement, Unit
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import STRICT, Fraction, InputError, NonNegative
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.scene.scene import Scene
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -40,7 +37,7 @@ class Stop(SceneElement):
         """Return `at` and `to`."""
         return {"at": self.at, "to": self.to}
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Any) -> None:
         """Raise ValueError for a restitution that the contact law has no element for, or a label that is missing."""
         try:
             scene.contact.element(self.restitution, 1.0)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.scene.shapes.shape import Polygon, Shape
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.scene.bodies import Damper
+from vanedamp.coupling.scene.shapes.shape import Measured, Polygon, Shape
 
 
 class Block(Polygon):
@@ -20,7 +17,7 @@ class Block(Polygon):
     half_extent = Shape.half_extent
     inertia = Shape.inertia
 
-    def corners(self, body: Damper) -> np.ndarray:
+    def corners(self, body: Measured) -> np.ndarray:
         """Return its four corners."""
         a, b = self.half_extent(body)
         return np.array([(-a, -b), (a, -b), (a, b), (-a, b)])

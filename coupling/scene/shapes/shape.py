@@ -7,12 +7,9 @@ rectangle around the body, whose sides lie along and across.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.scene.bodies import Damper
 
 #: names of the surfaces in their order, as keys of a cavity
 SIDES = ("left", "right", "floor", "ceiling")
@@ -23,6 +20,29 @@ OUTWARDS = ((-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0))
 Point = tuple[int, float, float]
 #: relative tolerance of points that are equally far out
 _SAME = 1e-12
+
+
+class Measured(Protocol):
+    """What a shape asks of its body (scene.bodies.Damper): mass, kg, and measures, m, None where they are not given."""
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+
+    @property
+    def length(self) -> float | None:
+        """Extent along the cavity."""
+
+    @property
+    def height(self) -> float | None:
+        """Extent across the cavity."""
+
+    @property
+    def radius(self) -> float | None:
+        """Radius."""
+
+    def measure(self, key: str) -> float | None:
+        """Return any measure by its key."""
 
 
 class Shape:
@@ -40,33 +60,33 @@ class Shape:
     #: its measures that a file must give, m: keys of Damper, or further ones, with a description that ends in "[m]"
     measures: ClassVar[Mapping[str, str]] = {}
 
-    def half_extent(self, body: Damper) -> tuple[float, float]:
+    def half_extent(self, body: Measured) -> tuple[float, float]:
         """Return half of its extent along and across, m."""
         return (body.length or 0.0) / 2, (body.height or 0.0) / 2
 
-    def inertia(self, body: Damper) -> float:
+    def inertia(self, body: Measured) -> float:
         """Return the moment of inertia of the homogeneous body about its centre, kg m^2."""
         a, b = self.half_extent(body)
         return body.mass * (a * a + b * b) / 3
 
-    def corners(self, body: Damper) -> np.ndarray:
+    def corners(self, body: Measured) -> np.ndarray:
         """Return the corners (k, 2) of its outline, counterclockwise from the lower left one; (0, 2): it is round."""
         return np.zeros((0, 2))
 
-    def points(self, body: Damper, surface: int) -> tuple[Point, ...]:
+    def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
         """Return the points that touch a surface of the cavity (SIDES)."""
         return ()
 
-    def face(self, body: Damper) -> tuple[float, float]:
+    def face(self, body: Measured) -> tuple[float, float]:
         """Return the lowest and the highest point above the floor, m, at which it touches a neighbour."""
         heights = [self.half_extent(body)[1] + b for _, _, b in self.points(body, RIGHT)]
         return min(heights), max(heights)
 
-    def rise(self, body: Damper, tilt: float) -> float:
+    def rise(self, body: Measured, tilt: float) -> float:
         """Return the height, m, by which a tilt, rad, lifts the centre of a body that stands on the floor."""
         return max((-tilt * a for _, a, _ in self.points(body, FLOOR)), default=0.0)
 
-    def shortening(self, body: Damper) -> float:
+    def shortening(self, body: Measured) -> float:
         """Return by how much a tilt shortens the body, m, to second order per square of the tilt; nan: never tilted."""
         return max(self.half_extent(body)) / 2
 
@@ -78,12 +98,12 @@ class Polygon(Shape):
     of the edge between them, and tilts are small.
     """
 
-    def half_extent(self, body: Damper) -> tuple[float, float]:
+    def half_extent(self, body: Measured) -> tuple[float, float]:
         """Return half of the extent of its corners."""
         a, b = np.abs(self.corners(body)).max(axis=0).tolist()
         return a, b
 
-    def inertia(self, body: Damper) -> float:
+    def inertia(self, body: Measured) -> float:
         """Return the sum over the triangles between the centre and the edges."""
         first = self.corners(body)
         second = np.roll(first, -1, axis=0)
@@ -91,7 +111,7 @@ class Polygon(Shape):
         squares = (first * first + first * second + second * second).sum(axis=1)
         return float(body.mass * (double @ squares) / (6 * double.sum()))
 
-    def points(self, body: Damper, surface: int) -> tuple[Point, ...]:
+    def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
         """Return the corners that are farthest out on that side."""
         corners = self.corners(body)
         out = corners @ OUTWARDS[surface]

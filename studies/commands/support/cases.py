@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.bases.registry import basis_named
+from vanedamp.rom.basis import basis_named
 from vanedamp.studies.case.tables import Case, check_interface
 
 
