@@ -37,7 +37,9 @@ def test_a_name_is_that_of_its_module_with_a_docstring(name):
     module, own = IMPORTS[name]
     assert own == name  # `import A as A`: an editor takes it for public
     value = getattr(vd, name)
-    assert value is (import_module(f"vanedamp.{name}") if module == "vanedamp" else getattr(import_module(module), name))
+    assert value is (
+        import_module(f"vanedamp.{name}") if module == "vanedamp" else getattr(import_module(module), name)
+    )
     assert getattr(value, "__module__", module) == module, "name the module that defines it"
     assert pydoc.getdoc(value)
 
