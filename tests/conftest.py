@@ -78,3 +78,11 @@ def browser():
         opened = engine.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield opened
         opened.close()
+
+
+@pytest.fixture
+def pictures(monkeypatch):
+    """The figures that a test saves, by what is in them (tests.tools.pictures)."""
+    from tests.tools.pictures import Pictures
+
+    return Pictures(monkeypatch)

@@ -56,7 +56,7 @@ class Variables:
     mass_ratio: Bounds = (0.005, 0.05)
     """mass of all bodies over that of the structure [-]"""
     gap_ratio: Bounds = (0.1, 1.5)
-    """free travel over X, the undamped maximum of the resonance [-]"""
+    """free travel over X, the maximum without bodies of the resonance [-]"""
     bodies: Counts = (1, 1)
     """number of bodies"""
 
