@@ -11,6 +11,7 @@ from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveform import Waveform, register
 from vanedamp.coupling.system.assembly import assemble
@@ -116,7 +117,7 @@ def test_a_slider_moves_as_in_the_scheme_of_sliders(excitation):
     stepped = scene.replace({"solver": {"method": "moreau", "steps_per_period": 400}})
     system = assemble(scene)
     records = new_records(system, 20, 4)
-    other = moreau.begin(stepped, system, records, True)
+    other = moreau.begin(stepped, system, records, True, start_of(scene, system))
     assert other.advance_to(20) is Status.OK
     assert records.impacts.sum() > 20
     for name in ("peak", "section", "samples", "harmonic", "momentum", "square", "parts", "impacts", "collided"):

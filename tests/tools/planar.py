@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vanedamp.coupling.methods import moreau
@@ -64,7 +66,7 @@ def witness(scene, periods, steps, samples=0, **options):
     system = assemble(scene)
     taken = moreau.Options(steps_per_period=steps, **options)
     records = new_records(system, periods, samples)
-    run = moreau._begin_planar(scene, system, taken, records, True, start_of(scene, system))
+    run = moreau.begin(replace(scene, solver=taken), system, records, True, start_of(scene, system))
     return run, run.advance_to(periods)
 
 
