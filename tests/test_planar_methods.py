@@ -18,6 +18,7 @@ from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.event_log import events_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.contact_laws.registry import register as register_law
 from vanedamp.coupling.scene.waveform import Waveform, register
@@ -39,7 +40,8 @@ def run_by(scene, samples=0, **solver):
     """The run of a scene's one period by a method, and its status."""
     method = METHODS[solver["method"]]
     system = assemble(scene)
-    run = method.begin(scene.replace({"solver": solver}), system, new_records(system, 1, samples), True)
+    records, start = new_records(system, 1, samples), start_of(scene, system)
+    run = method.begin(scene.replace({"solver": solver}), system, records, True, start)
     status = run.advance_to(1)
     return run, status
 

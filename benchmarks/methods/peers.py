@@ -121,9 +121,11 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    system = assemble(scene)
-    begun = motion_of(system, start_of(scene, system))
-    return Coupled(line_system(system), time_grid(scene, system, steps), begun)
+    whole = assemble(scene)
+    system, motion = line_system(whole), motion_of(whole, start_of(scene, whole))
+    travel, size = np.where(np.isinf(system.spring), system.free_travel, np.inf), len(system.mass)
+    times = time_grid(scene, whole, steps)._replace(travel=travel)
+    return Coupled(system, times, Motion(motion.q[:size], motion.v[:size]))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
@@ -135,8 +137,7 @@ def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> 
     slips = q[every] @ system.J[: system.bodies].T
     gaps = system.J @ q.T + system.rest[:, None]
     # no number is deeper than any
-    travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
-    deep = float(np.nan_to_num((-gaps / travel[:, None]).max(initial=0.0), nan=np.inf))
+    deep = float(np.nan_to_num((-gaps / times.travel[:, None]).max(initial=0.0), nan=np.inf))
     status = Status.OK if deep <= DEEPEST else Status.PENETRATION
     if not np.isfinite(q).all():
         status = Status.DIVERGED

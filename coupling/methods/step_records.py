@@ -15,9 +15,8 @@ from vanedamp.coupling.numerics.codes import (
     STEPS,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
 from vanedamp.coupling.planar.unit_kinematics import elongation, gap
-from vanedamp.coupling.response.recorder import note_step
+from vanedamp.coupling.response.recorder import note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR
 
@@ -69,7 +68,7 @@ def record_start(system, motion, records):
             springs += 0.5 * motion.spring[r] * min(motion.gap[0, r], 0.0) ** 2
     for j in range(len(system.tangential)):
         springs += 0.5 * system.tangential[j] * elongation(system, j, motion.q) ** 2
-    record_section(system, motion, records, springs)
+    record_section(system, records, motion.counters[PERIOD], motion.q, motion.v, springs, motion.ledger)
 
 
 @inlined

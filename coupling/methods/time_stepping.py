@@ -9,9 +9,9 @@ import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import Motion
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
-from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
+from vanedamp.coupling.response.recorder import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System

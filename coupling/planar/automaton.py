@@ -40,7 +40,6 @@ from vanedamp.coupling.planar.contact_decisions import decide, move_sliders
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, log_event, note_impact, stop_wedged
 from vanedamp.coupling.planar.quadrature import add_up, motion_at, response_at
-from vanedamp.coupling.planar.recorder import put_sample, record_section
 from vanedamp.coupling.planar.tolerances import ALMOST_CLOSED, AT_REST, BEYOND, BROKEN, GAP_ROUND_OFF, OVERLAP, SAMPLE
 from vanedamp.coupling.planar.unit_kinematics import (
     elongation,
@@ -54,6 +53,7 @@ from vanedamp.coupling.planar.unit_kinematics import (
     speed_scale,
     spring_force,
 )
+from vanedamp.coupling.response.recorder import put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
 #: events at one instant after which contacts are said to be undecided, for each unit
@@ -100,7 +100,7 @@ def advance(system, flows, st, guards, rec, log, work, periods, max_events):
             return PAUSED
         segments += 1
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
-            record_section(system, st, rec, _spring_energy(system, st))
+            record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
         tau, who = next_event(system, flows, st, guards)
         if who == ENDLESS:
             return ILL_CONDITIONED
@@ -181,7 +181,7 @@ def _end_period(system, flows, st, rec):
         st.last_impact[r] -= system.period
     _set_phases(system, st)
     _project(system, flows, st, st.counters[FLOW])
-    record_section(system, st, rec, _spring_energy(system, st))
+    record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
 
 
 @inlined

@@ -11,11 +11,11 @@ from vanedamp.coupling.exact.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import BOUNDED, DONE, REDUCED, UNDECIDED
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
-from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.planar.segments import event_of, segment_of
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
+from vanedamp.coupling.response.recorder import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState

@@ -15,10 +15,9 @@ from vanedamp.coupling.numerics.codes import FLOW, LEAVING, OPEN, PERIOD, SLIP_L
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 from vanedamp.coupling.planar.exponential_integrals import integrate, response_after, set_up
-from vanedamp.coupling.planar.recorder import note_tilts
 from vanedamp.coupling.planar.tolerances import PEAK
 from vanedamp.coupling.planar.unit_kinematics import is_compliant, row_speed
-from vanedamp.coupling.response.recorder import note_response
+from vanedamp.coupling.response.recorder import note_response, note_tilts
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.system.system import FLOOR
 

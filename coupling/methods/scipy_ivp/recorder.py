@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, OPEN, ROUND_OFF, Motion, Unforced
-from vanedamp.coupling.numerics.codes import COUNTERS, PERIOD
-from vanedamp.coupling.planar.recorder import record_section
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH
-from vanedamp.coupling.response.recorder import cubic_extremum, note_step
+from vanedamp.coupling.response.recorder import cubic_extremum, note_step, record_section
 from vanedamp.coupling.response.records import (
     CONTACT,
     ENERGIES,
@@ -26,15 +22,6 @@ from vanedamp.coupling.system.system import FLOOR
 
 #: the integrals; behind them, of each contact that yields, its impulses, along and across, and its loss
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(10)
-
-
-class _Moment(NamedTuple):
-    """What record_section reads of a state."""
-
-    counters: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    ledger: np.ndarray
 
 
 class Recorder:
@@ -251,8 +238,7 @@ class Recorder:
     def section(self, y: np.ndarray) -> None:
         """Record section and ledger at the start of a period."""
         free, system, q, integrals = self.free, self.system, y[self.free.q], y[self.free.size :]
-        counters, ledger = np.zeros(COUNTERS, np.int64), np.zeros(len(ENERGIES))
-        counters[PERIOD] = self.period
+        ledger = np.zeros(len(ENERGIES))
         ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
         ledger[CONTACT], ledger[IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
         # what Jenkins elements have taken is in their springs, or lost
@@ -260,7 +246,7 @@ class Recorder:
         ledger[FRICTION] -= springs
         pressed = self.soft[~np.isin(self.state[self.soft], (OPEN, LOOSE))]
         springs += 0.5 * float(system.spring[pressed] @ y[free.d][pressed] ** 2)
-        record_section(system, _Moment(counters, q.copy(), y[free.v].copy(), ledger), self.records, springs)
+        record_section(system, self.records, self.period, q.copy(), y[free.v].copy(), springs, ledger)
         extended = free.extended(0.0, y[: free.size])
         self.last = 0.0, self.watched @ extended, self.speeds @ extended
         self.before = integrals.copy()
