@@ -73,29 +73,40 @@ class Registry(NamedTuple):
     """Where parts of one kind come from that are loaded one by one, as they are wanted.
 
     kind        in words, for messages
-    modules     ours, by the name of the part
+    parts       by name: ours, as "package.module" or "package.module:object", and those that are registered
     group       of entry points, whose names are those of the parts
     attributes  that a part must have
     """
 
     kind: str
-    modules: Mapping[str, str]
+    parts: dict[str, Any]
     group: str
     attributes: tuple[str, ...]
 
     def names(self) -> list[str]:
         """Return the names of all parts, ours first; loads none. Raises ExtensionError for a name that is taken."""
-        return [*self.modules, *_added(self.kind, self.group, self.modules)]
+        return [*self.parts, *_added(self.kind, self.group, self.parts)]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a part with that name; looks for entry points only where none of ours has it."""
+        return name in self.parts or name in self.names()
 
     def part(self, name: str) -> Any:
         """Return a part. Raises KeyError for an unknown name, ExtensionError for a part that cannot be used."""
-        if name in self.modules:
-            return import_module(self.modules[name])
-        return _load(_added(self.kind, self.group, self.modules)[name], self.kind, self.attributes)
+        if name not in self.parts:
+            return _load(_added(self.kind, self.group, self.parts)[name], self.kind, self.attributes)
+        part = self.parts[name]
+        return pkgutil.resolve_name(part) if isinstance(part, str) else part
 
     def all(self) -> dict[str, Any]:
         """Return all parts by name. Raises ExtensionError for one that cannot be used."""
         return {name: self.part(name) for name in self.names()}
+
+    def register(self, name: str, part: Any) -> None:
+        """Add a part, as an entry point does. Raises ExtensionError for one that cannot be used, or a taken name."""
+        _check(part, f"{part!r}", self.kind, self.attributes)
+        if self.parts.setdefault(name, part) is not part:
+            raise ExtensionError(f"{part!r}: there is a {self.kind} named {name} already; name it otherwise")
 
 
 def _added(kind: str, group: str, own: Mapping[str, Any]) -> dict[str, EntryPoint]:
@@ -122,10 +133,14 @@ def _load(entry: EntryPoint, kind: str, attributes: tuple[str, ...]) -> Any:
         part = entry.load()
     except Exception as error:  # whatever another package's module does
         raise ExtensionError(f"{_source(entry)}: cannot be loaded ({type(error).__name__}: {error})") from error
+    _check(part, _source(entry), kind, attributes)
+    return part
+
+
+def _check(part: Any, source: str, kind: str, attributes: tuple[str, ...]) -> None:
     missing = [attribute for attribute in attributes if not hasattr(part, attribute)]
     if missing:
-        raise ExtensionError(f"{_source(entry)}: is no {kind}: lacks {', '.join(missing)}")
-    return part
+        raise ExtensionError(f"{source}: is no {kind}: lacks {', '.join(missing)}")
 
 
 def _source(entry: EntryPoint) -> str:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.bases.projection import Factorize, superlu
+from vanedamp.rom.basis import Structure, basis_named
 from vanedamp.rom.error_estimate import Rung, frf_errors
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.reduction import BASES, Factorize, reduce, superlu
-from vanedamp.rom.truncation import massless, truncated
 
 #: blocks of quasi-static coordinates that the estimate of a model needs in addition to its own
 BLOCKS = 2
@@ -32,28 +32,23 @@ def rich_model(
 ) -> ReducedModel:
     """Reduce a structure so far that every model of a basis up to `modes`, and its estimate, can be cut from it.
 
-    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce.
+    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce
+    but `quasi_static`.
     """
-    if basis in ("craig-bampton", "massless"):
-        return reduce(matrices, interface, "craig-bampton", modes, factorize, quasi_static=1 + BLOCKS, **others)
-    reduction_basis = "rubin" if basis in BASES else basis
-    return reduce(matrices, interface, reduction_basis, modes, factorize, quasi_static=BLOCKS, **others)
+    return basis_named(basis).rich(Structure(matrices, interface, factorize, **others), modes, 1 + BLOCKS)
 
 
 def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:
     """Return the model of a basis with `modes` modes, cut from `rich_model`."""
-    if basis in ("macneal", "massless"):
-        return massless(rich, modes)
-    return truncated(rich, modes, 0 if basis == "truncated" else 1)
+    return basis_named(basis).cut(rich, modes)
 
 
 def basis_ladder(
     rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
 ) -> list[Rung]:
     """Return the error of every model of a basis that `rich_model` holds, against the latter."""
-    least = 0 if basis == "craig-bampton" else max(rich.rigid_modes, int(basis != "rubin"))
     rungs = []
-    for modes in range(least, rich.modes + 1):
+    for modes in range(basis_named(basis).least_modes(rich), rich.modes + 1):
         model = basis_model(rich, basis, modes)
         errors = frf_errors(model, rich, frequencies_hz, labels)
         rungs.append(Rung(modes, model.size, float(errors.max()), 0.0))

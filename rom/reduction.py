@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, get_args
 
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases import craig_bampton, free_interface
-from vanedamp.rom.bases.projection import Factorize, ReductionError, superlu
+from vanedamp.rom.bases.projection import Factorize, superlu
+from vanedamp.rom.basis import Structure, basis_named
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.truncation import massless
-
-Basis = Literal["craig-bampton", "rubin", "macneal", "truncated", "massless"]
-BASES: tuple[str, ...] = get_args(Basis)
 
 
 def reduce(
@@ -43,23 +38,7 @@ def reduce(
     Raises ReductionError for an unknown basis, and as bases.craig_bampton.reduce and bases.free_interface.reduce_free
     do.
     """
-    check_basis(basis)
+    found = basis_named(basis)
     if not isinstance(interface, Interface):
         interface = Interface.on_patches(matrices, interface)
-    if basis in ("craig-bampton", "massless"):
-        fixed = max(2 * modes, modes + 10) if basis == "massless" else modes
-        most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
-        model = craig_bampton.reduce(
-            matrices, interface, min(fixed, most) if basis == "massless" else modes, factorize, keep_recovery,
-            quasi_static, characteristic,
-        )  # fmt: skip
-        return massless(model, modes) if basis == "massless" else model
-    blocks = {"rubin": 1 + quasi_static, "macneal": 1, "truncated": 0}[basis]
-    model = free_interface.reduce_free(matrices, interface, modes, factorize, keep_recovery, blocks)
-    return massless(model, modes) if basis == "macneal" else model
-
-
-def check_basis(basis: str) -> None:
-    """Raise ReductionError for an unknown basis."""
-    if basis not in BASES:
-        raise ReductionError(f"basis: expected one of {', '.join(BASES)}, not {basis!r}")
+    return found.reduce(Structure(matrices, interface, factorize, keep_recovery, characteristic), modes, quasi_static)

@@ -157,11 +157,7 @@ class Leapfrog:
 
     def section(self):
         """Record the start of a period."""
-        n, slips = self.system.modes, self.system.J[: self.system.bodies]
-        record_section(
-            self.system, self.records, self.period, self.q[:n], self.v[:n], slips @ self.q, slips @ self.v,
-            float(self.pressing(self.q)), self.ledger,
-        )  # fmt: skip
+        record_section(self.whole, self.records, self.period, self.q, self.v, float(self.pressing(self.q)), self.ledger)
 
     def outcome(self):
         """What the run leaves behind."""
@@ -347,4 +343,5 @@ def test_scenes_load_no_kernels_but_those_of_their_method():
         "print(*(name for name in sys.modules if name.startswith('vanedamp.coupling.methods.')))"
     )
     shown = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, check=True)
-    assert set(shown.stdout.decode().split()) == {"vanedamp.coupling.methods." + name for name in ("exact", "registry")}
+    names = {"vanedamp.coupling.methods." + name for name in ("engines", "exact", "registry")}
+    assert set(shown.stdout.decode().split()) == names

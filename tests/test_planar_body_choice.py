@@ -24,7 +24,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
 
-#: gravity in the unit of the undamped peak's acceleration
+#: gravity in the unit of the peak without bodies's acceleration
 PEAK = AMPLITUDE * (2 * np.pi * NATURAL) ** 2
 
 

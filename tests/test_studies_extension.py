@@ -1,4 +1,4 @@
-"""Another package adds a command, a section, a benchmark and a contact law by entry points; nothing of ours changes."""
+"""Another package adds a command, a section, a benchmark and parts of scenes by entry points; no file changes."""
 
 import base64
 import csv
@@ -117,6 +117,46 @@ class Slower(ContactLaw):
     def element(self, restitution, mass, flexibility=None):
         return Element(self.half)
 '''
+#: a spring that holds the structure back, and a square that stands on a corner
+ELEMENT = '''
+"""A leash between the structure and the ground."""
+
+from typing import ClassVar
+
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.contact_laws.law import Element
+from vanedamp.coupling.scene.elements.element import SceneElement, Unit
+from vanedamp.files.toml_input import STRICT, Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Leash(SceneElement):
+    on_structure: ClassVar[bool] = True
+    yields: ClassVar[bool] = True
+    length: Positive
+    """displacement at which it pulls [m]"""
+    stiffness: Positive
+    """stiffness [N/m]"""
+
+    def units(self, number, parts):
+        normal = -parts.motion(None, "leash")
+        yield Unit(normal, 0 * normal, self.length, element=Element(1.0, self.stiffness), play=self.length, body=number)
+'''
+SHAPE = '''
+"""A square on a corner."""
+
+import numpy as np
+
+from vanedamp.coupling.scene.shapes.shape import Polygon
+
+
+class Diamond(Polygon):
+    measures = {"edge": "edge [m]"}
+
+    def corners(self, body):
+        return body.measure("edge") / 2**0.5 * np.array([(0, -1), (1, 0), (0, 1), (-1, 0)])
+'''
 ENTRY_POINTS = """
 [vanedamp.commands]
 body-masses = acme.command
@@ -129,6 +169,12 @@ sum = acme.benchmark
 
 [vanedamp.contact_laws]
 slower = acme.law:Slower
+
+[vanedamp.elements]
+leash = acme.element:Leash
+
+[vanedamp.shapes]
+diamond = acme.shape:Diamond
 """
 SCENE = """
 [structure]
@@ -168,7 +214,7 @@ def site(tmp_path_factory):
     """A folder of packages with the one that adds all four."""
     folder = tmp_path_factory.mktemp("site")
     parts = {"command__py": COMMAND, "section__py": SECTION, "section__html": TEMPLATE, "benchmark__py": BENCHMARK}
-    parts["law__py"] = LAW
+    parts |= {"law__py": LAW, "element__py": ELEMENT, "shape__py": SHAPE}
     install(folder, "acme", ENTRY_POINTS, **parts)
     return folder
 
@@ -256,6 +302,26 @@ def test_law_is_one_of_contact(vanedamp, tmp_path):
     assert (finished.returncode, finished.stderr) == (
         BAD_INPUT, "vanedamp: scene.toml: contact.half: missing; it is required here\n"
     )  # fmt: skip
+
+
+def test_element_and_shape_are_tables_and_values_of_a_scene(vanedamp, tmp_path):
+    scene = (tmp_path / "scene.toml").read_text().split("[[damper]]")[0] + "play = 1e-4\n"
+    scene += (
+        "[[damper]]\ncavity = 'c1'\nmass = 0.05\nshape = 'diamond'\nedge = 0.01\n[time]\nperiods = 3\ntransient = 0\n"
+    )
+    scene += "[[leash]]\nlength = 1e-5\nstiffness = 1e5\n"
+    (tmp_path / "scene.toml").write_text(scene)
+    data = json.loads(succeeds(vanedamp("run", "scene.toml", "--json", "-", "--events")))
+    sides = {(event["side"], event["damper"]) for event in data["event_list"] if event["kind"] == "impact"}
+    assert data["status"] == "ok" and ("leash", 0) in sides and sides & {("left", 0), ("right", 0), ("floor", 0)}
+    assert data["energy_residual"] < 1e-9
+    (tmp_path / "scene.toml").write_text(scene.replace("length = 1e-5", "lengt = 1e-5"))
+    assert vanedamp("check", "scene.toml").stderr == (
+        "vanedamp: scene.toml: leash[0].lengt: unknown key; did you mean 'length'?\n"
+    )
+    table = json.loads(succeeds(vanedamp("schema", "scene")))["$defs"]
+    assert table["Leash"]["properties"]["length"]["x-unit"] == "m"
+    assert "diamond" in table["Damper"]["properties"]["shape"]["enum"]
 
 
 @pytest.mark.parametrize(

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.system import System
 
 
 def engine_run(
     system: System, start: RestartState, records: Records, events: bool, max_events: int, linearisation: float = 0.01
-) -> Run:  # fmt: skip
+) -> EventRun:  # fmt: skip
     """Return a run of the engine that takes all of a system: of sliders, or for bodies in the plane.
 
     linearisation: largest shortening of a tilted body over its play for a status ok. Kernels are loaded when they are
@@ -29,7 +29,7 @@ def engine_run(
     return EngineRun(system, line_system(system), start, records, events, max_events)
 
 
-def reuse_subsystems(run: Any, earlier: Run | None) -> None:
+def reuse_subsystems(run: Any, earlier: Any) -> None:
     """Let a run take over the subsystems that an earlier one has met, where both are of one engine that can."""
     if type(earlier) is type(run) and hasattr(run, "reuse"):
         run.reuse(earlier)

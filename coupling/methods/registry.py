@@ -17,6 +17,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import most_periods
 from vanedamp.files.toml_input import InputError
 
@@ -52,20 +53,20 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
-    _check_bodies(scene, method)
     system = assemble(scene)
+    _check_bodies(scene, system)
     records = new_records(
         system, most_periods(scene), samples_per_period, isinstance(scene.structure, Rom), deflects(scene, system)
     )
     return method.begin(scene, system, records, events, start_of(scene, system, start))
 
 
-def _check_bodies(scene: Scene, method: Method) -> None:
+def _check_bodies(scene: Scene, system: System) -> None:
     """Raise InputError for bodies in the plane, or a contact law of theirs, that a method does not take."""
     for number, damper in enumerate(scene.damper):
         if damper.shape == "auto":
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
-    if not scene.planar:
+    if not system.in_plane:
         return
     laws = {name: getattr(part, "PLANAR_LAWS", None) for name, part in METHODS.all().items()}
     law, name = scene.contact, scene.solver.method
@@ -76,12 +77,14 @@ def _check_bodies(scene: Scene, method: Method) -> None:
             f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
             f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(able)}'
         )
-    asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
+    asked = {"yields": scene.yields, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
     if not wanted <= set(taken):
         able = [other for other, known in laws.items() if known is not None and wanted <= set(known)]
+        tables = [table for table, _, element in scene.elements if element.yields and law.rigid]
+        source = f"{tables[0]}: springs" if tables else f'contact.law: "{law.law}"'
         raise InputError(
-            f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
+            f"{source} of bodies with extent, stiffness or dashpot, and of impacts in two phases, is "
             f"for solver.method {' or '.join(able)}, not {name}"
         )
 

@@ -85,7 +85,7 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
         if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
-            if scene.stop:
+            if any(element.on_structure for _, _, element in scene.elements):
                 raise InputError(
                     'structure.modes: "auto" weighs collisions of bodies, not those of stops; give a number of modes'
                 )
@@ -137,14 +137,14 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
     if warning is not None:
         estimate |= warning
         sentences.append(warning["sentence"])
-    if any(damper.shape != "slider" for damper in scene.damper):
+    if any(damper.form.planar for damper in scene.damper):
         sentences.append("bodies with extent count as sliders")
     return Selected(scene, estimate | {"sentence": "; ".join(sentences)})
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """Return the warnings of a scene without open choices: of its method, impact laws on several modes, and loads."""
-    rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
+    rubs = any(damper.form.planar and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
     return (
         *([] if warning is None else [f"solver.method: {warning}"]),
@@ -168,7 +168,8 @@ def _of_rotation(scene: Scene) -> tuple[str, ...]:
 
 
 def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
-    if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
+    hits = scene.damper or any(not element.yields for _, _, element in scene.elements)
+    if not (isinstance(scene.structure, Rom) and scene.contact.rigid and hits):
         return ()
     size = reduced_model(scene.structure, scene.speed).size
     if size == 1:

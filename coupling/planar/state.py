@@ -25,7 +25,7 @@ class PlanarState(NamedTuple):
     time: np.ndarray  # (1,) within the period, s
     q: np.ndarray  # (N,)
     v: np.ndarray  # (N,)
-    # (u,) int: OPEN; LEAVING, a contact that yields and has ended before its gap is open; TOUCHING, closed but others
+    # (u,) int: OPEN; LEAVING, a compliant contact that has ended before its gap is open; TOUCHING, closed but others
     # carry its force, or nothing presses it; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
     # contact without friction counts. A friction element sticks or slips
     state: np.ndarray
@@ -35,7 +35,7 @@ class PlanarState(NamedTuple):
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
-    pushed: np.ndarray  # (2u,) impulse of a contact that yields since it closed, N s
+    pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
     lost: np.ndarray  # (u,) what it has taken since then, J
     ledger: np.ndarray  # (6,) J
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
@@ -93,7 +93,7 @@ class Scratch(NamedTuple):
     first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
     doubt: np.ndarray  # (u,) int: doubtful now
     sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
-    resting: np.ndarray  # (u,) int: whether a contact that yields touches without speed, and what it does then
+    resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and what it does then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, System
+from vanedamp.coupling.system.system import System
 
 #: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
 #: scales, and motions of floors relative to that of the response, that are none
@@ -24,13 +24,13 @@ def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray
     slip, speed = section[:, 3 : 3 + b], section[:, 3 + b :]
     still = np.abs(speed).max(axis=0) <= _STILL * (scale[1] + scale[3 + b :])
     same = still & (np.ptp(slip, axis=0) <= _STILL * scale[3 : 3 + b])
-    shapes = np.array([damper.shape for damper in scene.damper], object)
-    held = (system.holds > 0.0) & (shapes != "disc")
+    rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
+    held = (system.holds > 0.0) & ~rolls
     moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.response).max(initial=0.0)
     held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
     c = system.contacts
     gaps = (system.rest[:c] + slip @ system.of_bodies.J[:c].T).max(axis=0)
-    along = np.isin(system.surface[:c], (LEFT, RIGHT, BODY)) & np.isinf(system.spring[:c])
+    along = ~system.across & ~system.without_body[:c] & np.isinf(system.spring[:c])
     contacts = np.flatnonzero(along & (gaps <= _CLOSED * system.play[:c]))
     for _ in range(b):  # from the walls inwards
         for unit in contacts:

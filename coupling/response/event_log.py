@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.response.records import DETACHES, IMPACT, KINDS
 from vanedamp.coupling.response.response import Event
-from vanedamp.coupling.system.system import BODY, FLOOR, RIGHT, SURFACES, System
+from vanedamp.coupling.system.system import FLOOR, SURFACES, System
 
 #: columns of the log of bodies in the plane, and of that of sliders
 WIDTH, LINE_WIDTH = 8, 6
@@ -22,24 +22,29 @@ WIDTH, LINE_WIDTH = 8, 6
 class Rows(NamedTuple):
     """What the rows (r,) of a log are.
 
-    places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). other: (r,) number of
-    the body to the right, -1: none. sign: (r,) of the gap's speed in that of the body relative to what it meets.
+    places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). without_body: (r,)
+    whether it is the latter. other: (r,) number of the body to the right, -1: none. sign: (r,) of the gap's speed in
+    that of the body relative to what it meets.
     spring: (r,) stiffness of a contact, N/m; inf: rigid.
     """
 
     places: Sequence[tuple[int, str, int]]
+    without_body: np.ndarray
     other: np.ndarray
     sign: np.ndarray
     spring: np.ndarray
 
 
 def rows_of_units(system: System) -> Rows:
-    """Return the rows of a log by units, whose speeds are those of gaps."""
+    """Return the rows of a log by units: speeds are those of gaps in the plane, and of bodies along their line."""
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    return Rows(places, system.other, np.ones(len(places)), system.spring)
+    on_body, sign = np.flatnonzero(~system.without_body[: system.contacts]), np.ones(len(places))
+    if not system.in_plane:  # gaps that close as their body moves on to the right
+        sign[on_body] = np.sign(system.J[on_body, system.along[system.body[on_body]]])
+    return Rows(places, system.without_body, system.other, sign, system.spring)
 
 
 def rows_of_line(system: System) -> Rows:
@@ -48,10 +53,11 @@ def rows_of_line(system: System) -> Rows:
     floors = [(body, SURFACES[FLOOR], -1) for body in range(system.bodies)]
     dampers = [(number, "casing", -1) for number in range(system.dampers)]
     first = len(floors) + len(dampers)
-    sign = np.where(np.isin(system.surface[:c], (RIGHT, BODY)), -1.0, 1.0)
     return Rows(
-        [*floors, *dampers, *units.places[:c]], np.r_[np.full(first, -1), system.other[:c]],
-        np.r_[np.ones(first), sign], np.r_[np.full(first, np.inf), system.spring[:c]],
+        [*floors, *dampers, *units.places[:c]],
+        np.r_[np.zeros(len(floors), bool), np.ones(len(dampers), bool), system.without_body[:c]],
+        np.r_[np.full(first, -1), system.other[:c]],
+        np.r_[np.ones(first), units.sign[:c]], np.r_[np.full(first, np.inf), system.spring[:c]],
     )  # fmt: skip
 
 
@@ -72,8 +78,8 @@ def named_bodies(rows: Rows, chunks: Sequence[np.ndarray], bodies: int) -> np.nd
     """Return whether an event after time zero names each body (bodies,): states at rest are logged as a run begins."""
     named = np.zeros(bodies + 1, bool)
     for row in {int(row) for chunk in chunks for row in chunk[chunk[:, 0] > 0.0, 2]}:
-        body, side, _ = rows.places[row]
-        if side not in ("stop", "casing"):
+        body, _, _ = rows.places[row]
+        if not rows.without_body[row]:
             named[[body, rows.other[row]]] = True  # the last place is that of no body
     return named[:bodies]
 

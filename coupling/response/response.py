@@ -58,10 +58,10 @@ class Event:
     """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
     neighbour, and "detach" from it"""
     damper: int
-    """number of the body, from 0; of a stop or a friction damper its own number"""
+    """number of the body, from 0; of a stop, a friction damper or another element of the structure its own number"""
     side: str
     """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
-    "stop" for a stop"""
+    "stop" for a stop; of other elements the name of their table"""
     relative_velocity_before: float
     """relative speed before [m/s]"""
     relative_velocity_after: float
@@ -69,7 +69,7 @@ class Event:
     impulse: float
     """impulse along the normal [N s]"""
     corner: int = -1
-    """corner of a block, 0 to 3 against the clock from the lower left one; -1: none"""
+    """corner of a body, from 0 (of a block 0 to 3) against the clock from the lower left one; -1: none"""
     tangential_impulse: float = 0.0
     """impulse of friction [N s]"""
     loss: float = 0.0

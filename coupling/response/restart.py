@@ -12,8 +12,7 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
-from vanedamp.coupling.system.shapes import shape_of
-from vanedamp.coupling.system.system import STOP, SURFACES, System
+from vanedamp.coupling.system.system import SURFACES, System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -37,7 +36,7 @@ def fitted(system: System, state: RestartState) -> RestartState:
     """Return a state as another system can begin with it, in its own modes: see `start_of`."""
     _check_size(system, state)
     p = state.displacement / system.scale
-    stops = np.flatnonzero((system.surface == STOP) & np.isinf(system.spring))
+    stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
     moved = before_stops(system.J[stops, : system.modes], system.rest[stops], p)
     if np.any(moved != p):
         state = replace(state, displacement=frozen(system.scale * moved))
@@ -87,7 +86,7 @@ def state_at(system: System, motion: Motion) -> RestartState:
 def _of_scene(scene: Scene, system: System) -> RestartState:
     """Return the state that a scene asks for."""
     n, bodies = system.modes, scene.damper
-    rise = [shape_of(damper).rise(damper.half_extent[0], damper.tilt) for damper in bodies]  # on its lower corner
+    rise = [damper.form.rise(damper, damper.tilt) for damper in bodies]  # on its lower corner
     parts = (
         # an initial state is that of a rigid structure: others have none
         np.full(n, scene.initial.displacement), np.full(n, scene.initial.velocity),
@@ -107,14 +106,10 @@ def _checked(system: System, state: RestartState) -> RestartState:
     u = system.contacts
     gaps = system.rest[:u] + system.J[:u] @ motion_of(system, state).q
     for unit in np.flatnonzero(gaps < -_ROUND_OFF * system.play[:u]):
-        if system.surface[unit] == STOP:
-            raise InputError(
-                f"initial.displacement: the structure would begin {-gaps[unit]:.3g} m beyond stop[{system.body[unit]}]"
-            )
-        raise InputError(
-            f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
-            f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
-        )
+        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
+        if system.without_body[unit]:
+            raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
+        raise InputError(f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt")
     return state
 
 

@@ -18,9 +18,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import EVENTS, PERIOD
+from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.system import System
 
 #: below this size, exp(z) - 1 - z and its quotient by z are computed by their series
@@ -141,8 +141,8 @@ class Begun(NamedTuple):
 START = Begun()
 
 
-class EventRun(Protocol):
-    """A run of an engine that knows its motion between events. It must keep its events."""
+class EventRun(Run, Protocol):
+    """A run of an engine, which knows its motion between events. It must keep its events, and ends at `max_events`."""
 
     records: Records
     max_events: int
@@ -151,17 +151,11 @@ class EventRun(Protocol):
     def counters(self) -> np.ndarray:
         """Counters (numerics.codes)."""
 
-    def advance_to(self, periods: int) -> Status:
-        """Advance to the end of `periods`, or of `max_events`."""
-
     def segment(self) -> Segment:
         """Return the motion from the present state on, which has been set up; its end is open."""
 
     def event(self) -> tuple[float, Event]:
         """Return the last event and the time since the last `segment`, s; before the first, the start of the run."""
-
-    def final(self) -> RestartState | None:
-        """Return the state at the end of the periods done; None for a run that ended within one."""
 
     def reuse(self, earlier: Any) -> None:
         """Take over what an earlier run of the same engine has computed, as far as its system is the same."""

@@ -1,12 +1,19 @@
-"""Cavities, the bodies in them, friction dampers, and stops."""
+"""Cavities, the bodies in them, and friction dampers."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler
 from pydantic.dataclasses import dataclass
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
+from vanedamp.coupling.scene.shapes.registry import SHAPES
+from vanedamp.coupling.scene.shapes.shape import Shape
+from vanedamp.files.open_record import OpenRecord
+from vanedamp.files.reference import unit_in
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real
 
 
@@ -53,8 +60,24 @@ class Cavity:
         return self.left or given, self.right or given, self.floor or given
 
 
+def _known_shape(name: str) -> str:
+    if name not in SHAPES:
+        *names, last = map(repr, SHAPES.names())
+        expected = {"expected": f"{', '.join(names)} or {last}"}
+        raise PydanticCustomError("literal_error", "Input should be {expected}", expected)
+    return name
+
+
+class _Shapes:
+    """JSON Schema of `shape`: the names that are known."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"enum": SHAPES.names(), "type": "string"}
+
+
 @dataclass(frozen=True, config=STRICT)
-class Damper:
+class Damper(OpenRecord):
     """A loose body in a cavity; bodies of one cavity stand in the file from left to right and hit each other."""
 
     cavity: str
@@ -71,7 +94,7 @@ class Damper:
     """velocity at time zero relative to the cavity, positive to the right [m/s]"""
     normal_load: NonNegative | None = None
     """load on the floor in place of the share of gravity and rotation, such as a centrifugal load [N]"""
-    shape: Literal["slider", "block", "disc", "auto"] = "slider"
+    shape: Annotated[str, AfterValidator(_known_shape), _Shapes] = "slider"
     """"slider" moves along the cavity only, "block" and "disc" in its plane; "auto" is a block, run as a slider where
     that changes the mean amplitude by `tolerance` at most"""
     length: Positive | None = None
@@ -101,14 +124,14 @@ class Damper:
     """of shape "auto": relative change of the mean amplitude that is allowed (default: 0.05) [-]"""
 
     def __post_init__(self) -> None:
-        block = ("length", "height")
-        wanted = {"slider": (), "block": block, "disc": ("radius",), "auto": block}[self.shape]
-        for key in ("length", "height", "radius"):
+        form = self.form
+        for key in ("length", "height", "radius", *(self.added or {}), *form.measures):
             if (self.shape, key) == ("slider", "height"):
                 continue  # says how high its centre is, if it is known
-            if (getattr(self, key) is not None) != (key in wanted):
-                raise ValueError(f'{key}: {"missing" if key in wanted else "not a measure"} of shape = "{self.shape}"')
-        if self.shape == "slider":
+            if (self.measure(key) is not None) != (key in form.measures):
+                reason = "missing" if key in form.measures else "not a measure"
+                raise ValueError(f'{key}: {reason} of shape = "{self.shape}"')
+        if not form.planar:
             for key in ("inertia", "lift", "tilt", "lift_velocity", "tilt_rate"):
                 if getattr(self, key):
                     raise ValueError(f'{key}: a slider only moves along its cavity; take shape = "block" or "disc"')
@@ -121,10 +144,31 @@ class Damper:
         if self.tolerance is not None and self.shape != "auto":
             raise ValueError(f'tolerance: of shape = "auto", which chooses; leave it out of shape = "{self.shape}"')
 
+    @classmethod
+    def keys_added(cls) -> Mapping[str, Any]:
+        """Return the measures of all shapes that are no fields."""
+        return {
+            key: Annotated[Positive, Field(description=text, json_schema_extra={"x-unit": unit_in(text) or "m"})] | None
+            for shape in SHAPES.all().values()
+            for key, text in shape.measures.items()
+            if key not in cls.__dataclass_fields__
+        }
+
+    @property
+    def form(self) -> Shape:
+        """Its shape."""
+        form: Shape = SHAPES.part(self.shape)()
+        return form
+
+    def measure(self, key: str) -> float | None:
+        """Return a measure of its shape, m; None: not given."""
+        value: float | None = (self.added or {}).get(key, getattr(self, key, None))
+        return value
+
     @property
     def planar(self) -> bool:
         """Whether the body needs the plane: it has an extent, or a spring or a track of its own."""
-        return self.shape != "slider" or self.sprung
+        return self.form.planar or self.sprung
 
     @property
     def sprung(self) -> bool:
@@ -134,18 +178,12 @@ class Damper:
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the length and half the height, m; 0 where a slider has none."""
-        if self.shape == "disc":
-            assert self.radius is not None
-            return self.radius, self.radius
-        return (self.length or 0.0) / 2, (self.height or 0.0) / 2
+        return self.form.half_extent(self)
 
     @property
     def moment_of_inertia(self) -> float:
         """Moment of inertia about the centre, kg m^2."""
-        if self.inertia is not None:
-            return self.inertia
-        a, b = self.half_extent
-        return self.mass * (a * a / 2 if self.shape == "disc" else (a * a + b * b) / 3)
+        return self.form.inertia(self) if self.inertia is None else self.inertia
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -160,23 +198,3 @@ class FrictionDamper:
     """tangential stiffness in series with the contact, unloaded at time zero (default: rigid Coulomb) [N/m]"""
     at: str | None = None
     """interface label of a reduced model where it acts (default: excitation.at)"""
-
-
-@dataclass(frozen=True, config=STRICT)
-class Stop:
-    """Contact of the structure with the ground, or with itself."""
-
-    side: Literal["left", "right"]
-    """side of the structure: a stop on the right limits positive displacement"""
-    gap: NonNegative
-    """distance at rest [m]"""
-    restitution: Fraction = 1.0
-    """coefficient of restitution [-]"""
-    at: str | None = None
-    """interface label of a reduced model that touches the stop (default: excitation.at)"""
-    to: str | None = None
-    """interface label of a reduced model that the stop is at and moves with (default: the ground)"""
-
-    def __post_init__(self) -> None:
-        if self.to is not None and self.to == self.at:
-            raise ValueError(f"to: a point ('{self.to}') does not touch itself; name another, or leave it out")

@@ -14,9 +14,12 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
+from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.contact_laws.registry import Contact
+from vanedamp.coupling.scene.elements.element import SceneElement, entries_of
+from vanedamp.coupling.scene.elements.registry import ELEMENTS
+from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
@@ -26,6 +29,8 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.display import Displayed
+from vanedamp.files.key_tables import documented
+from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import (
     STRICT,
@@ -119,8 +124,9 @@ class Continuation:
     """dotted path of an axis (default: the excitation frequency, or else the speed of rotation, or the only axis)"""
 
 
+@documented
 @dataclass(frozen=True, config=STRICT, repr=False)
-class Scene(Displayed):
+class Scene(OpenRecord, Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
     structure: Structure
@@ -169,9 +175,10 @@ class Scene(Displayed):
                     f"damper[{index}].cavity: no cavity '{damper.cavity}'; {nearest(damper.cavity, names)}"
                 )
             self._check_load(index, damper)
-            self._check_contact(f"damper[{index}]", damper.restitution, damper.mass)
-        for index, stop in enumerate(self.stop):
-            self._check_contact(f"stop[{index}]", stop.restitution, 1.0)
+            try:
+                self.contact.element(damper.restitution, damper.mass)
+            except InputError as error:
+                raise ValueError(f"damper[{index}].{error}") from None
         for cavity in self.cavity:
             self._check_row(cavity)
         if self.planar:
@@ -180,6 +187,7 @@ class Scene(Displayed):
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_rotation()
         self._check_structure()
+        self._check_elements()
 
     @property
     def speed(self) -> float:
@@ -212,13 +220,30 @@ class Scene(Displayed):
     @property
     def planar(self) -> bool:
         """Whether it is for coupling.planar: a body with extent or a spring of its own, or impacts of two phases."""
-        return self.contact.two_phases or any(damper.planar for damper in self.damper)
+        rubs = any(element.rubs for _, _, element in self.elements)
+        return rubs or self.contact.two_phases or any(damper.planar for damper in self.damper)
+
+    @property
+    def elements(self) -> Iterator[tuple[str, int, SceneElement]]:
+        """Table, number in it, and record of every element: stops, and those that other code adds."""
+        return entries_of({"stop": self.stop} | (self.added or {}))
+
+    @property
+    def yields(self) -> bool:
+        """Whether contacts are springs: by the contact law, or those of elements."""
+        return not self.contact.rigid or any(element.yields for _, _, element in self.elements)
+
+    @classmethod
+    def keys_added(cls) -> Mapping[str, Any]:
+        """Return the tables of elements that are no fields."""
+        names = [name for name in ELEMENTS.names() if name not in cls.__dataclass_fields__]
+        return {name: tuple.__class_getitem__((ELEMENTS.part(name), ...)) for name in names}
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
         play = {cavity.name: cavity.play for cavity in self.cavity}
         for index, damper in enumerate(self.damper):
-            if damper.shape != "slider" and play[damper.cavity] is None:
+            if damper.form.planar and play[damper.cavity] is None:
                 number = [cavity.name for cavity in self.cavity].index(damper.cavity)
                 raise ValueError(
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
@@ -242,15 +267,9 @@ class Scene(Displayed):
                 "each is"
             )
 
-    def _check_contact(self, key: str, restitution: float, mass: float) -> None:
-        try:
-            self.contact.element(restitution, mass)
-        except InputError as error:
-            raise ValueError(f"{key}.{error}") from None
-
     def _check_load(self, index: int, damper: Damper) -> None:
-        extended = damper.shape != "slider"  # has a ceiling to fall on
-        if extended or damper.normal_load is not None or damper.friction == 0:
+        # a body with extent has a ceiling to fall on
+        if damper.form.planar or damper.normal_load is not None or damper.friction == 0:
             return
         if self.speed:
             number = [cavity.name for cavity in self.cavity].index(damper.cavity)
@@ -310,11 +329,6 @@ class Scene(Displayed):
             for index, cavity in enumerate(self.cavity):
                 if cavity.labels()[2] is None:
                     raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
-            for index, stop in enumerate(self.stop):
-                if stop.at is None:
-                    raise ValueError(
-                        f"stop[{index}].at: name the interface label of the reduced model that hits the stop"
-                    )
             if self.initial != Initial():
                 raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
         elif self.gravity.direction is not None:
@@ -337,13 +351,6 @@ class Scene(Displayed):
             raise ValueError(
                 'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
             )
-        for index, stop in enumerate(self.stop):
-            if not isinstance(self.structure, Rom) and (stop.at, stop.to) != (None, None):
-                key = "at" if stop.to is None else "to"
-                raise ValueError(
-                    f"stop[{index}].{key}: interface labels are a reduced model's; the one mode of this structure has "
-                    "no points: leave it out"
-                )
         if isinstance(self.structure, Prescribed):
             excitation = self.excitation
             if excitation.base_acceleration:
@@ -357,11 +364,26 @@ class Scene(Displayed):
                 )
             if excitation.signal is not None:
                 raise ValueError("excitation.waveform: a prescribed motion takes a sum of sines; give harmonics")
-            for name in ("friction_damper", "stop"):
-                if getattr(self, name):
-                    raise ValueError(f"{name}: a prescribed motion feels no force; remove it")
+            if self.friction_damper:
+                raise ValueError("friction_damper: a prescribed motion feels no force; remove it")
             if self.initial != Initial():
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
+
+    def _check_elements(self) -> None:
+        """Raise ValueError for an element that the structure, or something else in the scene, does not fit."""
+        for table, number, element in self.elements:
+            try:
+                element.check(self)
+            except ValueError as error:
+                raise ValueError(f"{table}[{number}].{error}") from None
+            given = [key for key, label in element.labels().items() if label is not None]
+            if given and not isinstance(self.structure, Rom):
+                raise ValueError(
+                    f"{table}[{number}].{given[-1]}: interface labels are a reduced model's; the one mode of this "
+                    "structure has no points: leave it out"
+                )
+            if element.on_structure and isinstance(self.structure, Prescribed):
+                raise ValueError(f"{table}: a prescribed motion feels no force; remove it")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

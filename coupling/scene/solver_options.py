@@ -105,7 +105,7 @@ def options_of(table: Mapping[str, Any]) -> SolverOptions:
     """
     given = {key: value for key, value in table.items() if value is not None}
     method = given.get("method", "exact")
-    if not isinstance(method, str) or not (method in METHODS.modules or method in METHODS.names()):
+    if not isinstance(method, str) or method not in METHODS:
         *names, last = map(repr, METHODS.names())
         expected = {"expected": f"{', '.join(names)} or {last}"}
         raise _error(InitErrorDetails(type="literal_error", loc=("method",), input=method, ctx=expected))

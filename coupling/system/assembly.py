@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.scene.elements.element import Unit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.scene.waveform import Waveform
@@ -18,16 +19,16 @@ from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_la
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
-from vanedamp.coupling.system.system import FLOOR, System
+from vanedamp.coupling.system.system import FLOOR, System, surface_code
 from vanedamp.coupling.system.units import (
     Body,
+    ElementParts,
     Law,
-    Unit,
     check_friction,
     coefficient,
     contacts_of,
+    element_units,
     friction_elements,
-    stops_of,
 )
 
 #: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
@@ -64,9 +65,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     excited = _excitation(scene, basis, bodies, loads, forced, table, size)
     placed = _places(scene, basis, bodies, surfaces, loads, size)
     mass, holds = _mass(bodies, size), _holding(scene, loads)
-    contacts = _contacts(scene, Law(scene.contact, basis, mass), bodies, surfaces, excited["load"][:, :n])
+    law = Law(scene.contact, basis, mass)
+    contacts, own = _contacts(scene, law, bodies, surfaces, placed, excited["load"][:, :n])
     rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
-    units = _columns([*contacts, *rubbing], size)
+    units = _columns([*contacts, *own, *rubbing], size)
     sliders = len(casing["tangential"])
     massive = slice(size - sliders)
     # rows of sliders are not to be small beside others
@@ -82,7 +84,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         viscous=basis.damping, response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
         period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
-        two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
+        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
     return _with_scales(system)
 
@@ -144,7 +146,7 @@ def _places(
         floor[body.number, :n] = ground.motion(0.0, body.b)[0] if body.b > 0.0 else ground.along
         rise[body.number, :n], turn[body.number, :n] = ground.motion(body.centre, 0.0)[1], ground.turn
     plays = [min(scene.cavity[index].gap, scene.cavity[index].play or np.inf) for index in owner]
-    shortening = [body.shape.shortening(body.a, body.b) for body in bodies]
+    shortening = [body.shape.shortening(body.damper) for body in bodies]
     return {
         "along": np.array([body.x for body in bodies], np.int64),
         "tilt": np.array([body.x + 2 if body.shape.extended else -1 for body in bodies], np.int64),
@@ -165,18 +167,25 @@ def _mass(bodies: list[Body], size: int) -> np.ndarray:
 
 
 def _contacts(
-    scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], force: np.ndarray
-) -> list[Unit]:
-    """Return the contacts: cavity by cavity, then the stops. force: (e, n) on the modes. Raises InputError."""
+    scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], placed: dict[str, Any],
+    force: np.ndarray,
+) -> tuple[list[Unit], list[Unit]]:  # fmt: skip
+    """Return the contacts, cavity by cavity, then those of elements; and friction elements of these.
+
+    placed: where the bodies are; force: (e, n) on the modes. Raises InputError.
+    """
     contacts: list[Unit] = []
     for index, cavity in enumerate(scene.cavity):
         inside = [body for body in bodies if body.damper.cavity == cavity.name]
         contacts += contacts_of(law, cavity, surfaces[index], inside)
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
-    contacts += stops_of(scene, law, np.abs(force).sum(axis=0) / squares, start)
+    reach = np.abs(force).sum(axis=0) / squares
+    parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"])
+    own = list(element_units(scene, parts))
+    contacts += [unit for unit in own if unit.normal.any()]
     check_friction(contacts, law.mass)
-    return contacts
+    return contacts, [unit for unit in own if not unit.normal.any()]
 
 
 def _columns(units: list[Unit], size: int) -> dict[str, Any]:
@@ -184,9 +193,13 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
-    kinds |= dict.fromkeys(("body", "other", "surface", "corner"), np.int64)
-    return {name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()} | {
-        "J": J, "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
+    kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
+    found: dict[str, Any] = {
+        name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()
+    }
+    return found | {
+        "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
+        "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
     }  # fmt: skip
 
 

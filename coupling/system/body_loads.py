@@ -68,7 +68,7 @@ def body_loads(scene: Scene, basis: ModalBasis) -> BodyLoads:
         else:
             gradient = 0.0
             label = surface_labels(scene, _cavity(scene, damper))[2]
-            normal = None if damper.shape == "slider" else basis.across(label)
+            normal = basis.across(label) if damper.form.planar else None
             along, across = scene.gravity.components(basis.directions[label], normal)
         curvature = 0.0 if damper.track_radius is None else across / damper.track_radius
         if curvature < 0.0 and -across > 1e-12 * abs(along):
@@ -163,7 +163,7 @@ class _Body(NamedTuple):
 
     def aside(self, field: _Field) -> float:
         """Return the acceleration across the plane of its motion, m/s^2; 0 of a slider, which has no such plane."""
-        if field.across is None or self.damper.shape == "slider":
+        if field.across is None or not self.damper.form.planar:
             return 0.0
         return abs(float(field.acceleration @ np.cross(field.along, field.across)))
 
@@ -216,7 +216,7 @@ def _of_track(body: _Body, radius: float) -> Iterator[tuple[str, str]]:
     """Yield kinds and sentences of what a track of that radius (m) neglects."""
     angle = body.reach / radius
     neglected = {"the frequency": angle**2 / 16}
-    if body.damper.shape == "block":
+    if body.damper.form.extended and not body.damper.form.rolls:
         neglected["the moving mass"] = body.damper.moment_of_inertia / (body.damper.mass * radius**2)
     if body.across > 0.0 and body.damper.friction > 0.0:
         neglected["the normal load"] = (abs(body.along) * angle + body.speed**2 / radius) / body.across
@@ -252,7 +252,7 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
             "axis and point, and reduce again"
         )
     label = str(cavity.labels()[2])
-    along, across = basis.directions[label], None if damper.shape == "slider" else basis.across(label)
+    along, across = basis.directions[label], basis.across(label) if damper.form.planar else None
     for name, known in (("direction", along.any()), ("position", label in basis.positions)):
         if not known:
             raise InputError(

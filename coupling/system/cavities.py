@@ -77,8 +77,8 @@ def check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
     keys: dict[str, str | None] = {"excitation.at": scene.excitation.at}
     for index, cavity in enumerate(scene.cavity):
         keys |= {f"cavity[{index}].{side}": getattr(cavity, side) for side in ("left", "right", "floor", "ceiling")}
-    for index, stop in enumerate(scene.stop):
-        keys |= {f"stop[{index}].at": stop.at, f"stop[{index}].to": stop.to}
+    for table, number, element in scene.elements:
+        keys |= {f"{table}[{number}].{key}": label for key, label in element.labels().items()}
     keys |= {place: load.at for place, load in scene.excitation.loads.items()}
     keys |= {f"friction_damper[{index}].at": damper.at for index, damper in enumerate(scene.friction_damper)}
     for key, label in keys.items():

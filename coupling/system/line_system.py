@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
-from vanedamp.coupling.system.system import BODY, FLOOR, LEFT, RIGHT, Part, System
+from vanedamp.coupling.system.system import FLOOR, Part, System
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -96,9 +96,7 @@ def line_system(system: System) -> LineSystem:
     friction[:b, :n], friction[:b, n:] = -system.floor[:, :n], np.eye(b)
     friction[b:] = system.casing[:, :size]
     J = np.vstack([friction, system.J[contacts, :size]]) + 0.0
-    surface, body = system.surface[contacts], system.body[contacts]
-    right = np.where(surface == LEFT, body, np.where(surface == BODY, system.other[contacts], -1))
-    left = np.where((surface == RIGHT) | (surface == BODY), body, -1)
+    left, right = (_body_of(sign * system.J[contacts, n:size]) for sign in (-1.0, 1.0))
     on_structure, on_bodies = J[:, :n], J[:, n:]
     on_floors = on_bodies @ -system.floor[:, :n]
     alike = (np.abs(on_structure - on_floors) <= _ALIKE * np.abs(on_floors)).all(axis=1)
@@ -132,6 +130,11 @@ def rows_of_units(system: System) -> np.ndarray:
     unit, first = np.arange(len(system.rest)), system.bodies + system.dampers
     elements = system.body + np.where(system.surface == FLOOR, 0, system.bodies)
     return np.where(unit < system.contacts, first + unit, elements)
+
+
+def _body_of(moved: np.ndarray) -> np.ndarray:
+    """Return which body (k,) widens each gap as it moves on, of rows (k, b) of the bodies; -1: none."""
+    return np.where((moved > 0.0).any(axis=1), (moved > 0.0).argmax(axis=1) if moved.shape[1] else -1, -1)
 
 
 def row_motion(

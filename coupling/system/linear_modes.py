@@ -58,7 +58,7 @@ def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
     """Return the modes of the loose system of a scene and, where that is another one, of the held one."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
-    rolls = np.array([damper.shape == "disc" for damper in scene.damper], bool)
+    rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
     made = [_matrices(scene, system, sprung, np.zeros(len(sprung), bool))]
     # what pulls a body along its cavity presses it on a wall
     held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
@@ -114,7 +114,7 @@ def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray
 
 def _turning(scene: Scene) -> np.ndarray:
     """Return the mass (b,) by which its rotation makes a disc heavier that rolls, kg."""
-    rolling = [damper.shape == "disc" and damper.friction > 0 for damper in scene.damper]
+    rolling = [damper.form.rolls and damper.friction > 0 for damper in scene.damper]
     return np.array([
         damper.moment_of_inertia / damper.half_extent[0] ** 2 if rolls else 0.0
         for damper, rolls in zip(scene.damper, rolling, strict=True)

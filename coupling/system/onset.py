@@ -81,7 +81,7 @@ def onsets(scene: Scene) -> list[Onset | None]:
     for index, damper in enumerate(scene.damper):
         row = [other for other, one in enumerate(scene.damper) if one.cavity == damper.cavity]
         alike = len(row) == 1 or (np.ptp(friction[row]) == 0.0 and not pull[row].any())
-        lies = damper.shape != "disc" and not (damper.lift or damper.tilt)
+        lies = not damper.form.rolls and not (damper.lift or damper.tilt)
         if damper.sprung or not alike or not lies or not reach[index] or not response:
             found.append(None)
             continue

@@ -11,14 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, SIDES
 from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import NORMAL, ROTATION
-
-#: names of the surfaces in their order, as keys of a cavity
-SIDES = ("left", "right", "floor", "ceiling")
-LEFT, RIGHT, FLOOR, CEILING = range(len(SIDES))
 
 
 class Surface(NamedTuple):
@@ -49,7 +46,7 @@ def heights(scene: Scene) -> np.ndarray:
     found = np.array([damper.half_extent[1] for damper in scene.damper])
     mass = np.array([damper.mass for damper in scene.damper])
     for cavity in scene.cavity:
-        row = np.array([item.shape == "slider" and item.cavity == cavity.name for item in scene.damper], bool)
+        row = np.array([not item.form.planar and item.cavity == cavity.name for item in scene.damper], bool)
         known = row & (found > 0.0)
         if known.any():
             found[row] = (mass[known] @ found[known]) / mass[known].sum()

@@ -20,11 +20,18 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record
-from vanedamp.coupling.system.surfaces import SIDES
+from vanedamp.coupling.scene.shapes.shape import SIDES
 
-#: names of what a unit touches
-SURFACES = (*SIDES, "body", "stop", "casing")
+#: names of what a unit meets, also those of the elements that have been assembled
+SURFACES = [*SIDES, "body", "stop", "casing"]
 LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
+
+
+def surface_code(name: str) -> int:
+    """Return the place of a name in SURFACES, where it is put if it is new."""
+    if name not in SURFACES:
+        SURFACES.append(name)
+    return SURFACES.index(name)
 
 
 class Part(NamedTuple):
@@ -78,9 +85,10 @@ class System(NamedTuple):
     dashpot: np.ndarray  # (u,) N s/m
     tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
     elongation: np.ndarray  # (j, N) of these springs
+    in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
-    body: np.ndarray  # (u,) number of the unit's body, the left one of two; of a stop or a friction damper its own
+    body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body that of its own table
     other: np.ndarray  # (u,) number of the body to its right; -1: none
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
     corner: np.ndarray  # (u,) int: 0 to 3, counterclockwise from the lower left one; -1: none
@@ -128,19 +136,21 @@ class System(NamedTuple):
         return len(self.casing)
 
     @property
+    def without_body(self) -> np.ndarray:
+        """Whether each unit (u,) moves no body: it is between places of the structure, or one and the ground."""
+        bodies = slice(self.modes, len(self.mass) - len(self.tangential))
+        moves: np.ndarray = self.J[:, bodies].any(axis=1).reshape(2, -1).any(axis=0)
+        return ~moves
+
+    @property
+    def across(self) -> np.ndarray:
+        """Whether each contact (contacts,) is one with a floor or a ceiling."""
+        return np.isin(self.surface[: self.contacts], (FLOOR, CEILING))
+
+    @property
     def travels(self) -> np.ndarray:
         """Free travel (contacts,) of each contact, m: along its cavity or across it."""
         return self.play[: self.contacts]
-
-    @property
-    def in_plane(self) -> bool:
-        """Whether it has more than bodies that slide: extent, springs or tracks of bodies, or impacts of two phases.
-
-        Then it has no rows in a line (system.line_system).
-        """
-        own = slice(self.modes, None)
-        bound = self.stiffness[own].any() or self.damping[own].any()
-        return bool(self.two_phases or bound or (self.tilt >= 0).any())
 
     @property
     def order(self) -> np.ndarray:

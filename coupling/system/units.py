@@ -2,7 +2,8 @@
 
 A contact is a normal row, its gap, and a slip row with a coefficient of friction; a friction element is a slip row with
 a constant limit: the floor under a body that only slides, or a friction damper between structure and casing. Contacts
-come first, cavity by cavity from left to right, then stops; of the friction elements, Jenkins elements come last.
+come first, cavity by cavity from left to right, then those of stops and other elements; of the friction elements,
+Jenkins elements come last.
 
 A body whose height is known lies in a cavity that turns by theta: a point at the height y above the floor meets walls
 that move by u - theta y where the floor moves by u.
@@ -17,35 +18,17 @@ import numpy as np
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
+from vanedamp.coupling.scene.elements.element import Unit
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, LEFT, RIGHT, SIDES, Shape, common_heights
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
-from vanedamp.coupling.system.shapes import Slider, common_heights, shape_of
 from vanedamp.coupling.system.surfaces import Surface, flexibility
-from vanedamp.coupling.system.system import BODY, CASING, CEILING, FLOOR, LEFT, RIGHT, STOP, SURFACES
 from vanedamp.files.toml_input import InputError
 
 #: smaller coefficients of friction are treated as zero: their forces are lost in the round-off of others
 _SMOOTH = 1e-9
 #: mobility (1/kg) of a point that the first mode does not move
 _LIGHT = 1e-30
-#: of units that do not rebound
-_RIGID = Element(0.0)
-
-
-class Unit(NamedTuple):
-    """A unit, with the meaning of the fields of system.system.System; normal, slip: rows (N,)."""
-
-    normal: np.ndarray
-    slip: np.ndarray
-    rest: float = 0.0
-    friction: float = 0.0
-    element: Element = _RIGID
-    play: float = np.inf
-    body: int = -1
-    surface: int = CASING
-    corner: int = -1
-    limit: float = 0.0
-    other: int = -1
 
 
 class Body(NamedTuple):
@@ -62,9 +45,9 @@ class Body(NamedTuple):
     centre: float
 
     @property
-    def shape(self) -> Slider:
+    def shape(self) -> Shape:
         """Its shape."""
-        return shape_of(self.damper)
+        return self.damper.form
 
     @property
     def coordinates(self) -> slice:
@@ -120,7 +103,7 @@ def _at_wall(
 ) -> Iterator[Unit]:
     """Yield the contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign, moving = 1.0 if surface == LEFT else -1.0, surfaces[surface]
-    for corner, a, b in body.shape.points(body.a, body.b, surface):
+    for corner, a, b in body.shape.points(body.damper, surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(wall, body.b + b)
         # a slider without a height meets the wall where the wall's motion is known
@@ -137,7 +120,7 @@ def _at_floor(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: Bod
     """Yield the contacts with floor or ceiling."""
     below, play, moving = surface == FLOOR, cavity.play or 0.0, surfaces[surface]
     sign = 1.0 if below else -1.0
-    for corner, a, b in body.shape.points(body.a, body.b, surface):
+    for corner, a, b in body.shape.points(body.damper, surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(body.centre + a, 0.0 if below else 2 * body.b + play)
         along[: len(moved_along)] -= moved_along
@@ -157,7 +140,7 @@ def _touching(
     (normal, slip), extended = rows, body.shape.extended
     return Unit(
         normal, slip * extended, rest, body.damper.friction * extended,
-        law.element(normal, body.damper.restitution, yields), play, body.number, surface, corner,
+        law.element(normal, body.damper.restitution, yields), play, body.number, SIDES[surface], corner,
     )  # fmt: skip
 
 
@@ -168,9 +151,10 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
             f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
             "no height at which they could touch: give it a shape"
         )
-    heights, size = common_heights(left.damper, right.damper), len(law.mass)
+    faces = [item.shape.face(item.damper) for item in (right, left)]
+    heights, size = common_heights(*faces), len(law.mass)
     if not heights:
-        spans = [" to ".join(f"{height:g}" for height in item.shape.face(item.a, item.b)) for item in (right, left)]
+        spans = [" to ".join(f"{height:g}" for height in face) for face in faces]
         raise InputError(
             f"damper[{right.number}].shape: touches a neighbour in cavity '{cavity.name}' from {spans[0]} m above the "
             f"floor, and damper[{left.number}] from {spans[1]} m: neighbours must have a height in common"
@@ -185,29 +169,54 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
         normal = right_along - left_along
         yield Unit(
             normal, (right_across - left_across) * (friction > 0.0), 0.0, friction,
-            law.element(normal, coefficient, yields), cavity.gap, left.number, BODY, other=right.number,
+            law.element(normal, coefficient, yields), cavity.gap, left.number, "body", other=right.number,
         )  # fmt: skip
 
 
-def stops_of(scene: Scene, law: Law, reach: np.ndarray, start: float) -> Iterator[Unit]:
-    """Yield the contact of each stop, whose gap closes as the structure moves to that side.
+class ElementParts(NamedTuple):
+    """What the elements of a scene make their rows of (scene.elements.element.Parts): N coordinates, n of them modes.
 
-    A gap may be zero: its scale is at least how far the place moves. reach: (n,) static displacements of the modes
-    under the excitation; start: of the structure by its initial motion, m.
+    law: of contacts; label: of the response; reach: (n,) static displacements of the modes under the excitation; start:
+    displacement of the structure by its initial motion, m; floor (b, N), along (b,): as in System.
     """
-    n, size = len(reach), len(law.mass)
-    for number, stop in enumerate(scene.stop):
-        ends = [(stop.at or "structure", "at", 1.0)] + ([(stop.to, "to", -1.0)] if stop.to else [])
-        towards = -1.0 if stop.side == "right" else 1.0
-        places = [(sign, interface_row(law.basis, label, f"stop[{number}].{key}")) for label, key, sign in ends]
-        normal = np.zeros(size)
-        normal[:n] = np.sum([towards * sign * row for sign, row in places], 0)
-        yields = sum(law.basis.flexibility({label: 1.0}) for label, _, _ in ends)
-        moved = float(np.abs(normal[:n]) @ reach + start + np.finfo(float).tiny)
-        yield Unit(
-            normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields),
-            play=max(stop.gap, moved), body=number, surface=STOP,
-        )  # fmt: skip
+
+    law: Law
+    label: str
+    reach: np.ndarray
+    start: float
+    floor: np.ndarray
+    along: np.ndarray
+
+    def motion(self, label: str | None, key: str) -> np.ndarray:
+        """Return the displacement of an interface label. Raises InputError for an unknown one."""
+        row, n = np.zeros(self.floor.shape[1]), len(self.reach)
+        row[:n] = interface_row(self.law.basis, label or self.label, key)
+        return row
+
+    def slip(self, body: int) -> np.ndarray:
+        """Return the displacement of a body along its cavity, relative to it."""
+        row = -self.floor[body]
+        row[self.along[body]] += 1.0
+        return row
+
+    def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
+        """Return the scene's contact of a row between places of the structure."""
+        yields = sum(self.law.basis.flexibility({label or self.label: 1.0}) for label in labels)
+        return self.law.element(normal, restitution, yields)
+
+    def travel(self, normal: np.ndarray) -> float:
+        """Return how far a row of the structure moves, m, at least the smallest number."""
+        return float(np.abs(normal[: len(self.reach)]) @ self.reach + self.start + np.finfo(float).tiny)
+
+
+def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
+    """Yield the units of the scene's elements. Raises TypeError for springs or friction that one does not declare."""
+    for table, number, element in scene.elements:
+        for unit in element.units(number, parts):
+            springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid
+            if (springs and not element.yields) or ((unit.friction or unit.limit) and not element.rubs):
+                raise TypeError(f"{table}: its units have springs or friction: declare `yields` or `rubs` of its class")
+            yield unit._replace(side=table)
 
 
 def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
@@ -217,7 +226,7 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
         coupled = abs((unit.normal * unit.slip / mass).sum())
         if unit.friction > 0.0 and unit.friction * coupled >= normal:
             raise InputError(
-                f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {SURFACES[unit.surface]}; "
+                f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {unit.side}; "
                 f"with its length, height and inertia a corner has a unique motion only below {normal / coupled:.4g}"
             )
 
@@ -234,7 +243,7 @@ def friction_elements(
         if holds[body.number] > 0.0 and not body.shape.extended:
             slip = -floor[body.number]
             slip[body.x] += 1.0
-            yield Unit(none, slip, body=body.number, surface=FLOOR, limit=float(holds[body.number]))
+            yield Unit(none, slip, body=body.number, side="floor", limit=float(holds[body.number]))
     rubbing = np.flatnonzero(grip > 0.0)
     jenkins = [number for number in rubbing if scene.friction_damper[number].stiffness is not None]
     for number in rubbing:

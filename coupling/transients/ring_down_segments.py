@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import CLOSED, OPEN
-from vanedamp.coupling.response import segment as segments
-from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.segment import EventRun, beyond_line
+from vanedamp.coupling.response.segment import Segment, beyond_line
 
 #: share of the largest speed below which a mode is not felt
 _FELT = 1e-9
@@ -24,14 +21,15 @@ class Energy(NamedTuple):
     kinetic: float
 
 
-class Segment:
+class Followed:
     """A segment of a free motion, with one modal coordinate followed.
 
-    rate: (m,) 1/s; wave: (m,) coefficients of exp(rate t) in the coordinate; powers: (3,) value, slope and second
-    derivative of the rest.
+    start, duration: s; rate: (m,) 1/s; wave: (m,) coefficients of exp(rate t) in the coordinate; powers: (3,) value,
+    slope and second derivative of the rest.
     """
 
-    def __init__(self, segment: segments.Segment, mode: int) -> None:
+    def __init__(self, segment: Segment, mode: int) -> None:
+        self.start, self.duration = segment.start, segment.duration
         self._segment, self.rate, self.wave = segment, segment.rate, segment.shape[mode] * segment.amplitude
         self.powers = np.array([segment.q[mode], segment.v[mode], segment.bend[mode]])
 
@@ -65,19 +63,3 @@ class Segment:
         gap = (system.rest[:u] + system.J[:u] @ q)[pressed]
         total += 0.5 * float(system.spring[:u][pressed] @ gap**2 + system.tangential @ (system.elongation @ q) ** 2)
         return Energy(total, kinetic + 0.5 * float(q[:n] @ system.stiffness[:n, :n] @ q[:n]), kinetic)
-
-
-class Walk:
-    """A walk along a free motion, with one modal coordinate followed, over `periods`."""
-
-    def __init__(self, run: EventRun, mode: int, periods: int) -> None:
-        self._walk, self._mode = segments.Walk(run, periods), mode
-
-    @property
-    def status(self) -> Status:
-        """How it has ended."""
-        return self._walk.status
-
-    def __iter__(self) -> Iterator[tuple[Segment, float, float]]:
-        """Yield segments with the time of their start and their duration, s."""
-        return ((Segment(each, self._mode), each.start, each.duration) for each in self._walk)

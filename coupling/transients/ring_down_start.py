@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.response.restart import before_stops, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.excitation import Excitation
@@ -16,7 +15,7 @@ from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
-from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, STOP, System
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.ramp_course import MOST_PERIODS
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -36,8 +35,6 @@ def table_of(scene: Scene) -> RingDownTable:
         raise InputError('ring_down: a prescribed motion does not ring down; take structure.model = "rigid" or "rom"')
     if scene.solver.method != "exact":
         raise InputError(f'ring_down: is for solver.method "exact", not "{scene.solver.method}"')
-    if reason := why_no_restart(scene):
-        raise InputError(f"ring_down: {reason}")
     if table.at is not None and not isinstance(scene.structure, Rom):
         raise InputError("ring_down.at: a structure of one mode has no interface labels; leave it out")
     if table.start != "steady":
@@ -93,8 +90,8 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     if table.displacement is not None:
         softness = row / system.of_structure.stiffness
         p = softness * (table.displacement / (row @ softness))
-        stops = (system.surface == STOP) & np.isinf(system.spring)
-        if np.any(before_stops(system.J[: len(stops)][stops, : system.modes], system.rest[stops], p) != p):
+        stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
+        if np.any(before_stops(system.J[stops, : system.modes], system.rest[stops], p) != p):
             raise InputError(
                 f"ring_down.displacement: {table.displacement:g} m would bring the structure beyond a stop; take less"
             )
@@ -116,7 +113,7 @@ def check_impacts(free: Scene, system: System, start: RestartState) -> None:
     A body that meets its walls at a speed u loses it as exp(-n log(1/e)) in n impacts at restitution e, each a free
     travel g apart: in a time T these are log(1 + (1 - e) u T / g) / log(1/e). Every period begins anew. InputError.
     """
-    rows = np.flatnonzero(np.isin(system.surface, (LEFT, RIGHT, BODY, STOP)))
+    rows = np.flatnonzero(~system.across)
     rigid, bounce = np.isinf(system.spring[rows]), np.clip(system.restitution[rows], 0.01, 1.0 - 1e-12)
     if free.solver.method != "exact" or not rigid.any():
         return

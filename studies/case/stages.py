@@ -32,6 +32,7 @@ from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, 
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
+from vanedamp.rom.basis import basis_named
 from vanedamp.rom.basis_ladder import BLOCKS, basis_ladder, basis_model, rich_model
 from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors, worst_rungs
 from vanedamp.rom.interface import (
@@ -44,7 +45,7 @@ from vanedamp.rom.interface import (
 )
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.rotation import SpeedBases, reduce_rotating
+from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
@@ -425,6 +426,7 @@ def reduction(
     InputError for a structure that rotates with another basis, or up to no speed.
     """
     rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
+    speeds = basis_named(basis).speeds
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
     most = min(_MOST, structure.matrices.free.size // 4)
@@ -434,7 +436,8 @@ def reduction(
             bases = None
             rich = [rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)]
         else:
-            bases = SpeedBases(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+            assert speeds is not None  # as _greatest_speed has checked
+            bases = speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
             rich = [bases.model_at(speed) for speed in (0.0, greatest)]
         grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
         rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
@@ -482,7 +485,7 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
     table, rotating = structure.case.rotation, structure.rotating
     if table is None or rotating is None:
         return 0.0
-    if basis != "craig-bampton":
+    if basis_named(basis).speeds is None:
         raise InputError(
             f"basis: {basis} is that of one speed; of a case with [rotation] take craig-bampton, from which a scene "
             "takes natural modes at its own speed by structure.natural = true"

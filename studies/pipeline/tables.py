@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Real, Whole, read_toml, validate
-from vanedamp.rom.reduction import check_basis
+from vanedamp.rom.basis import basis_named
 
 #: what the stages write into the folder of the results, beside a file for every sweep
 CALIBRATION, TUNED_CASE, RIGID_SCENE, MODES, REDUCED = (
@@ -47,7 +47,7 @@ class ReduceStage:
     """most stressed places of the first mode whose stresses are outputs of the model [-]"""
 
     def __post_init__(self) -> None:
-        check_basis(self.basis)
+        basis_named(self.basis)
 
 
 @dataclass(frozen=True, config=STRICT)

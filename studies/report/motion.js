@@ -23,8 +23,8 @@
     const ground = draw(frame, "path", {class: "walls"});
     const bodies = data.bodies.map(body => ({
       data: body,
-      shape: draw(frame, body.shape === "disc" ? "circle" : "polygon", {class: "body", fill: body.colour, stroke: body.colour}),
-      mark: body.shape === "disc" ? draw(frame, "line", {stroke: body.colour, "stroke-width": 1}) : null,
+      shape: draw(frame, body.round ? "circle" : "polygon", {class: "body", fill: body.colour, stroke: body.colour}),
+      mark: body.round ? draw(frame, "line", {stroke: body.colour, "stroke-width": 1}) : null,
       name: numbered ? draw(frame, "text", {fill: body.colour}) : null,
     }));
     bodies.forEach(body => body.name && (body.name.textContent = body.data.number));
@@ -66,7 +66,7 @@
       caption.textContent = data.name + ": " + data.bodies.map(body => {
         const parts = [`${body.along[k].toFixed(1)} µm along`];
         if (body.lift) parts.push(`${body.lift[k].toFixed(1)} µm up`);
-        if (body.tilt && body.shape === "block") parts.push(`${body.tilt[k].toFixed(2)} mrad`);
+        if (body.tilt && !body.round) parts.push(`${body.tilt[k].toFixed(2)} mrad`);
         return (numbered ? `body ${body.number} ` : "") + parts.join(", ");
       }).join("; ");
     };

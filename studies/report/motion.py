@@ -18,6 +18,9 @@ import numpy as np
 from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.shapes.block import Block
+from vanedamp.coupling.scene.shapes.shape import OUTWARDS, SIDES, Shape, common_heights
+from vanedamp.coupling.scene.shapes.slider import Slider
 from vanedamp.studies.report.charts import COLOURS
 
 #: periods that are drawn, the last of a run; frames of each at most
@@ -30,27 +33,33 @@ _ALONG, _ACROSS, _SWING = 0.35, 0.6, 0.25
 _WIDTH, _WALL = 100.0, 9.0
 #: of a contact in a frame
 OPEN, CLOSED, HIT = range(3)
-#: corners from the centre, against the clock from the lower left one, in half lengths and half heights
-_CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-#: sides of a disc, and of a slider
-_SIDES = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "floor": (0.0, -1.0), "ceiling": (0.0, 1.0)}
+#: directions out of a body, of contacts without a corner
+_SIDES = dict(zip(SIDES, OUTWARDS, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
     """A body as drawn in n frames, in units of the drawing, y upwards.
 
-    outline: (n, 4, 2) corners of a block or slider; (n, 2, 2) centre of a disc and a point of its rim
+    form: as which it ran
+    outline: (n, k, 2) corners, of a slider those of a rectangle; (n, 2, 2) centre and a point of the rim
+    face: heights at which it touches a neighbour
     along, lift (m), tilt (rad): (n,) in the cavity, as sampled; nan of a slider
     """
 
     number: int
-    shape: str
+    form: Shape
     half: tuple[float, float]
     outline: np.ndarray
+    face: tuple[float, float]
     along: np.ndarray
     lift: np.ndarray
     tilt: np.ndarray
+
+    @property
+    def round(self) -> bool:
+        """Whether it has no corners."""
+        return self.form.rolls
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +121,12 @@ class Motion:
     @property
     def has_sliders(self) -> bool:
         """Whether there are bodies whose drawn size means nothing."""
-        return any(body.shape == "slider" for cavity in self.cavities for body in cavity.bodies)
+        return any(not body.form.extended for cavity in self.cavities for body in cavity.bodies)
 
     @property
     def has_extent(self) -> bool:
         """Whether there are bodies with a size."""
-        return any(body.shape != "slider" for cavity in self.cavities for body in cavity.bodies)
+        return any(body.form.extended for cavity in self.cavities for body in cavity.bodies)
 
     @property
     def first(self) -> int:
@@ -163,11 +172,11 @@ def motion_of(
     stride = -(-sampled // _MOST_FRAMES)
     frames = slice(max(len(time) // sampled - _PERIODS, 0) * sampled, None, stride)
     plane = plane.cut(frames)
-    time, kinds, half = time[frames], _kinds(scene, plane), _half_extents(scene)
+    time, forms, half = time[frames], _forms(scene, plane), _half_extents(scene)
     factor = _factor(scene, half)
     widths = [sum(2 * half[k][0] for k in _inside(scene, cavity)) for cavity in scene.cavity]
     swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
-    draw = _Drawing(scene, plane, along[frames], kinds, half, factor, swing, _WIDTH / max(widths))
+    draw = _Drawing(scene, plane, along[frames], forms, half, factor, swing, _WIDTH / max(widths))
     light = np.where(plane.contact_closed, CLOSED, OPEN)
     for moment, place in impacts:
         recent = (time >= moment) & (time < moment + _FLASH * period)
@@ -186,7 +195,7 @@ class _Drawing:
     scene: Scene
     plane: PlanarSamples
     along: np.ndarray
-    kinds: list[str]
+    forms: list[Shape]
     half: list[tuple[float, float]]
     factor: float
     swing: float
@@ -216,7 +225,7 @@ class _Drawing:
         contacts = [
             ContactMotion(place, self._points(number, bodies), light[:, number])
             for number, place in enumerate(self.plane.contacts)
-            if place[1] != "stop" and any(body.number == place[0] for body in bodies)
+            if place[1] in (*SIDES, "body") and any(body.number == place[0] for body in bodies)
         ]
         left, right = (
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
@@ -233,60 +242,71 @@ class _Drawing:
         a, b = self.half[k]
         centre = np.column_stack([place + self.factor * along, b + self.factor * lift])
         turn = self.factor * tilt[:, None]
-        if self.kinds[k] == "disc":
+        form, damper = self.forms[k], self.scene.damper[k]
+        if form.rolls:
             rim = a * np.hstack([-np.sin(turn), np.cos(turn)])
             outline = np.stack([centre, centre + rim], axis=1)
         else:
-            outline = centre[:, None, :] + _turned(turn, _CORNERS * (a, b))
+            outline = centre[:, None, :] + _turned(turn, self._corners(k))
+        face = form.face(damper) if form.extended else (b, b)
         return BodyMotion(
-            k, self.kinds[k], (self.scale * a, self.scale * b), self.scale * outline, self.along[:, k],
-            self.plane.body_lift[:, k], self.plane.body_tilt[:, k],
+            k, form, (self.scale * a, self.scale * b), self.scale * outline,
+            (self.scale * face[0], self.scale * face[1]), self.along[:, k], self.plane.body_lift[:, k],
+            self.plane.body_tilt[:, k],
         )  # fmt: skip
 
-    def _moved(self, k: int, side: str, play: float) -> list[np.ndarray]:
-        """Return by how much a surface has moved towards its outside, relative to the floor: (n,) at each contact.
+    def _corners(self, k: int) -> np.ndarray:
+        """Return the corners (c, 2) of a body from its centre; of one without any, of the rectangle around it."""
+        corners = self.forms[k].corners(self.scene.damper[k])
+        a, b = self.half[k]
+        return corners if len(corners) else np.array([(-a, -b), (a, -b), (a, b), (-a, b)])
 
-        That is its gap less what the body's pose leaves of the play; corners in the order of their height, or from
-        left to right.
+    def _moved(self, k: int, side: str, play: float, *ends: float) -> np.ndarray:
+        """Return by how much a surface has moved towards its outside, relative to the floor: (n, 2) at two ends.
+
+        That is its gap less what the body's pose leaves of the play, at the contacts, and on the line through two.
+        ends: from the body's centre, across it for walls, along it for a ceiling.
         """
         along, lift, tilt = self._pose(k)
         across, sign = side == "ceiling", -1.0 if side == "left" else 1.0
-        moved = {}
+        moved: dict[float, np.ndarray] = {}
         for number, (body, at, corner) in enumerate(self.plane.contacts):
             if (body, at) == (k, side):
-                a, b = _CORNERS[corner] * self.half[k] if corner >= 0 else (0.0, 0.0)
+                a, b = self._corners(k)[corner].tolist() if corner >= 0 else (0.0, 0.0)
                 place = lift + a * tilt if across else along - b * tilt
                 moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
-        return [moved[point] for point in sorted(moved)]
+        if not moved:
+            return np.zeros((len(along), 2))
+        low, high = min(moved), max(moved)
+        slope = (moved[high] - moved[low]) / max(high - low, 1e-300)
+        return np.column_stack([moved[low] + slope * (end - low) for end in ends])
 
     def _ceiling(self, play: float, k: int) -> np.ndarray:
         """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
-        moved = self._moved(k, "ceiling", play) or [np.zeros(len(self.along))]
-        return np.column_stack([moved[0], moved[-1]])
+        a = self.half[k][0]
+        return self._moved(k, "ceiling", play, -a, a)
 
     def _wall(self, cavity: Cavity, inside: list[int], side: str, height: float) -> np.ndarray:
         """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
         k = inside[0 if side == "left" else -1]
         sign = -1.0 if side == "left" else 1.0
-        moved = self._moved(k, side, cavity.gap / 2)
-        slope = (moved[-1] - moved[0]) / max(2 * self.half[k][1], 1e-300)
-        return sign * np.column_stack([moved[0], moved[0] + slope * height])
+        b = self.half[k][1]
+        return sign * self._moved(k, side, cavity.gap / 2, -b, height - b)
 
     def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
         """Return the point of a body at which a contact acts (n, 2)."""
         k, side, corner = self.plane.contacts[number]
         place = next(i for i, body in enumerate(bodies) if body.number == k)
         body = bodies[place]
-        centre = body.outline[:, 0] if body.shape == "disc" else body.outline.mean(axis=1)
+        centre = body.outline[:, 0] if body.round else body.outline.mean(axis=1)
         if corner >= 0:
             return body.outline[:, corner]
         if side != "body":
             return centre + np.array(_SIDES[side]) * body.half
-        other = bodies[place + 1]
-        heights = _heights(body, other)
+        heights = common_heights(body.face, bodies[place + 1].face) or (body.half[1],)
         upper = sum(each == self.plane.contacts[number] for each in self.plane.contacts[:number])
         point = np.array([body.half[0], heights[upper] - body.half[1]])
-        turn = self.factor * np.nan_to_num(body.tilt)[:, None] * (body.shape == "block")
+        turn = self.factor * np.nan_to_num(body.tilt)[:, None] * (not body.round)
         return centre + _turned(turn, point[None])[:, 0]
 
 
@@ -295,23 +315,15 @@ def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points + np.stack([-turn * points[:, 1], turn * points[:, 0]], axis=2)
 
 
-def _heights(body: BodyMotion, other: BodyMotion) -> list[float]:
-    """Return the heights at which neighbours touch, as system.shapes has them: discs at one, faces at two."""
-    discs = [each.half[1] for each in (body, other) if each.shape == "disc"]
-    if discs or body.shape == "slider":
-        return discs[:1] or [body.half[1]]
-    return [0.0, 2 * min(body.half[1], other.half[1])]
-
-
 def _inside(scene: Scene, cavity: Cavity) -> list[int]:
     """Return the numbers of the bodies in a cavity."""
     return [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
 
 
-def _kinds(scene: Scene, plane: PlanarSamples) -> list[str]:
-    """Return as what each body ran: a body without tilt is a slider, whatever the scene's shape allows."""
+def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
+    """Return as what each body ran: one without tilt as a slider, an open shape that tilts as a block."""
     return [
-        "slider" if np.isnan(tilt).any() else "block" if damper.radius is None else "disc"
+        Slider() if np.isnan(tilt).any() else damper.form if damper.form.extended else Block()
         for damper, tilt in zip(scene.damper, plane.body_tilt.T, strict=True)
     ]
 
@@ -355,7 +367,7 @@ def _drawn(cavity: CavityMotion) -> dict[str, Any]:
         "ceiling": [{"ends": part.ends, "heights": _short(part.heights, 2)} for part in cavity.ceiling],
         "bodies": [
             {
-                "number": body.number + 1, "shape": body.shape, "colour": COLOURS[body.number % len(COLOURS)],
+                "number": body.number + 1, "round": body.round, "colour": COLOURS[body.number % len(COLOURS)],
                 "radius": round(body.half[0], 2), "outline": _short((body.outline * down).reshape(len(shift), -1), 2),
                 "along": _short(1e6 * body.along, 3), "lift": _short(1e6 * body.lift, 3),
                 "tilt": _short(1e3 * body.tilt, 4),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.scene.scene import Scene
 
 #: sides of events as a chart names them, and the corners of each in the order against the clock
 _SURFACES = {
@@ -25,13 +26,14 @@ _SURFACES = {
 class ImpactsAtPlace:
     """The impacts of one contact in the evaluated periods.
 
-    body counts from 0 (of a stop: its number); impulses (N s) are sums, of tangential ones of their sizes; loss: J, nan
-    for files that have none.
+    body counts from 0 (of a stop: its number); four: whether its corners are those of a block; impulses (N s) are sums,
+    of tangential ones of their sizes; loss: J, nan for files that have none.
     """
 
     body: int
     side: str
     corner: int
+    four: bool
     impacts: int
     normal_impulse: float
     tangential_impulse: float
@@ -40,38 +42,51 @@ class ImpactsAtPlace:
     @property
     def place(self) -> str:
         """Surface and corner in words, on two lines."""
-        surface, corners = _SURFACES[self.side]
-        return f"{surface}<br>{corners[self.corner]}".removesuffix("<br>")
+        surface, corners = _SURFACES.get(self.side, (self.side, {}))
+        words = "" if self.corner < 0 else f"corner {self.corner}"
+        return f"{surface}<br>{corners.get(self.corner, words) if self.four else words}".removesuffix("<br>")
 
 
-def impacts_by_place(values: Mapping[str, Any], begin: float) -> list[ImpactsAtPlace]:
-    """Return the impacts from a time (s) on, by contact; empty for a file without events of bodies in the plane."""
+def impacts_by_place(values: Mapping[str, Any], begin: float, scene: Scene | None = None) -> list[ImpactsAtPlace]:
+    """Return the impacts from a time (s) on, by contact; empty for a file without events of bodies in the plane.
+
+    scene: of the run; without one bodies count as blocks.
+    """
     if "event_corner" not in values:
         return []
     counted = (np.asarray(values["event_kind"]) == "impact") & (values["event_time"] >= begin)
+    names = np.asarray(values["event_damper"]), np.asarray(values["event_side"]), np.asarray(values["event_corner"])
+    places = set(zip(*(name[counted].tolist() for name in names), strict=True))
     found = []
-    for body in np.unique(values["event_damper"][counted]):
-        for side, (_, corners) in _SURFACES.items():
-            for corner in corners:
-                here = counted & (values["event_damper"] == body) & (values["event_side"] == side)
-                here &= values["event_corner"] == corner
-                if here.any():
-                    found.append(
-                        ImpactsAtPlace(
-                            int(body), side, corner, int(here.sum()),
-                            normal_impulse=float(values["event_impulse"][here].sum()),
-                            tangential_impulse=float(np.abs(values["event_tangential_impulse"][here]).sum()),
-                            loss=float(values["event_loss"][here].sum()) if "event_loss" in values else np.nan,
-                        )
-                    )  # fmt: skip
+    for body, side, corner in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
+        here = counted & (names[0] == body) & (names[1] == side) & (names[2] == corner)
+        found.append(
+            ImpactsAtPlace(
+                body, side, corner, _four(scene, body), int(here.sum()),
+                normal_impulse=float(values["event_impulse"][here].sum()),
+                tangential_impulse=float(np.abs(values["event_tangential_impulse"][here]).sum()),
+                loss=float(values["event_loss"][here].sum()) if "event_loss" in values else np.nan,
+            )
+        )  # fmt: skip
     return found
+
+
+def _four(scene: Scene | None, body: int) -> bool:
+    """Return whether the corners of a body have the names of a block's."""
+    if scene is None or body >= len(scene.damper):
+        return True
+    return len(scene.damper[body].form.corners(scene.damper[body])) <= 4
+
+
+def _walk(side: str, corner: int) -> tuple[int, int]:
+    """Return the place of a contact in a walk against the clock through the cavity."""
+    corners = list(_SURFACES.get(side, ("", {}))[1])
+    return [*_SURFACES, side].index(side), corners.index(corner) if corner in corners else len(corners) + corner
 
 
 def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
     """Return the places of impacts, in the order of a walk against the clock through the cavity."""
-    walk = [(side, corner) for side, (_, corners) in _SURFACES.items() for corner in corners]
-    ordered = sorted(impacts, key=lambda each: walk.index((each.side, each.corner)))
-    return list(dict.fromkeys(each.place for each in ordered))
+    return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
 
 
 def hits_in_plane(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:

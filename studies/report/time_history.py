@@ -13,6 +13,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.response.response import PlanarSamples, Response
+from vanedamp.coupling.scene.elements.registry import meets_body
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
@@ -57,9 +58,11 @@ class History:
         values, attributes = load(path, "response")
         provenance = json.loads(attributes.pop("provenance", "{}"))
         kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
-        struck = np.where(values.get("event_side", "") == "stop", -1, values.get("event_damper", -1))
+        on_body = [meets_body(str(side)) for side in np.atleast_1d(values.get("event_side", ""))]
+        struck = np.where(on_body, values.get("event_damper", -1), -1)
         energy = json.loads(attributes.pop("energy", "{}"))
         begin = attributes.get("transient", 0) / attributes["frequency"]
+        scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
         return cls(
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
@@ -68,10 +71,10 @@ class History:
             struck=frozen(np.atleast_1d(struck)[kinds] if len(kinds) else [], int),
             plane=samples_in_plane(values),
             hits=hits_in_plane(values),
-            by_place=impacts_by_place(values, begin),
+            by_place=impacts_by_place(values, begin, scene),
             measures=attributes | {"energy": energy},
             provenance=provenance,
-            scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
+            scene=scene,
         )
 
     @classmethod
@@ -83,7 +86,7 @@ class History:
             displacement=frozen(response.displacement),
             bodies=frozen(response.body_displacement),
             impacts=frozen([event.time for event in impacts]),
-            struck=frozen([-1 if event.side == "stop" else event.damper for event in impacts], int),
+            struck=frozen([event.damper if meets_body(event.side) else -1 for event in impacts], int),
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
             by_place=[],
@@ -182,7 +185,7 @@ def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
         return []
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
     if history.scene is not None:
-        discs = np.array([damper.radius is not None for damper in history.scene.damper])
+        discs = np.array([damper.form.rolls for damper in history.scene.damper])
         if np.isfinite(tilt[:, ~discs]).any():  # beside the turns of discs, tilts would not show
             tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]

@@ -62,9 +62,8 @@ def run_planar(scene, periods, events=10**7, samples=0):
 def witness(scene, periods, steps, samples=0, **options):
     """The run of a scene by time stepping, with its status."""
     system = assemble(scene)
-    taken = moreau.Options(steps_per_period=steps, **options)
-    records = new_records(system, periods, samples)
-    run = moreau._begin_planar(scene, system, taken, records, True, start_of(scene, system))
+    stepped = scene.replace({"solver": {"method": "moreau", "steps_per_period": steps} | options})
+    run = moreau.begin(stepped, system, new_records(system, periods, samples), True, start_of(scene, system))
     return run, run.advance_to(periods)
 
 

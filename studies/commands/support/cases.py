@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.reduction import check_basis
+from vanedamp.rom.basis import basis_named
 from vanedamp.studies.case.tables import Case, check_interface
 
 
@@ -29,7 +29,7 @@ def read_campbell_case(arguments: Namespace) -> Case:
 
 def read_reducible_case(arguments: Namespace) -> Case:
     """Load a case with an interface, for a basis that there is; as read_case."""
-    check_basis(arguments.basis)
+    basis_named(arguments.basis)
     case = read_case(arguments)
     check_interface(case)
     return case

@@ -1,0 +1,65 @@
+"""Records some of whose keys other code adds: their tables are read, written and described with these keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any
+
+from pydantic import GetJsonSchemaHandler, TypeAdapter, model_serializer, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, SchemaValidator, core_schema
+
+from vanedamp.files.toml_input import STRICT
+
+
+@dataclass(frozen=True, config=STRICT)
+class OpenRecord:
+    """Base of such records.
+
+    added: values of the keys that a record has beyond its fields; None: no such keys
+    """
+
+    added: dict[str, Any] | None = field(default=None, kw_only=True)
+
+    @classmethod
+    def keys_added(cls) -> Mapping[str, Any]:
+        """Return the types of the keys that other code adds, by name."""
+        raise NotImplementedError(f"{cls.__qualname__} does not say what may be added")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, table: Any) -> Any:
+        if not isinstance(table, Mapping):
+            return table
+        if "added" in table:
+            raise ValueError("added: unknown key")
+        further = [key for key in table if key not in cls.__dataclass_fields__]
+        types = cls.keys_added() if further else {}
+        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in further if key in types}
+        if not schemas:
+            return table
+        own = {key: table[key] for key in schemas}
+        values = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(own)
+        return {key: value for key, value in table.items() if key not in own} | {"added": values}
+
+    @model_serializer(mode="wrap")
+    def _write(self, handler: Any) -> dict[str, Any]:
+        table: dict[str, Any] = handler(self)
+        return table | (table.pop("added", None) or {})
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        properties = handler.resolve_ref_schema(made)["properties"]
+        del properties["added"]
+        properties |= {key: handler(_schema(kind)) for key, kind in cls.keys_added().items()}
+        return made
+
+
+def _schema(kind: Any) -> CoreSchema:
+    """Return the schema of a type, built now where that was put off."""
+    adapter = TypeAdapter(kind)
+    adapter.rebuild()
+    return adapter.core_schema
