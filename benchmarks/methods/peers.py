@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.methods.scenes import charted
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.assembly import Motion, assemble, initial_motion
+from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
@@ -121,8 +120,10 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    system, initial = line_start(scene, assemble(scene))
-    return Coupled(system, time_grid(system, steps), start(system, initial))
+    whole = assemble(scene)
+    line, (q, v) = line_system(whole), initial_motion(scene, whole)
+    size = len(line.mass)  # without the sliders of Jenkins elements
+    return Coupled(line, time_grid(scene, whole, steps), Motion(q[:size], v[:size]))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
@@ -134,7 +135,8 @@ def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> 
     slips = q[every] @ system.J[: system.bodies].T
     gaps = system.J @ q.T + system.rest[:, None]
     # no number is deeper than any
-    deep = float(np.nan_to_num((-gaps / times.travel[:, None]).max(initial=0.0), nan=np.inf))
+    travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
+    deep = float(np.nan_to_num((-gaps / travel[:, None]).max(initial=0.0), nan=np.inf))
     status = Status.OK if deep <= DEEPEST else Status.PENETRATION
     if not np.isfinite(q).all():
         status = Status.DIVERGED
