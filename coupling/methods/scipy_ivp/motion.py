@@ -25,8 +25,8 @@ ROUND_OFF = 1e-11
 _DEPENDENT = 1e-9
 #: fraction of a row's motion by which forces may fail to hold it
 _LOST = 1e-7
-#: gaps below these fractions of the play, and of the terms that they are sums of, are closed: of sliders and stops, and
-#: of bodies with extent, whose corners are to meet a surface together
+#: gaps below these fractions of the play, and of the terms that they are sums of, are closed; the second ones are of rigid
+#: bodies with extent, whose corners are to meet a surface together
 _TOUCH, _TOUCH_EXTENDED = (0.0, 2e-14), (1e-11, 10 * ROUND_OFF)
 
 States = tuple[int, ...]
@@ -75,7 +75,7 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
-        self.extends = self.contact & (system.surface != STOP)  # whether a unit is of a body with extent
+        self.extends = self.rigid & (system.surface != STOP)  # whether a rigid contact is of a body with extent
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
         near, self._relative = np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T
         self._near = near * np.where(self.contact, system.play, 0.0)

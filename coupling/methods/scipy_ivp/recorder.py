@@ -85,7 +85,9 @@ class Recorder:
         drag, momentum = np.zeros((n, free.extent)), np.zeros((1, free.extent))
         drag[:, free.v] = system.damping
         momentum[0, free.n + system.along] = system.mass[system.along]
-        self.constant = np.concatenate([free.load, drag, free.speed[u:], free.speed[self.soft], self.watched[:1], momentum])
+        self.constant = np.concatenate(
+            [free.load, drag, free.speed[u:], free.speed[self.soft], self.watched[:1], momentum]
+        )
         k = len(self.soft)
         load, drag_, slip, approach, x, p, friction, push, dashpot = np.split(
             free.extent + np.arange(2 * n + 2 * u + 3 * k + 2), np.cumsum([n, n, u, k, 1, 1, u, k])
@@ -98,7 +100,11 @@ class Recorder:
         ]  # fmt: skip
         for i, r in enumerate(self.soft):
             at, one = _COUNT + 3 * i, [free.one]
-            terms += [(at, 1, [push[i]], one), (at + 1, 1, [friction[r]], one), (at + 2, 1, [dashpot[i]], [approach[i]])]
+            terms += [
+                (at, 1, [push[i]], one),
+                (at + 1, 1, [friction[r]], one),
+                (at + 2, 1, [dashpot[i]], [approach[i]]),
+            ]
             terms += [(at + 2, -1, [friction[r]], [slip[r]])]
         self.count = _COUNT + 3 * k
         self.left, self.right = (np.concatenate([term[i] for term in terms]).astype(int) for i in (2, 3))
