@@ -89,7 +89,7 @@ def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.nda
     rows = [row for r in closed for row in ((r, u + r) if free.rubs[r] else (r,))]
     mobility = system.delassus[np.ix_(rows, rows)].tolist()
     speed = (system.J[rows] @ v + np.r_[rebound, np.zeros(u)][rows]).tolist()
-    impulse = [0.0] * len(rows)
+    impulse, bound = [0.0] * len(rows), 0.0
     for _ in range(_SWEEPS):
         largest = 0.0
         for i, row in enumerate(rows):
