@@ -14,6 +14,7 @@ import ast
 import re
 import sys
 from collections.abc import Mapping
+from contextvars import ContextVar
 from functools import lru_cache
 from importlib import import_module
 from inspect import cleandoc
@@ -28,6 +29,9 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _UNIT = re.compile(r"\[([^\[\]]+)\]$")
 #: constraints that pydantic leaves as they are behind validators of ours, and their names in JSON Schema
 _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+
+#: whether a schema is being made, whose descriptions are docstrings without keys (key_tables.KeyedDocstring)
+making_schema = ContextVar("making_schema", default=False)
 
 
 class FileKind(NamedTuple):
@@ -57,7 +61,11 @@ def schema(record: Any) -> dict[str, Any]:
 
     Properties have a "description", a "default", and the "x-unit" of numbers ("-" of ratios).
     """
-    made: dict[str, Any] = TypeAdapter(record).json_schema(schema_generator=_Generator)
+    token = making_schema.set(True)
+    try:
+        made: dict[str, Any] = TypeAdapter(record).json_schema(schema_generator=_Generator)
+    finally:
+        making_schema.reset(token)
     return {"$schema": DIALECT} | made
 
 

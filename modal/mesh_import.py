@@ -113,11 +113,26 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
     if bad.size:
         raise MeshError(f"{path}: the coordinates of node {list(mesh.nodes)[bad[0]]} are not finite")
     place = dict(zip(mesh.nodes, range(len(mesh.nodes)), strict=True))
-    volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
     for label, (_, nodes) in mesh.elements.items():
         missing = [node for node in nodes if node not in place]
         if missing:
             raise MeshError(f"{path}: element {label}: there is no node {missing[0]}")
+    kind, cells, order = _cells(path, mesh, place)
+    return _Source(
+        path=path,
+        points=points,
+        kind=kind,
+        cells=cells,
+        cell_sets=_indexed(mesh.element_sets, order),
+        covers=_covers(mesh, place),
+        node_sets=_indexed(mesh.node_sets, place),
+        absent=_absent(mesh),
+    )
+
+
+def _cells(path: Path, mesh: LabelledMesh, place: dict[int, int]) -> tuple[str, np.ndarray, dict[int, int]]:
+    """Return the kind of the volume elements, the indices of their nodes, and the index of each by its label."""
+    volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
     solids = set(volumes.values())
     if len(solids) != 1 or not solids <= set(_VOLUMES):
         found = ", ".join(sorted(solids)) or "none"
@@ -128,12 +143,21 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
     if pair is not None:
         first, second = (list(volumes)[index] for index in pair)
         raise MeshError(f"{path}: volume elements {first} and {second} have the same nodes; remove one of them")
-    order = dict(zip(volumes, range(len(volumes)), strict=True))
+    return kind, cells, dict(zip(volumes, range(len(volumes)), strict=True))
+
+
+def _absent(mesh: LabelledMesh) -> dict[str, str]:
+    """Return the sets with members that do not exist: the first of these, "node 7", by the set's name."""
     absent: dict[str, str] = {}
-    for what, known, sets in (("node", place, mesh.node_sets), ("element", mesh.elements, mesh.element_sets)):
+    for what, known, sets in (("node", mesh.nodes, mesh.node_sets), ("element", mesh.elements, mesh.element_sets)):
         for name, members in sets.items():
             lost = [label for label in members if label not in known]
             absent |= {name: f"{what} {lost[0]}"} if lost else {}
+    return absent
+
+
+def _covers(mesh: LabelledMesh, place: dict[int, int]) -> dict[int, dict[str, set[tuple[int, ...]]]]:
+    """Return the corners of the points, lines and shells in each set, by dimension and name."""
     covers: dict[int, dict[str, set[tuple[int, ...]]]] = {0: {}, 1: {}, 2: {}}
     for name, members in mesh.element_sets.items():
         for label in members:
@@ -144,16 +168,7 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
                 covers[dimension].setdefault(name, set()).add(key)
     for name, faces in mesh.face_sets.items():
         covers[2].setdefault(name, set()).update(tuple(sorted(place[node] for node in face)) for face in faces)
-    return _Source(
-        path=path,
-        points=points,
-        kind=kind,
-        cells=cells,
-        cell_sets=_indexed(mesh.element_sets, order),
-        covers=covers,
-        node_sets=_indexed(mesh.node_sets, place),
-        absent=absent,
-    )
+    return covers
 
 
 def _indexed(sets: dict[str, list[int]], place: dict[int, int]) -> dict[str, np.ndarray]:

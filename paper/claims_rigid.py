@@ -1,7 +1,7 @@
 """The paper's claims on each figure computed with rigid models, and what these models show.
 
 Claims are in words of our own. A verdict is a rule on figures; where a claim holds in part or not, `why` says what the
-model has or lacks. Amplitudes are relative to the undamped maximum.
+model has or lacks. Amplitudes are relative to the maximum without bodies.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def fig19(curves: Curves, bar: Bar, mass: float) -> list[Claim]:
         claim(
             "The damper's mass by +-6 %, with the gap that goes with it, changes the reduction a lot.",
             f"the bar is {1e3 * bar.length(mass):.2f} mm long, 6 % of it {1e6 * change:.0f} µm or "
-            f"{change / reference:.1f} undamped amplitudes; highest means (maxima): "
+            f"{change / reference:.1f} amplitudes without bodies; highest means (maxima): "
             + ", ".join(f"{name} {peaks[name].height:.3f} ({tops[name]:.3f})" for name in _BARS),
             verdict(max(real) - min(real) > 0.1 or max(highest) - min(highest) > 0.2),
             "The change of the gap is many times the gap that damps best; the peak moves between the frequencies of "
@@ -149,7 +149,7 @@ def regime(curve: Curve, half_gap: float, restitution: float) -> tuple[np.ndarra
 
 
 def mistuning(curves: Curves, half_gaps: list[float], restitution: float) -> list[Claim]:
-    """Judge the attached mass in the 1:1 regime; half_gaps: of the curves, in undamped amplitudes."""
+    """Judge the attached mass in the 1:1 regime; half_gaps: of the curves, in amplitudes without bodies."""
     errors: list[float] = []
     fractions: list[float] = []
     for curve, half in zip(curves[""], half_gaps, strict=True):

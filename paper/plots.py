@@ -51,7 +51,7 @@ def orientations_picture(
         third.errorbar(angles, tops, spread, color=colour, linestyle=style, marker="o", capsize=3, label=label)
     third.set_xticks(list(angles))
     third.set_xlabel("orientation from the horizontal, degrees")
-    third.set_ylabel("top of the smoothed mean / undamped maximum, %")
+    third.set_ylabel("top of the smoothed mean / maximum without bodies, %")
     third.set_ylim(bottom=0)
     third.set_title("tops; bars: 95 % confidence of the highest mean")
     draw_grid(third)
@@ -110,7 +110,7 @@ def fit_picture(
         axes.set_xlabel("coefficient of friction")
         axes.set_title(name)
     row[0].set_ylabel("play across the cavity, µm")
-    figure.colorbar(mesh, ax=row, label="highest mean / undamped maximum, %")
+    figure.colorbar(mesh, ax=row, label="highest mean / maximum without bodies, %")
     references = f"slider {100 * slider.peak().height:.0f} %, body fixed {100 * slider.fixed.max():.0f} %"
     figure.suptitle(f"{title}: highest mean over the frequency ({references})")
     save(figure, path, dpi=110)
@@ -134,7 +134,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
     top.set_xlim(1e3 * begin, 1e3 * response.periods * period)
     top.set_ylim(top=1.45 * motion.max())
     top.set_xlabel("time, ms")
-    top.set_ylabel("displacement / undamped maximum")
+    top.set_ylabel("displacement / maximum without bodies")
     top.set_title(f"the last {last} periods")
     top.legend(ncols=3, loc="upper right", fontsize=9)
     left.plot(
@@ -146,7 +146,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
     )
     left.axvline(response.transient, color=GREY, linestyle="--", label="end of the transient")
     left.set_xlabel("period")
-    left.set_ylabel("peak / undamped maximum")
+    left.set_ylabel("peak / maximum without bodies")
     left.set_ylim(bottom=0)
     left.legend(fontsize=9)
     steady = np.array([event.time for event in impacts if event.time >= response.transient * period])
@@ -173,7 +173,7 @@ def mistuning_picture(
             curve.attached[chosen],
             "o",
             color=colour,
-            label=f"gap {2 * half:g} undamped amplitudes",
+            label=f"gap {2 * half:g} amplitudes without bodies",
         )
         other = hit & ~chosen
         axes.plot(curve.mean[other] / half, curve.attached[other], "x", color=colour, markersize=5, alpha=0.6)
@@ -217,7 +217,7 @@ def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Pat
     right.set_yticks(np.arange(len(tops)), labels, fontsize=9)
     right.invert_yaxis()
     right.set_xlim(0, 112)
-    right.set_xlabel("top / undamped maximum, %")
+    right.set_xlabel("top / maximum without bodies, %")
     right.set_title(
         "tops of the curves; forces in exciting forces,\nloads in shares of the one that sticks", fontsize=11
     )

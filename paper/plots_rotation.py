@@ -93,7 +93,7 @@ def rotating_body_picture(curves: Curves, scenes: Scenes, title: str, path: Path
     middle.plot(np.repeat(at, 5), 100 * started.ravel(), "x", color=COLOURS[2], label="walls, other starts")
     middle.axhline(100 * last.fixed.max(), color=_GREY, linestyle="--", label="body fixed")
     middle.set_xlabel("friction of the load / inertia at the undamped resonance")
-    middle.set_ylabel("top / undamped maximum, %")
+    middle.set_ylabel("top / maximum without bodies, %")
     middle.set_ylim(0, 110)
     middle.set_title("tops over the load")
     _linear(right, curves["order_60"][0])
@@ -135,14 +135,14 @@ def self_tuning_picture(curves: Curves, scenes: Scenes, title: str, path: Path) 
         blades.semilogy(spring.frequency, 100 * spring.undamped, ":", color=colour, linewidth=1.2)
         blades.semilogy(spring.frequency, 100 * spring.mean, "--", color=colour, label=f"{label}: spring and dashpot")
         blades.semilogy(track.frequency, 100 * track.mean, color=colour, label=f"{label}: track")
-    _finish(blades, "blades of other frequencies (dotted: undamped)", (5e-4, 150))
+    _finish(blades, "blades of other frequencies (dotted: without bodies)", (5e-4, 150))
     blades.legend(fontsize=8, loc="lower center", ncols=3)
     releases = values(scenes["starts"], "initial.displacement") / unit
     means = np.array([curve.mean.max() for curve in curves["starts"]]).reshape(-1, len(releases))
     for gap, row, colour in zip(values(scenes["starts"], "cavity.c1.gap") / unit, means, COLOURS, strict=False):
         starts.plot(releases, 100 * row, "o-", color=colour, label=f"gap {gap:g} X")
     starts.set_xlabel("released from, X")
-    starts.set_ylabel("highest mean / undamped maximum, %")
+    starts.set_ylabel("highest mean / maximum without bodies, %")
     starts.set_ylim(0, 105)
     starts.set_title("from other starts")
     off = 100 * (values(scenes["radius"], "damper.0.track_radius") / scenes["radius"].damper[0].track_radius - 1)
@@ -150,7 +150,7 @@ def self_tuning_picture(curves: Curves, scenes: Scenes, title: str, path: Path) 
     spread = [100 * curve.peak().confidence for curve in curves["radius"]]
     errors.errorbar(off, rest, spread, fmt="o-", color=COLOURS[0], capsize=3, label="from rest, gap 2 X")
     errors.set_xlabel("error of the track's radius, %")
-    errors.set_ylabel("top / undamped maximum, %")
+    errors.set_ylabel("top / maximum without bodies, %")
     errors.set_ylim(bottom=0)
     errors.set_title("tracks off their order")
     for axes in (starts, errors):
@@ -161,7 +161,7 @@ def self_tuning_picture(curves: Curves, scenes: Scenes, title: str, path: Path) 
 
 
 def _linear(axes: Axes, curve: Curve) -> None:
-    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=_DARK, linewidth=1.4, label="undamped")
+    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=_DARK, linewidth=1.4, label="without bodies")
     axes.plot(curve.frequency, 100 * curve.fixed, "--", color=_GREY, linewidth=1.4, label="body fixed")
 
 
@@ -176,7 +176,7 @@ def _line(axes: Axes, curve: Curve, label: str, colour: str) -> None:
 
 def _finish(axes: Axes, title: str, limits: tuple[float, float] = (0, 105)) -> None:
     axes.set_xlabel("excitation frequency along the engine order, Hz")
-    axes.set_ylabel("amplitude / undamped maximum, %")
+    axes.set_ylabel("amplitude / maximum without bodies, %")
     axes.set_ylim(*limits)
     axes.margins(x=0)
     axes.set_title(title)

@@ -87,7 +87,7 @@ def _bar(figure: FigureScenes) -> tuple[Bar, float]:
 
 
 def _mistuned(read: Read) -> tuple[list[float], float]:
-    """Return half gaps over the undamped amplitude, and the restitution."""
+    """Return half gaps over the amplitude without bodies, and the restitution."""
     first, reference = read.figure.scenes[""], read.curves[""][0].reference
     gaps = first.sweep_points()[0]["cavity.c1.gap"]
     return (gaps / 2 / reference).tolist(), first.damper[0].restitution

@@ -1,29 +1,36 @@
 #!/usr/bin/env bash
-# Everything vanedamp needs, on Debian or Ubuntu: system packages, a virtual environment on the system's interpreter, the
-# pinned packages of requirements.txt and the project itself. dolfinx is PyPI's wheel where there is one for that
-# interpreter (x86-64, Python 3.12 and newer), otherwise apt's; DOLFINX=wheel or DOLFINX=apt decides.
-# It installs what is missing and nothing else, so it may run before every command.
+# What vanedamp needs, on Debian or Ubuntu: system packages, a virtual environment on the system's interpreter, the pinned
+# packages of requirements.txt and the project itself. dolfinx is PyPI's wheel where there is one for that interpreter
+# (x86-64, Python 3.12 and newer), otherwise apt's; DOLFINX=wheel or DOLFINX=apt decides.
+#
+#     scripts/setup.sh [product] [tests] [checks] [browser] [peers] [docs]
+#
+# It installs what is missing of these groups (all, if none is named; product is in every one) and nothing else, so it may
+# run before every command.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 python=/usr/bin/python3
 venv=.venv
-stamp=$venv/setup-stamp # names what .venv was made from; written last, so that a killed set-up starts over
+stamp=$venv/setup- # stamp and group: what the group was made from; written last, so that a killed set-up starts over
 
+# first what the engine compiles with, then the rest while it compiles
+first_packages=(python3-venv)
 system_packages=(
-    python3-venv
     # dolfinx compiles forms when they are first used
     gcc libc6-dev
-    # gmsh and pyvista, which render without a display but not without these
-    libglu1-mesa libgl1 libegl1 libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
+    # gmsh, which works without a display but not without these
+    libglu1-mesa libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
 )
 of_wheel=(python3-dev)
-of_apt=(
+first_of_wheel=()
+first_of_apt=(
     # h5py stays apt's: PyPI's carries a second HDF5 library, which breaks Debian 12's dolfinx
-    python3-dolfinx python3-slepc4py python3-scipy python3-h5py python3-setuptools python3-wheel
+    python3-scipy python3-h5py python3-setuptools python3-wheel
     # without OpenBLAS a factorisation is six times slower
     libopenblas0-pthread
 )
+of_apt=(python3-dolfinx python3-slepc4py)
 
 say() { echo "setup: $*" >&2; }
 
@@ -71,13 +78,16 @@ prepare_apt() {
     [ -x $python ] || apt_get install -y --no-install-recommends python3
 }
 
-# What some tests need, which are skipped without it: a browser, and a program to compare with (27 MB), which only an
-# environment that sees apt's packages can import.
-install_for_tests() {
-    local package packages=(chromium)
-    [ $dolfinx = wheel ] || packages+=(python3-siconos)
+# Packages of apt that a group has besides; a test that lacks one is skipped, and says so.
+install_of_group() {
+    local package packages=()
+    case $1 in
+        browser) packages=(chromium) ;;
+        # only an environment that sees apt's packages can import it
+        peers) packages=(libgl1 libegl1) && [ $dolfinx = wheel ] || packages+=(python3-siconos) ;;
+    esac
     for package in "${packages[@]}"; do
-        installed "$package" || (apt_get install -y --no-install-recommends "$package") 2>/dev/null ||
+        installed "$package" || { as_root true && (apt_get install -y --no-install-recommends "$package") 2>/dev/null; } ||
             say "no $package to install here; tests that need it are skipped"
     done
 }
@@ -93,61 +103,127 @@ choose_dolfinx() {
     esac
 }
 
-install_system_packages() {
-    local package others
+# The packages of a list that are not there.
+missing_of() {
+    local package
     missing=()
+    for package in "$@"; do
+        installed "$package" || missing+=("$package")
+    done
+}
+
+# Install the packages that an environment begins with; `rest` are the others.
+install_first_packages() {
     [ -x $python ] || prepare_apt python3
     require_python
     choose_dolfinx
-    declare -n others=of_$dolfinx
-    for package in "${system_packages[@]}" "${others[@]}"; do
-        installed "$package" || missing+=("$package")
-    done
-    [ ${#missing[@]} -gt 0 ] || return 0
-    prepare_apt "${missing[@]}"
+    declare -n first=first_of_$dolfinx others=of_$dolfinx
+    missing_of "${system_packages[@]}" "${others[@]}"
+    rest=("${missing[@]}")
+    missing_of "${first_packages[@]}" "${first[@]}"
+    [ ${#missing[@]} -gt 0 ] || [ ${#rest[@]} -gt 0 ] || return 0
+    local now=("${missing[@]}")
+    prepare_apt "${now[@]}" "${rest[@]}"
     [ $dolfinx = wheel ] || apt-get --simulate install python3-dolfinx >/dev/null 2>&1 ||
         refuse "apt has no python3-dolfinx to install here."
-    apt_get install -y --no-install-recommends "${missing[@]}"
+    [ ${#now[@]} = 0 ] || apt_get install -y --no-install-recommends "${now[@]}"
+}
+
+# The packages of a group in requirements.txt.
+pinned() { awk -v group="[$1]" '/^# \[/ { found = $2 == group; next } found && NF' requirements.txt; }
+
+pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
+
+extras_of() {
+    case $1 in
+        product) echo fem,explore ;;
+        tests) echo exchange,nastran,cluster,dev ;;
+        checks) echo dev ;;
+        *) echo "$1" ;;
+    esac
+}
+
+install_python_packages() {
+    if [ $dolfinx = wheel ]; then
+        pip --constraint requirements.txt -e ".[$(extras_of "$1")]"
+        return
+    fi
+    # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
+    pip --no-deps -r <(pinned "$1")
+    [ "$1" != product ] || pip --no-deps --no-build-isolation -e .
+}
+
+compile_engine() {
+    say "compiling the engine"
+    $venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up; warm_up()' ||
+        say "that failed; the first run compiles it"
 }
 
 # A finished set-up whose interpreter still finds the packages, also after an upgrade of the system's Python.
-finished() {
-    [ -f $stamp ] && $venv/bin/python -P - <<'END'
+works() {
+    [ -f ${stamp}product ] && $venv/bin/python -P - <<'END'
 import sys
 from importlib.util import find_spec
 
-packages = "dolfinx slepc4py scipy h5py numba gmsh pyvista pytest vanedamp".split()
+packages = "dolfinx slepc4py scipy h5py numba gmsh meshio vanedamp".split()
 sys.exit(not all(map(find_spec, packages)))
 END
 }
 
-up_to_date() { finished && [ "$(cat $stamp)" = "$wanted" ]; }
+wanted() { { pwd && echo "${DOLFINX:-}" && cat scripts/setup.sh pyproject.toml && pinned "$1"; } | cksum; }
 
-wanted=$({ pwd && echo "${DOLFINX:-}" && cat scripts/setup.sh requirements.txt pyproject.toml; } | cksum)
-up_to_date && exit 0
+# The groups asked for that are not as they should be.
+find_open() {
+    local group
+    open=()
+    works || { rm -f $stamp* 2>/dev/null || true; }
+    for group in "${groups[@]}"; do
+        # a new environment has none of the others
+        [[ " ${open[*]} " != *" product "* && "$(cat $stamp$group 2>/dev/null)" = "$(wanted "$group")" ]] ||
+            open+=("$group")
+    done
+}
+
+all=(product tests checks browser peers docs)
+groups=(product)
+for group in "${@:-${all[@]}}"; do
+    [[ " ${all[*]} " == *" $group "* ]] || { say "no group $group; there are ${all[*]}"; exit 2; }
+    [ "$group" = product ] || groups+=("$group")
+done
+find_open
+[ ${#open[@]} -gt 0 ] || exit 0
 
 command -v apt-get >/dev/null || refuse "there is no apt-get here."
 exec 9<scripts/setup.sh
 flock --nonblock 9 || { say "waiting for another set-up to end" && flock 9; }
-up_to_date && exit 0
+find_open
+[ ${#open[@]} -gt 0 ] || exit 0
 
-install_system_packages
-install_for_tests
-finished || $python -m venv --clear $([ $dolfinx = wheel ] || echo --system-site-packages) $venv
-rm -f $stamp
-say "installing Python packages into $venv"
-pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
-if [ $dolfinx = wheel ]; then
-    pip --constraint requirements.txt -e ".[fem,explore,exchange,nastran,cluster,peers,docs,dev]"
-else
-    # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
-    pip --no-deps -r requirements.txt
-    pip --no-deps --no-build-isolation -e .
-fi
-say "compiling the engine"
-$venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up; warm_up()' ||
-    say "that failed; the first run compiles it"
-echo "$wanted" >$stamp
+rest=()
+install_first_packages
+compiled=
+for group in "${open[@]}"; do
+    if [ "$group" = product ]; then
+        [ -f ${stamp}product ] || $python -m venv --clear $([ $dolfinx = wheel ] || echo --system-site-packages) $venv
+        rm -f $stamp*
+    fi
+    say "installing Python packages of $group into $venv"
+    if [ "$group" = product ]; then
+        if [ ${#rest[@]} -gt 0 ]; then
+            apt_get install -y --no-install-recommends "${rest[@]}" & installing=$!
+        fi
+        install_python_packages product
+        compile_engine & compiled=$!
+        [ -z "${installing:-}" ] || wait $installing
+    else
+        install_python_packages "$group"
+        install_of_group "$group"
+    fi
+done
+[ -z "$compiled" ] || wait $compiled
+for group in "${open[@]}"; do
+    wanted "$group" >$stamp$group
+done
 $venv/bin/python - >&2 <<'END'
 import platform
 

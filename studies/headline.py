@@ -1,4 +1,4 @@
-"""The key figures of a damped curve, like beside like: its top over that of the undamped curve in the same range.
+"""The key figures of a damped curve, like beside like: its top over that of the curve without bodies in the same range.
 
 The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
 many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
@@ -58,7 +58,7 @@ class Headline:
     points_left_out: int
 
     def relative(self, height: float) -> float:
-        """Return an amplitude, m, over the undamped maximum; nan where that has no bound or is none."""
+        """Return an amplitude, m, over the maximum without bodies; nan where that has no bound or is none."""
         return height / self.undamped_peak if 0.0 < self.undamped_peak < math.inf else math.nan
 
     @property
@@ -80,7 +80,7 @@ class Headline:
         """Return these reasons; units: of the axis."""
         remarks = []
         if self.undamped_at_edge:
-            remarks.append("no undamped resonance lies within the range")
+            remarks.append("no resonance without bodies lies within the range")
         if self.peak_at_edge:
             remarks.append("the damped peak lies at an edge of the range, and may be higher beyond it")
         if self.too_coarse:
@@ -100,16 +100,17 @@ class Headline:
         at = f"{axis} = {format_value(self.damped_peak_at)}{unit}"
         if not math.isfinite(self.peak_ratio):
             unbounded = self.undamped_peak == math.inf
-            compared = "the undamped one has no bound" if unbounded else "there is no undamped one to compare with"
+            compared = "that without bodies has no bound" if unbounded else "none without bodies to compare with"
             text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; {compared}"
         elif self.undamped_at_edge or not along_frequency:
             text = (
-                f"highest damped mean {self.peak_ratio:.3f} of the highest undamped amplitude {self.undamped_peak:.4g} "
-                f"m from {format_value(low)} to {format_value(high)}{unit}, at {at}"
+                f"highest damped mean {self.peak_ratio:.3f} of the highest amplitude without bodies "
+                f"{self.undamped_peak:.4g} m from {format_value(low)} to {format_value(high)}{unit}, at {at}"
             )
         else:
             text = (
-                f"damped peak (mean) {self.peak_ratio:.3f} of the undamped maximum {self.undamped_peak:.4g} m, at {at}"
+                f"damped peak (mean) {self.peak_ratio:.3f} of the maximum without bodies {self.undamped_peak:.4g} m, "
+                f"at {at}"
             )
         return "; ".join([text, *self.remarks_in(units)])
 

@@ -13,7 +13,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
 
-#: share of the structure's mass that the body has, and of the undamped amplitude that its gap has
+#: share of the structure's mass that the body has, and of the amplitude without bodies that its gap has
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
 #: share of the natural frequency at which a run shows the body at work, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)

@@ -25,7 +25,10 @@ def pytest_report_header(config):
 
 def pytest_terminal_summary(terminalreporter):
     if "skipped" in terminalreporter.stats:
-        terminalreporter.write_line("Skipped tests: `make setup` installs what they lack, unless they name a command.")
+        terminalreporter.write_line(
+            "Skipped tests: `make setup` installs what they lack (`make setup-browser setup-peers setup-docs`), "
+            "unless they name a command."
+        )
 
 
 @pytest.fixture
@@ -75,3 +78,11 @@ def browser():
         opened = engine.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield opened
         opened.close()
+
+
+@pytest.fixture
+def pictures(monkeypatch):
+    """The figures that a test saves, by what is in them (tests.tools.pictures)."""
+    from tests.tools.pictures import Pictures
+
+    return Pictures(monkeypatch)

@@ -15,9 +15,10 @@ from vanedamp.coupling.numerics.codes import SEGMENTS, STEPS
 from vanedamp.coupling.planar import planar_run
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.files.toml_input import validate
 
 
@@ -70,7 +71,8 @@ def resting():
         "time": {"periods": 10_000, "transient": 0},
     }, "scene")  # fmt: skip
     system = assemble(scene)
-    return EngineRun(system, *line_start(scene, system), new_records(system, 10_000, 0), False, 10**6)
+    line, start = line_system(system), start_of(scene, system)
+    return EngineRun(system, line, start, new_records(system, 10_000, 0), False, 10**6)
 
 
 def test_runs_of_sliders_return_now_and_then(resting):

@@ -341,7 +341,7 @@ def test_sweep_over_a_parameter_of_the_waveform():
         assert (result.status == "ok").all() and np.isnan(result.amplitude_undamped).all()
         assert result.amplitude_mean[0, 1] == single.amplitude_mean != result.amplitude_mean[1, 1]
         for response in forced_responses(result):
-            assert "; there is no undamped one to compare with;" in response.sentence
+            assert "; none without bodies to compare with;" in response.sentence
 
 
 SCENE = """

@@ -26,11 +26,12 @@ from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.recorder import cubic_extremum, record_section
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import InputError, Positive, validate
 from vanedamp.studies.commands.support.budget import check_run
@@ -55,17 +56,17 @@ class Options(SteppingOptions):
         return 50e-6 * self.steps_per_period
 
 
-def begin(scene, system, records, events):
+def begin(scene, system, records, events, start):
     """Return a run. Raises InputError for friction dampers with springs."""
     if np.isfinite(system.casing_spring).any():
         raise InputError("solver.method: leapfrog knows no springs of friction dampers; take another")
-    return Leapfrog(system, *line_start(scene, system), scene.solver, records)
+    return Leapfrog(system, line_system(system), start, scene.solver, records)
 
 
 class Leapfrog:
     """A run."""
 
-    def __init__(self, whole, system, initial, options, records):
+    def __init__(self, whole, system, start, options, records):
         self.whole, self.rows = whole, rows_of_line(whole)
         self.h, friction = system.period / options.steps_per_period, system.friction_rows
         spring, dashpot, reduced = system.spring.copy(), system.dashpot.copy(), 1 / np.diag(system.delassus)
@@ -76,8 +77,8 @@ class Leapfrog:
         self.slow = 2 * system.limit[:friction] / reduced[:friction] * self.h
         self.rigid = np.isinf(system.spring[friction:])
         self.system, self.options, self.records = system._replace(spring=spring, dashpot=dashpot), options, records
-        self.q = np.concatenate([initial.p, initial.displacement[: system.bodies] + system.floor @ initial.p])
-        self.v = np.concatenate([initial.p_rate, initial.velocity[: system.bodies] + system.floor @ initial.p_rate])
+        size = len(system.mass)
+        self.q, self.v = (part[:size] for part in motion_of(whole, start))
         half = 0.5 * self.h * system.damping
         self.back, self.solve = np.diag(system.mass) - half, np.linalg.inv(np.diag(system.mass) + half)
         self.ledger, self.deepest, self.period = np.zeros(len(recs.ENERGIES)), 0.0, 0
@@ -156,11 +157,7 @@ class Leapfrog:
 
     def section(self):
         """Record the start of a period."""
-        n, slips = self.system.modes, self.system.J[: self.system.bodies]
-        record_section(
-            self.system, self.records, self.period, self.q[:n], self.v[:n], slips @ self.q, slips @ self.v,
-            float(self.pressing(self.q)), self.ledger,
-        )  # fmt: skip
+        record_section(self.whole, self.records, self.period, self.q, self.v, float(self.pressing(self.q)), self.ledger)
 
     def outcome(self):
         """What the run leaves behind."""
@@ -346,4 +343,5 @@ def test_scenes_load_no_kernels_but_those_of_their_method():
         "print(*(name for name in sys.modules if name.startswith('vanedamp.coupling.methods.')))"
     )
     shown = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, check=True)
-    assert set(shown.stdout.decode().split()) == {"vanedamp.coupling.methods." + name for name in ("exact", "registry")}
+    names = {"vanedamp.coupling.methods." + name for name in ("engines", "exact", "registry")}
+    assert set(shown.stdout.decode().split()) == names

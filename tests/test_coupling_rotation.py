@@ -160,7 +160,7 @@ def test_a_sweep_along_an_engine_order_has_the_level_of_its_crossing():
     assert found.units() == {"rotation.speed": "rad/s"}
     (curve,) = forced_responses(found)
     assert curve.headline.undamped_peak_at == pytest.approx(crossing, rel=2e-4)
-    assert "of the undamped maximum 0.001 m, at rotation.speed = 5.05 rad/s" in curve.sentence
+    assert "of the maximum without bodies 0.001 m, at rotation.speed = 5.05 rad/s" in curve.sentence
     assert axis_title(curve.axis, curve.units, curve.hertz) == (
         "speed of rotation, rad/s (along the engine order 0.63662 Hz a rad/s)"
     )

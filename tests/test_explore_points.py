@@ -324,7 +324,7 @@ def test_curve_is_that_of_the_chosen_values(grid):
     behind = [value for value in figure["other values"].y if value is not None]
     others = [grid.amplitude_mean[gap, :, k] for gap in range(3) for k in range(2) if (gap, k) != (1, 0)]
     np.testing.assert_allclose(behind, 1e6 * np.concatenate(others))
-    styles = {figure[name].line.dash for name in ("undamped", "bodies fixed", "best design")}
+    styles = {figure[name].line.dash for name in ("without bodies", "bodies fixed", "best design")}
     assert len(styles | {figure["damped, mean of peaks"].line.dash}) == 4
 
 
@@ -412,7 +412,7 @@ def test_sweeps_without_numbers_or_frequency(tmp_path):
     gaps = sweep(scene_of(SCENE | {"sweep": {"cavity.c1.gap": [1e-5, 2e-5, 3e-5]}}))
     best = best_design(gaps)
     assert best.amplitude == gaps.amplitude_mean.min()
-    assert "of the undamped amplitude" in best_sentence(gaps, best)
+    assert "of the amplitude without bodies" in best_sentence(gaps, best)
     words.save(tmp_path / "words.h5")
     gaps.save(tmp_path / "gaps.h5")
     simulate(scene_of(SCENE)).save(tmp_path / "run.h5", {"scene": SCENE})

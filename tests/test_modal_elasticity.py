@@ -123,7 +123,7 @@ def test_fields_for_paraview(solid, block, tmp_path):
 
 def test_cells_for_pyvista(solid, block):
     """The cells that drawing takes fill the volume, on the points of the matrices."""
-    pyvista = pytest.importorskip("pyvista")
+    pyvista = pytest.importorskip("pyvista", reason="needs VTK: make setup-peers")
     cells, types, points = solid.vtk_mesh()
     assert np.array_equal(points, block.coordinates)
     assert pyvista.UnstructuredGrid(cells, types, points).volume == pytest.approx(0.3 * 0.15 * 0.1, rel=1e-6)

@@ -16,7 +16,7 @@ NATURAL = math.sqrt(STIFFNESS / MASS) / (2 * math.pi)
 
 
 def figure9(gap, frequency, position=0.49, **tables):
-    """The scene; gap in undamped amplitudes, frequency in natural ones, position of the body in gaps."""
+    """The scene; gap in amplitudes without bodies, frequency in natural ones, position of the body in gaps."""
     return scene(
         structure={"model": "rigid", "mass": MASS, "stiffness": STIFFNESS, "damping_ratio": RATIO},
         excitation={

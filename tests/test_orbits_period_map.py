@@ -11,8 +11,7 @@ from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scen
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus
-from vanedamp.coupling.orbits.period_map import period_map
-from vanedamp.coupling.orbits.slider_passage import SliderMap
+from vanedamp.coupling.orbits.period_map import SceneMap, period_map
 from vanedamp.files.toml_input import InputError
 
 FREQUENCY = "excitation.frequency"
@@ -77,7 +76,7 @@ SCENES = {
 }  # fmt: skip
 
 
-def passed(tables, periods) -> tuple[SliderMap, np.ndarray]:
+def passed(tables, periods) -> tuple[SceneMap, np.ndarray]:
     """The period map of a scene, and the state after some periods of it."""
     made = scene(**tables)
     mapped = period_map(made, FREQUENCY)
@@ -92,7 +91,7 @@ def passed(tables, periods) -> tuple[SliderMap, np.ndarray]:
 
 def begun(mapped, state):
     """States of the rows of friction with which a passage begins, as FixedSequence has them."""
-    n, b, states = mapped._dynamics.system.modes, len(mapped.scene.damper), {}
+    n, b, states = mapped._frame.system.modes, len(mapped.scene.damper), {}
     for i, damper in enumerate(mapped.scene.damper):
         if damper.friction:
             speed = state[2 * n + b + i]
@@ -118,9 +117,9 @@ def test_the_derivative_is_that_of_40_digits(name):
     assert passage.status is PassageStatus.OK and passage.crossings
     made = mapped.scene
     law = (lambda speed: 1 - made.contact.coefficient * speed**0.2) if made.contact.depends_on_speed else None
-    system, contact = mapped._dynamics.system, None
+    system, contact = mapped._frame.system, None
     if not made.contact.rigid:
-        names = mapped._names_of_rows.names
+        names = mapped._event_names.names
         contact = made.contact.stiffness, {names[r]: system.dashpot[r] for r in range(len(names))}
     final, derivative = FixedSequence(made, law).passage(state, passage.crossings, begun(mapped, state), contact)
     assert np.abs((final - passage.state) / mapped.scale).max() < EXACT

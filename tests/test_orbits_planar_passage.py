@@ -8,21 +8,23 @@ import pytest
 
 from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
-from tests.tools.planar import planar_scene
+from tests.tools.planar import initial_motion, planar_scene
 from tests.tools.planar_laws import scene_of, tables
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.methods.engines import engine_run
 from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
 from vanedamp.coupling.orbits.multipliers import decided
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
-from vanedamp.coupling.orbits.planar_segment import Segment
+from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, initial_motion
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.report.branch_charts import branches_figure
 
@@ -119,11 +121,11 @@ def test_matches_a_fixed_sequence_in_40_digits(case):
 
 def directions(found, x):
     """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
-    frame = found._frame
-    motion = Motion(*np.split(frame.from_state @ x, 2))
-    run = PlanarRun(frame.system, motion, new_records(frame.system, 1, 0), True, 0)
-    run.advance_to(1)
-    held = frame.to_state @ Segment(run).begun() @ frame.from_state
+    frame, dynamics = found._frame, found._dynamics
+    start = found.restart_of(x)
+    segment = next(iter(Walk(engine_run(frame.system, start, new_records(frame.system, 1, 0), True, 100), 1)))
+    begun = dynamics.begun(segment.state, Start(frame, dynamics, start).closed(segment))
+    held = frame.to_state / dynamics.unit @ begun @ (dynamics.unit[:, None] * frame.from_state)
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]
 

@@ -62,7 +62,9 @@ def test_packages_hold_the_project_and_run_without_a_checkout(tmp_path):
     assert {name.split("/")[1] for name in held if name.startswith("vanedamp/")} == {
         *PARTS,
         "__init__.py",
+        "__init__.pyi",
         "__main__.py",
+        "py.typed",
     }
     fresh = tmp_path / "fresh"
     subprocess.run([sys.executable, "-m", "venv", str(fresh)], check=True)

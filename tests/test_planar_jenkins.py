@@ -12,10 +12,11 @@ from tests.tools.planar_laws import check_laws, image_parts, tables
 from tests.tools.planar_laws import jenkins as tables_with_elements
 from tests.tools.random_scenes import random_jenkins
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.methods.engines import engine_run
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET
-from vanedamp.coupling.planar.planar_run import begin_run
 from vanedamp.coupling.response.records import FRICTION, SLIPS, STICKS, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
@@ -234,7 +235,7 @@ def test_a_smaller_bound_unloads_the_spring():
     weak = [element | {"friction": 1e-3 * element["friction"]} for element in HELD["friction_damper"]]
     case = thrown(1, friction_damper=weak)
     system = assemble(case)
-    run = begin_run(case, system, new_records(system, 1, 0), True, 10**6, final)
+    run = engine_run(system, start_of(case, system, final), new_records(system, 1, 0), True, 10**6)
     found = run.system.elongation @ run.state.q
     np.testing.assert_allclose(np.abs(found), run.system.limit[-2:] / run.system.tangential, rtol=1e-9)
     assert run.advance_to(1) is Status.OK

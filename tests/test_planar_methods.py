@@ -15,8 +15,12 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import moreau, penalty, scipy_ivp
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.evaluation import residual
+from vanedamp.coupling.response.event_log import events_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import start_of
+from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
+from vanedamp.coupling.scene.contact_laws.registry import register as register_law
 from vanedamp.coupling.scene.waveform import Waveform, register
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import STRICT, InputError
@@ -36,7 +40,8 @@ def run_by(scene, samples=0, **solver):
     """The run of a scene's one period by a method, and its status."""
     method = METHODS[solver["method"]]
     system = assemble(scene)
-    run = method.begin(scene.replace({"solver": solver}), system, new_records(system, 1, samples), True)
+    records, start = new_records(system, 1, samples), start_of(scene, system)
+    run = method.begin(scene.replace({"solver": solver}), system, records, True, start)
     status = run.advance_to(1)
     return run, status
 
@@ -216,6 +221,62 @@ def test_solve_ivp_on_more_random_scenes():
     assert np.quantile(errors, 0.5) <= 1e-9
     assert np.quantile(errors, 0.8) <= 1e-5
     assert np.isinf(errors).sum() <= 2
+
+
+@pytest.mark.parametrize("seed", [3, 4, 9, 11, 13])
+def test_solve_ivp_on_compliant_contacts_with_friction(seed):
+    """Motion, impulses and energies of one to three blocks, by springs whose ends the integrator finds for itself."""
+    data = tables(seed) | {"contact": {"law": "compliant", "stiffness": 1e3}}
+    for damper in data["damper"]:
+        damper["restitution"] = max(damper["restitution"], 0.2)
+    scene = scene_of(data).replace({"time.periods": 1, "time.transient": 0})
+    exact = run_planar(scene, 1, samples=32)
+    run, status = run_by(scene, 32, method="solve_ivp")
+    assert status is exact.status is Status.OK
+    np.testing.assert_allclose(
+        run.record.records.samples, exact.records.samples, rtol=0, atol=1e-5 * np.ptp(exact.records.samples)
+    )
+    ours, theirs = (
+        [
+            (event.damper, event.side, event.corner, event.relative_velocity_before, event.impulse)
+            for event in events_of(other.rows, other.log)
+            if event.kind == "impact"
+        ]
+        for other in (run.outcome(), exact.outcome())
+    )
+    assert len(ours) >= 2 and [event[:3] for event in ours] == [event[:3] for event in theirs]
+    np.testing.assert_allclose(*([event[3:] for event in events] for events in (ours, theirs)), rtol=1e-4, atol=1e-7)
+    for name in ("ledger", "parts"):
+        expected = getattr(exact.records, name)
+        np.testing.assert_allclose(getattr(run.record.records, name), expected, rtol=0, atol=1e-5 * np.ptp(expected))
+    assert imbalance(run) <= 1e-7
+
+
+@register_law
+@dataclass(frozen=True, config=STRICT)
+class Softer(ContactLaw):
+    """Restitution k/(1 + v/c) with c = 0.05 m/s."""
+
+    law: Literal["softer"] = "softer"
+
+    @staticmethod
+    def restitution_at(speed, coefficient):
+        return coefficient / (1.0 + speed / 0.05)
+
+    def element(self, restitution, mass, flexibility=None):
+        return Element(restitution)
+
+
+def test_restitution_of_blocks_that_falls_with_the_speed():
+    scene = in_flight(0.3).replace({"contact": {"law": "softer"}})
+    exact = run_planar(scene, 1)
+    run, status = run_by(scene, method="solve_ivp")
+    assert status is exact.status is Status.OK
+    theirs, ours = exact.events(0), np.array(run.record.log)
+    assert len(theirs) == len(ours) > 3
+    speed = -ours[0, 3]
+    assert ours[0, 4] == pytest.approx(0.6 / (1.0 + speed / 0.05) * speed, rel=1e-12)
+    np.testing.assert_allclose(ours[:, 3:], theirs[:, 3:], rtol=1e-7, atol=1e-12)
 
 
 def test_moreau_on_random_scenes():

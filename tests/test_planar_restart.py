@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError, validate
 
 #: a cavity that moves along, across and turns, with two blocks, and one with a slider on a spring
@@ -49,6 +51,64 @@ def test_a_run_in_two_parts_is_the_run_in_one(cut):
     for name in ("displacement", "velocity", "slip", "slip_velocity", "lift", "tilt"):
         one, other = getattr(whole.final, name), getattr(second.final, name)
         np.testing.assert_allclose(other, one, atol=1e-8 * max(np.abs(one).max(), 1e-3))
+
+
+#: a body on springs with dashpots that gravity presses onto a floor and a wall
+SPRUNG = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 400.0, "damping_ratio": 0.02},
+    "excitation": {"frequency": 3.1, "force": 2.0},
+    "gravity": {"acceleration": 9.81, "orientation_deg": 20.0},
+    "cavity": [{"name": "c1", "gap": 0.02, "play": 0.002}],
+    "initial": {},
+}  # fmt: skip
+BODIES = {"block": {"length": 0.03, "height": 0.02}, "disc": {"radius": 0.01}}
+
+
+@pytest.mark.parametrize(
+    ("shape", "stiffness", "frequency", "gravity"),
+    [("block", 200.0, 3.1, 9.81), ("block", 60.0, 3.7, 1.0), ("disc", 30.0, 4.3, 9.81)],
+)
+def test_a_cut_leaves_springs_as_they_are(shape, stiffness, frequency, gravity):
+    """Contacts that are compressed at the cut, or lag behind a body that leaves, are no impacts of the next run."""
+    body = {"cavity": "c1", "mass": 0.05, "friction": 0.2, "restitution": 0.3, "position": -0.004}
+    tables = SPRUNG | {
+        "damper": [body | {"shape": shape} | BODIES[shape]], "contact": {"law": "compliant", "stiffness": stiffness},
+        "excitation": {"frequency": frequency, "force": 2.0}, "gravity": SPRUNG["gravity"] | {"acceleration": gravity},
+    }  # fmt: skip
+    whole, system = simulate(scene(20, **tables)), assemble(scene(1, **tables))
+    pressed = lags = 0
+    for cut in (3, 8, 10, 13, 16, 17):
+        first = simulate(scene(cut, **tables))
+        second = simulate(scene(20 - cut, **tables), start=RestartState.from_list(first.final.to_list()))
+        for part in ("section", "slip", "slip_velocity", "peak"):
+            expected = getattr(whole, part)
+            np.testing.assert_allclose(getattr(second, part), expected[cut:], atol=1e-9 * np.abs(expected).max())
+        assert first.counters["impacts"] + second.counters["impacts"] == whole.counters["impacts"]
+        assert second.energy_residual < 1e-12
+        q, v = motion_of(system, first.final)
+        gap, speed = system.rest + system.J[: len(system.rest)] @ q, system.J[: len(system.rest)] @ v
+        inside = np.isfinite(system.spring) & (gap < -1e-9)
+        pushes = np.where(inside, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
+        pressed, lags = pressed + (inside & pushes).sum(), lags + (inside & ~pushes).sum()
+    assert pressed > 5 and (lags > 3 or gravity * stiffness > 1e3)
+
+
+def test_springs_of_a_smaller_cavity_are_not_compressed():
+    """A block on compliant contacts is put into a cavity with less play; in its own it stays as it is."""
+    body = {"cavity": "c1", "mass": 0.05, "shape": "block", "restitution": 0.9} | BODIES["block"]
+    tables = SPRUNG | {"damper": [body], "contact": {"law": "compliant", "stiffness": 200.0}}
+    given = scene(1, **tables)
+    state = simulate(given).final
+    for gap, play in ((0.02, 0.002), (0.02, 0.0005), (0.003, 0.002)):
+        smaller = scene(1, **tables | {"cavity": [{"name": "c1", "gap": gap, "play": play}]})
+        system = assemble(smaller)
+        begun = start_of(smaller, system, state)
+        gaps = (system.rest + system.J[: len(system.rest)] @ motion_of(system, begun).q)[: system.contacts]
+        if (gap, play) == (0.02, 0.002):
+            assert begun.to_list() == state.to_list() and gaps.min() < -1e-4
+        else:
+            changed = system.travels != state.gap
+            assert changed.any() and gaps[changed].min() >= -1e-12 * play
 
 
 def test_the_state_is_relative_to_the_cavity():

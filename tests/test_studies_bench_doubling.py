@@ -5,7 +5,6 @@ import json
 import math
 
 import pytest
-from PIL import Image
 
 from benchmarks.doubling import measure
 from benchmarks.doubling.measure import Doubling
@@ -26,7 +25,7 @@ def test_the_doubling_is_that_of_forty_digits():
     )
 
 
-def test_benchmark_leaves_its_results(tmp_path, capsys):
+def test_benchmark_leaves_its_results(tmp_path, capsys, pictures):
     bench = Doubling((100, 1000), 600, 6, 5, (100, 200))
     result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_doubling.json").read_text())["points"] == result["points"]
@@ -43,7 +42,11 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     fine = {row["method"]: float(row["unsteady"]) for row in rows if row["steps"] == "1000"}
     coarse = {row["method"]: float(row["unsteady"]) for row in rows if row["steps"] == "100"}
     assert all(1e-4 < fine[method] < coarse[method] for method in measure.METHODS)
-    with Image.open(tmp_path / "bench_doubling.png") as picture:
-        assert picture.size[0] > 1000
+    left, middle, right = pictures["bench_doubling"]
+    assert list(left.curves["multiplier -1"].x) == [result["exact"]] * 2
+    assert "exact engine" in middle.curves and set(measure.METHODS) <= set(right.curves)
+    for method in measure.METHODS:
+        assert sorted(right.curves[method].y) == sorted((fine[method], coarse[method]))
+    assert "error" in middle.y and "Hz" in left.x
     bench.print_summary(result)
     assert "multiplier -1" in capsys.readouterr().out

@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from benchmarks.sweep.measure import SweepScaling, _efficiency
 from benchmarks.sweep.simulation import Costs, simulated
@@ -72,7 +71,7 @@ def test_simulated_checkpoints_take_their_share():
 
 
 @pytest.mark.slow
-def test_benchmark_leaves_its_results(tmp_path, capsys):
+def test_benchmark_leaves_its_results(tmp_path, capsys, pictures):
     result = TINY.run(tmp_path / "bench")
     assert json.loads((tmp_path / "bench" / "bench_sweep.json").read_text())["pairs"] == result["pairs"]
     with (tmp_path / "bench" / "bench_sweep.csv").open(newline="") as stream:
@@ -81,7 +80,9 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert {file.name for file in (tmp_path / "bench").iterdir()} == {
         f"bench_sweep.{e}" for e in ("json", "csv", "png")
     }
-    with Image.open(tmp_path / "bench" / "bench_sweep.png") as picture:
-        assert picture.width > 1000
+    efficiency, memory, simulated_ones = pictures["bench_sweep"]
+    assert efficiency.curves[f"target {result['target']}"].y[0] == result["target"]
+    assert set(memory.curves) == {"main process", "a worker"} and memory.y == "peak memory, MB"
+    assert simulated_ones.curves and simulated_ones.x == "workers"
     TINY.print_summary(result)
     assert "parallel efficiency by the processor" in capsys.readouterr().out

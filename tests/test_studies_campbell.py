@@ -11,6 +11,7 @@ from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.report.campbell_chart import campbell_figure, campbell_header, campbell_rows
+from vanedamp.studies.report.campbell_picture import campbell_picture
 
 #: the block 0.1 m out from an axis across it, halfway between its sides
 ROTATION = """
@@ -121,8 +122,14 @@ def test_chart_has_every_mode_and_mark(diagram):
     assert len(rows) == len(diagram.speeds) and len(rows[0]) == len(campbell_header(diagram))
 
 
-def test_picture_is_one(folder):
-    assert (folder / "campbell.png").read_bytes().startswith(b"\x89PNG")
+def test_picture_has_the_modes(folder, tmp_path, pictures):
+    diagram = Campbell.load(folder / "campbell.h5")
+    campbell_picture(diagram, tmp_path / "again.png")
+    panel, above = pictures["again"]
+    assert (panel.x, panel.y, above.x) == ("speed, rpm", "natural frequency, Hz", "rad/s")
+    for mode in diagram.modes:
+        assert panel.curves[f"mode {mode + 1}"].y.shape == diagram.rpm.shape
+    assert ("crossing" in panel.curves) == bool(diagram.crossings)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Another package adds commands, sections, benchmarks, and parts of scenes by entry points; nothing of ours changes."""
+"""Another package adds a command, a section, a benchmark and parts of scenes by entry points; no file changes."""
 
 import base64
 import csv

@@ -257,7 +257,7 @@ def test_files_without_permission(folder):
     [
         ("dolfinx", ["modal", "case.toml"], "apt install python3-dolfinx"),
         ("gmsh", ["mesh", "case.toml", "-o", "block.msh"], "pip install gmsh"),
-        ("pyvista", ["modal", "case.toml", "--vtk", "modes.vtu"], "pip install pyvista"),
+        ("meshio", ["modal", "case.toml", "--vtk", "modes.vtu"], "pip install meshio"),
         ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
         ("h5py", ["run", "scene.toml"], "pip install h5py"),
     ],

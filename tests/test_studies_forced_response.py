@@ -140,7 +140,7 @@ def magnification(frequency, damping=ZETA):
 
 
 def test_range_beside_the_resonance():
-    """The undamped amplitude at the edge of the range is what a response of the range is compared with."""
+    """The amplitude without bodies at the edge of the range is what a response of the range is compared with."""
     result = run_sweep(scene(1700.0, 1850.0, 4))
     (response,) = forced_responses(result)
     found = response.headline
@@ -148,9 +148,9 @@ def test_range_beside_the_resonance():
     assert found.undamped_peak == pytest.approx(TOP * magnification(1850.0) / largest, rel=1e-9)
     assert found.undamped_at_edge and found.peak_at_edge and not found.too_coarse
     assert found.peak_ratio == pytest.approx(1.0, abs=0.02)  # the walls are out of reach
-    assert "of the undamped maximum" not in response.sentence
-    assert "highest undamped amplitude 1.697e-06 m from 1700 to 1850 Hz" in response.sentence
-    assert "no undamped resonance lies within the range" in response.sentence
+    assert "of the maximum without bodies" not in response.sentence
+    assert "highest amplitude without bodies 1.697e-06 m from 1700 to 1850 Hz" in response.sentence
+    assert "no resonance without bodies lies within the range" in response.sentence
 
 
 def test_tops_between_the_points():
@@ -172,7 +172,7 @@ def test_tops_between_the_points():
 def test_fine_range_over_the_resonance_has_no_remark():
     (response,) = forced_responses(run_sweep(scene(1850.0, 1950.0, 21)))
     assert response.headline.remarks == []
-    assert "of the undamped maximum 3e-05 m, at excitation.frequency" in response.sentence
+    assert "of the maximum without bodies 3e-05 m, at excitation.frequency" in response.sentence
 
 
 def test_no_bound_without_damping():
@@ -182,7 +182,7 @@ def test_no_bound_without_damping():
     assert response.headline.undamped_peak == math.inf
     assert math.isnan(response.headline.peak_ratio)
     assert response.sentence.startswith("rigid model: damped peak (mean) ")
-    assert "the undamped one has no bound" in response.sentence
+    assert "that without bodies has no bound" in response.sentence
     assert math.isfinite(response.reference)
 
 

@@ -160,7 +160,7 @@ def test_one_value_is_held(tmp_path):
 
 
 def undamped_at(frequency):
-    """Closed form of the example's undamped amplitude, m."""
+    """Closed form of the example's amplitude without bodies, m."""
     ratio = frequency / (np.sqrt(3.4e7 / 0.148) / (2 * np.pi))
     return 3e-5 * 2 * 0.002 * np.sqrt(1 - 0.002**2) / abs(1 - ratio**2 + 2j * 0.002 * ratio)
 
@@ -172,7 +172,7 @@ def alone(data):
 
 
 def test_a_band_far_from_the_resonance_gains_nothing(tmp_path):
-    """Damped and undamped amplitudes of the same band: the walls are out of reach, so nothing is taken."""
+    """Damped and amplitudes without bodies of the same band: the walls are out of reach, so nothing is taken."""
 
     def far(data):
         alone(data)
@@ -184,8 +184,8 @@ def test_a_band_far_from_the_resonance_gains_nothing(tmp_path):
     assert record.amplitude == pytest.approx(3e-5)  # the gap's unit is the resonance's amplitude all the same
     assert abs(record.nominal.reduction) < 0.02
     assert record.headlines["nominal"]["undamped_at_edge"] and record.headlines["nominal"]["peak_at_edge"]
-    assert "of the highest undamped amplitude in the band" in record.sentence
-    assert "no undamped resonance lies within the range" in record.sentence
+    assert "of the highest amplitude without bodies in the band" in record.sentence
+    assert "no resonance without bodies lies within the range" in record.sentence
 
 
 def test_mean_over_mean(tmp_path):
@@ -197,7 +197,7 @@ def test_mean_over_mean(tmp_path):
     band = [2380.0, 2405.0, 2430.0]
     assert record.reference == pytest.approx(np.mean([undamped_at(frequency) for frequency in band]), rel=1e-9)
     assert record.nominal.amplitude == pytest.approx(record.nominal_response.mean(), rel=1e-9)
-    assert "of the undamped mean in the band" in record.sentence
+    assert "of the mean without bodies in the band" in record.sentence
     # 25 Hz of a resonance of 9.6 Hz
     assert record.headlines["nominal"]["too_coarse"]
     assert "points 25 Hz apart are too coarse for a resonance 9.65 Hz wide" in record.sentence

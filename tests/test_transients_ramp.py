@@ -236,6 +236,12 @@ CASES = {
     "chatters": (BODY | {"damper": [{**SLIDER, "friction": 0.0}], "gravity": {"orientation_deg": 60.0}}, 97.0),
     "is compressed": (BODY | {"contact": {"law": "compliant", "stiffness": 2e6}}, 100.0),
     "tilts": (BODY | {"cavity": [{"name": "c", "gap": 2e-4, "play": 1e-4}], "damper": [BLOCK]}, 100.0),
+    "tilts on springs": (
+        BODY | {
+            "cavity": [{"name": "c", "gap": 2e-4, "play": 1e-4}], "damper": [BLOCK],
+            "contact": {"law": "compliant", "stiffness": 1e7},
+        }, 100.0,
+    ),
     "spring before a slider": (
         ONE_MODE | {"friction_damper": [{"normal_force": 1.0, "friction": 0.5, "stiffness": 2e5}]}, 100.0,
     ),
@@ -447,10 +453,6 @@ def test_modes_that_do_not_hold_the_motion_leave_the_ledger_open(tmp_path):
 
 # what cannot be
 
-PLANAR_SPRINGS = BODY | {
-    "cavity": [{"name": "c", "gap": 2e-4, "play": 1e-4}], "damper": [BLOCK],
-    "contact": {"law": "compliant", "stiffness": 1e7},
-}  # fmt: skip
 TABLE = {"structure": {"model": "prescribed", "displacement_amplitude": 1e-4}, "excitation": {"frequency": 9.0}}
 SOFTENED = ROTOR | {"structure": ROTOR["structure"] | {"centrifugal_stiffness": -1.0}}
 UP = {"from": 90.0, "to": 110.0, "rate": 5.0}
@@ -466,7 +468,6 @@ REFUSED = [
     ({"from": 90.0, "to": 110.0, "periods": 10**400}, {}, "ramp.periods: expected a whole number up to"),
     (UP, TABLE, "jump"),
     (UP, {"solver": {"method": "moreau"}}, 'run-ups are those of the exact engine, not of "moreau"'),
-    (UP, PLANAR_SPRINGS, "contacts are springs"),
     (UP | {"quantity": "speed"}, {}, "[rotation], which is missing"),
     (UP, ROTOR, 'take "speed" or "rpm"'),
     (UP | {"quantity": "rpm", "from": 0.0}, ROTOR, "at standstill"),

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import tomli_w
+from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 import vanedamp as vd
@@ -14,8 +15,11 @@ from tests.test_studies_report import charts
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import motion_of
+from vanedamp.coupling.response.segment import Walk
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, bins, cycles, without_rebounds
-from vanedamp.coupling.transients.ring_down_segments import Energy, Segment, Walk
+from vanedamp.coupling.transients.ring_down_segments import Energy, Followed
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
@@ -210,13 +214,13 @@ def assert_states_have_the_ledgers_energy(data):
     table = table_of(data)
     free = free_scene(data, table)
     run = run_of(free, start=blown_or_pulled(data, table))
-    walk, total, place, lost, segments = Walk(run, 0, free.time.simulated), None, None, 0.0, 0
-    for segment, _, duration in walk:
+    walk, total, place, lost, segments = Walk(run, free.time.simulated), None, None, 0.0, 0
+    for segment in (Followed(each, 0) for each in walk):
         energy = segment.energy(0.0).total
         total = energy if total is None else total
         assert energy + lost == pytest.approx(total, rel=1e-11)  # the run's ledger closes to as much
         assert place is None or segment.coordinate(0.0) == pytest.approx(place, abs=1e-14)
-        lost, place, segments = run.state.ledger[1:5].sum(), segment.coordinate(duration), segments + 1
+        lost, place, segments = run.state.ledger[1:5].sum(), segment.coordinate(segment.duration), segments + 1
     assert walk.status is Status.OK and segments > 60
 
 
@@ -229,13 +233,40 @@ def test_energies_of_states_are_those_of_the_ledger(name):
 def test_energies_of_a_block_are_those_of_the_ledger():
     data = oscillator(1e-3, ring_down=pull(3e-3, 30), **BLOCK)
     assert_states_have_the_ledgers_energy(data)
+    assert_states_have_the_ledgers_energy(data.replace({"contact": {"law": "compliant", "stiffness": 1e6}}))
     found = vd.ring_down(data.replace({"ring_down": blow(0.3, 30)}))
     assert found.status is Status.OK and found.impacts.sum() > 50
     # the block is at rest before the blow
     assert found.energies["initial"] == pytest.approx(0.3**2 / 2, rel=1e-9)
-    compliant = data.replace({"contact": {"law": "compliant", "stiffness": 1e6}})
-    with pytest.raises(InputError, match="ring_down: runs of bodies in the plane whose contacts are springs leave no"):
-        vd.ring_down(compliant)
+
+
+def test_a_block_on_springs_against_an_independent_integration():
+    """Turning points of a structure with a block between elastic walls, floor and ceiling: DOP853 on their springs."""
+    block = {"cavity": "c", "mass": 0.1, "shape": "block", "length": 0.012, "height": 0.01, "tilt": 2e-3, "lift": 2e-5}
+    tables = {"cavity": [CAVITY | {"gap": 4e-4, "play": 1e-4}], "damper": [block | {"restitution": 1.0}]}
+    tables |= {"contact": {"law": "compliant", "stiffness": 2e4}, "gravity": {"orientation_deg": 20.0}}
+    data = oscillator(0.01, ring_down=pull(5e-4, 4), **tables)
+    found = vd.ring_down(data)
+    free = free_scene(data, table_of(data))
+    system = assemble(free)
+    u, (q, v) = system.contacts, motion_of(system, blown_or_pulled(data, table_of(data)))
+    J, rest, spring = system.J[:u], system.rest[:u], system.spring[:u]
+
+    def motion(t, y):
+        at, rate = np.split(y, 2)
+        push = spring * np.maximum(-(rest + J @ at), 0.0)
+        force = system.weight - system.stiffness @ at - system.damping @ rate + push @ J
+        return np.r_[rate, force / system.mass]
+
+    turns = lambda t, y: y[len(q)]  # noqa: E731
+    options = {"rtol": 1e-12, "atol": 1e-16, "max_step": 1e-4, "events": turns}
+    other = solve_ivp(motion, (0.0, found.duration), np.r_[q, v], "DOP853", **options)
+    later = other.t_events[0] > 0.0  # the pull turns, too
+    times, x = other.t_events[0][later], other.y_events[0][later, 0] * system.response[0]
+    assert found.status is Status.OK and found.impacts.sum() > 20 and found.energy_residual < 1e-11
+    assert len(x) > 6
+    assert found.time[1:] == pytest.approx(times, rel=1e-7)
+    assert found.displacement[1:] == pytest.approx(x, abs=1e-7 * np.abs(x).max())
 
 
 RHO = 2 / np.pi * 0.3 / 1.7
@@ -325,10 +356,11 @@ def test_rebounds_are_no_half_cycles(coordinates, expected):
     assert [point.coordinate for point in without_rebounds(points)] == expected
 
 
-class Jolted(Segment):
+class Jolted(Followed):
     """A segment of x'' = -x from a place and a speed, as an impact leaves them."""
 
-    def __init__(self, place, speed):
+    def __init__(self, place, speed, start, duration):
+        self.start, self.duration = start, duration
         self.wave, self.rate = np.array([place - 1j * speed]), np.array([1j])
         self.powers = np.array([place, speed, 0.0])
 
@@ -338,11 +370,11 @@ class Jolted(Segment):
 
 def test_two_impacts_at_one_instant_turn_the_motion_once_or_not_at_all():
     found = TurningPoints()
-    found.add(Jolted(0.5, 1.0), 0.0, 0.1)
-    found.add(Jolted(0.6, -1.0), 0.1, 0.0)
-    found.add(Jolted(0.6, 0.5), 0.1, 0.1)  # turned back at once
+    found.add(Jolted(0.5, 1.0, 0.0, 0.1))
+    found.add(Jolted(0.6, -1.0, 0.1, 0.0))
+    found.add(Jolted(0.6, 0.5, 0.1, 0.1))  # turned back at once
     assert not found.found
-    found.add(Jolted(0.65, -0.5), 0.2, 0.1)
+    found.add(Jolted(0.65, -0.5, 0.2, 0.1))
     assert [point.time for point in found.found] == [0.2] and found.rest is None
 
 

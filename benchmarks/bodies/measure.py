@@ -23,7 +23,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import validate
 
-#: kg, N/m, m of the rigid model of the cluster; share of the body's mass; gap over the undamped amplitude
+#: kg, N/m, m of the rigid model of the cluster; share of the body's mass; gap over the amplitude without bodies
 MASS, STIFFNESS, DAMPING, AMPLITUDE, SHARE, GAP = 0.15696, 3.6046e7, 0.002, 7e-5, 0.02, 0.5
 NATURAL = float(np.sqrt(STIFFNESS / MASS) / (2 * np.pi))
 SHAPES: dict[str, dict[str, Any]] = {

@@ -13,11 +13,13 @@ import numpy as np
 
 from benchmarks.methods.peers import PeerRun
 from vanedamp.coupling.methods.scipy_ivp import Options
-from vanedamp.coupling.methods.scipy_ivp.run import Arc, IvpRun
+from vanedamp.coupling.methods.scipy_ivp.arcs import Arc
+from vanedamp.coupling.methods.scipy_ivp.run import IvpRun
 from vanedamp.coupling.response.records import new_records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import on_structure
 
 if TYPE_CHECKING:
     from sksundae.cvode import CVODEResult
@@ -32,7 +34,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     options = Options(rtol=setting, steps_per_period=_STEPS)
     options.check_samples(samples)
     records = new_records(system, periods, samples)
-    job = CvodeRun(system, *line_start(scene, system), options, records, False)
+    job = CvodeRun(on_structure(system), options, motion_of(system, start_of(scene, system)), records, False)
     started = time.thread_time()
     status = job.advance_to(periods)
     seconds = time.thread_time() - started
@@ -60,18 +62,18 @@ class CvodeRun(IvpRun):
     def _solve(self, grid: np.ndarray) -> CVODEResult:
         from sksundae.cvode import CVODE
 
-        u, guards = self.unforced, self.guards
-        leaves = guards.order > 0
-        size = np.abs(guards.functional) @ np.abs(u.extended(self.time, self.y[: u.size]))
+        free, guard = self.free, self.guard
+        leaves = self.order > 0
+        size = np.abs(guard) @ np.abs(free.extended(self.time, self.y[: free.size]))
 
         def rate(t: float, y: np.ndarray, out: np.ndarray) -> None:
             out[:] = self.rate(t, y)
 
         def roots(t: float, y: np.ndarray, out: np.ndarray) -> None:
-            now = u.extended(t, y[: u.size])
-            out[:] = guards.functional @ now
+            now = free.extended(t, y[: free.size])
+            out[:] = guard @ now
             # what leaves zero is no root: the first steps after an event are of low order, and may dip below zero
-            early = leaves & (out <= 0) & (guards.functional @ u.rates(self.motion, now) >= 0)
+            early = leaves & (out <= 0) & (guard @ (self.motion.rate @ now) >= 0)
             out[early] = np.maximum(size[early], np.finfo(float).tiny)
 
         roots.terminal = [True] * len(leaves)  # type: ignore[attr-defined]

@@ -31,7 +31,7 @@ def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
     import siconos.kernel as kernel
 
     whole = assemble(scene)
-    times, n, body, cavity = time_grid(whole, steps), whole.modes, scene.damper[0], scene.cavity[0]
+    times, n, body, cavity = time_grid(scene, whole, steps), whole.modes, scene.damper[0], scene.cavity[0]
     a, b = body.half_extent
     q, v = np.zeros(n + 3), np.zeros(n + 3)
     scale = whole.scale

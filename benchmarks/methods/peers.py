@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.methods.scenes import charted
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
@@ -121,8 +121,11 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    system, initial = line_start(scene, assemble(scene))
-    return Coupled(system, time_grid(system, steps), start(system, initial))
+    whole = assemble(scene)
+    system, motion = line_system(whole), motion_of(whole, start_of(scene, whole))
+    travel, size = np.where(np.isinf(system.spring), system.free_travel, np.inf), len(system.mass)
+    times = time_grid(scene, whole, steps)._replace(travel=travel)
+    return Coupled(system, times, Motion(motion.q[:size], motion.v[:size]))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:

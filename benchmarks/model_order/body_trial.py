@@ -27,14 +27,14 @@ from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.files.store import write_csv
 from vanedamp.files.toml_input import validate
 
-#: kg, N/m, m: the paper's cluster as one mode, and its undamped amplitude
+#: kg, N/m, m: the paper's cluster as one mode, and its amplitude without bodies
 MASS, STIFFNESS, AMPLITUDE = 0.15696, 3.6046e7, 7e-5
 NATURAL = math.sqrt(STIFFNESS / MASS) / (2 * math.pi)
 #: the scenes of the trial; nothing was settled on them, and other seeds give other scenes for that
 SEED = 2031
 TOLERANCES = (0.2, 0.05)
 # ranges of what is drawn: share of the structure's mass, of the undamped peak, play across (m), length (m), height over
-# length, damping ratio, gravity over the undamped peak's acceleration, all uniform in the logarithm
+# length, damping ratio, gravity over the peak without bodies's acceleration, all uniform in the logarithm
 _RANGES = {
     "mass": (0.005, 0.05), "gap": (0.1, 1.0), "play": (2e-5, 4e-4), "length": (3e-3, 15e-3), "slender": (0.3, 1.2),
     "damping": (1e-3, 5e-3), "gravity": (1e-4, 1.0),

@@ -58,10 +58,10 @@ def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
     if noise > 0.0:
         left.axhline(noise, ls=":", color=GREY, label="95 % confidence of the reference")
     left.set_xlabel("CPU time per excitation period, µs")
-    left.set_ylabel("rms error of the mean amplitude, of the undamped peak")
+    left.set_ylabel("rms error of the mean amplitude, of the peak without bodies")
     left.set_title(f"against one model: {reference['law']}, {reference['modes']} modes; figures: modes", fontsize=10)
     right.set_xlabel("excitation frequency, Hz")
-    right.set_ylabel("mean amplitude, of the undamped peak")
+    right.set_ylabel("mean amplitude, of the peak without bodies")
     for axis in (left, right):
         draw_grid(axis)
     right.legend(fontsize=8)
@@ -91,7 +91,7 @@ def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
     right.set_ylim(bottom=0.0)
     right.set_ylabel("cost over that of the cheapest model within the tolerance")
     for axis in (left, right):
-        axis.set_xlabel("tolerance, of the undamped peak (scenes side by side)")
+        axis.set_xlabel("tolerance, of the peak without bodies (scenes side by side)")
         draw_grid(axis)
         axis.legend(fontsize=8)
     save(figure, path)

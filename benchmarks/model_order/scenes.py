@@ -25,9 +25,9 @@ from vanedamp.rom.truncation import massless
 #: the scenes of the trial; nothing was settled on them, and other seeds give other scenes for that
 SEED = 2028
 _AMPLITUDE = 3e-5
-# ranges of what is drawn: share of the first modal mass, of the undamped peak, of the first frequency
+# ranges of what is drawn: share of the first modal mass, of the peak without bodies, of the first frequency
 _MASS, _GAP, _CONTACT, _RESTITUTION, _FRICTION = (0.005, 0.05), (0.2, 1.0), (3.0, 30.0), (0.5, 0.95), (0.1, 0.5)
-#: gravity in the unit of the undamped peak's acceleration: 9.81 m/s^2 on the cluster
+#: gravity in the unit of the peak without bodies's acceleration: 9.81 m/s^2 on the cluster
 _GRAVITY = 1e-3
 #: a wide band, of the first frequency, and its points in addition to those at the damped peak
 _WIDE, _POINTS = (0.83, 1.04), 8

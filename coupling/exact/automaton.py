@@ -19,9 +19,8 @@ from vanedamp.coupling.exact.contact_states import (
     stop_attached_bodies,
 )
 from vanedamp.coupling.exact.energy_balance import account, account_impact, account_spell
-from vanedamp.coupling.exact.event_functions import AT_START, ENDLESS, carry_over_period, hop_speed, next_event
+from vanedamp.coupling.exact.event_functions import ENDLESS, carry_over_period, hop_speed, next_event
 from vanedamp.coupling.exact.gap_kinematics import (
-    SIMULTANEOUS,
     align_gaps,
     close_gaps,
     join_places,
@@ -33,6 +32,7 @@ from vanedamp.coupling.exact.gap_kinematics import (
 )
 from vanedamp.coupling.exact.impacts import all_in_flight, simultaneous_impacts, single_impact
 from vanedamp.coupling.exact.section import record_start, structure_state
+from vanedamp.coupling.exact.tolerances import INACTIVE, OVERLAP
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     AWAKE,
@@ -67,15 +67,12 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import comparing, entry, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, long_minus_line, secular
+from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
 from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
 
 #: segments after which a run returns to Python, which sees interrupts
 _SLICE = 4096
-#: differences below this share of their terms are round-off
-_EQUAL = 1e-14
-#: modes whose acceleration is below this share of the largest sleep until the next impact
-_ASLEEP = 1e-14
 
 
 @entry
@@ -307,7 +304,7 @@ def _constant_forces(system, flows, st, scratch, s):
             part = system.J[r, i] * st.coordinate_acceleration[i]
             st.free_acceleration[r] += part
             size += abs(part)
-        if abs(st.free_acceleration[r]) <= _EQUAL * size:
+        if abs(st.free_acceleration[r]) <= CANCELLED * size:
             st.free_acceleration[r] = 0.0  # bodies that fall together
     for i in range(n):
         scratch.loads[i] -= system.stiffness[i] * st.constant[i]
@@ -330,7 +327,7 @@ def _constant_forces(system, flows, st, scratch, s):
         for k in range(r_count):
             force -= flows.closed_inverse[s, r, k] * scratch.acceleration[k]
             size += abs(flows.closed_inverse[s, r, k]) * scratch.jerk[k]
-        st.constant_force[r] = force if abs(force) > _EQUAL * size else 0.0
+        st.constant_force[r] = force if abs(force) > CANCELLED * size else 0.0
 
 
 @inlined
@@ -344,7 +341,7 @@ def _select_awake_modes(flows, st):
     last, count = flows.driven[s, e], flows.driven[s, e]
     for j in range(last, st.counters[AWAKE]):
         c = st.amplitude[j]
-        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > INACTIVE * largest:
             count = j + 1
         else:
             st.amplitude[j] = 0.0
@@ -358,7 +355,7 @@ def _wake_modes(flows, st):
     largest, count = _largest_acceleration(flows, st, s, flows.modes[s]), flows.modes[s]
     while count > st.counters[AWAKE]:
         c = st.amplitude[count - 1]
-        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > _ASLEEP * largest:
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > INACTIVE * largest:
             break
         count -= 1
         st.amplitude[count] = 0.0
@@ -488,7 +485,7 @@ def _within_walls(system, st):
     friction = system.friction_rows
     for r in range(friction, len(st.state)):
         pressed = st.state[r] == SPRUNG or st.state[r] == LEAVING
-        if not pressed and not st.displacement[r] >= -1e-9 * system.free_travel[r]:
+        if not pressed and not st.displacement[r] >= -OVERLAP * system.free_travel[r]:
             return False
     return True
 

@@ -17,15 +17,9 @@ from scipy.linalg import qr, solve_triangular
 from scipy.linalg.lapack import dgejsv
 from scipy.sparse.csgraph import connected_components
 
-#: largest condition of the complex modes, their vectors as long as their energy: beyond, two are one to round-off
-DEFECTIVE = 1e7
-#: largest relative residual of an eigenpair, and largest error of a state that is split into modes and put together
-LOST = 1e-9
+from vanedamp.coupling.exact.tolerances import MIXED, NEARLY_EQUAL, SHIFTS
+from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST
 
-#: products of a left and a right vector below this share of their size belong to combinations of equal modes
-_MIXED = 1e-3
-#: condition of modes beyond which some nearly coalesce
-_NEAR = 1e2
 _EPS = float(np.finfo(float).eps)
 #: complex numbers in a batch of eigenpairs that are polished at once
 _BATCH = 1 << 20
@@ -167,12 +161,12 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     # left vectors follow from symmetry, up to combinations of those with the same eigenvalue
     left, norm = _left(values, shapes, w)
     length *= np.linalg.norm(left / np.r_[w, np.ones(k)], axis=1)
-    left /= np.where(np.abs(norm) > _MIXED * length, norm, length)[:, None]
+    left /= np.where(np.abs(norm) > MIXED * length, norm, length)[:, None]
     product, noise = left @ right.T, np.abs(left) @ np.abs(right.T)
     product[np.abs(product) <= 8 * _EPS * noise] = 0.0  # round-off would turn a slow mode's speed into displacement
     if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
         left = np.linalg.solve(product, left)
-    if condition > _NEAR:
+    if condition > NEARLY_EQUAL:
         left += left @ (np.eye(2 * k) - right.T @ left)  # the shares of modes that nearly coalesce must cancel
     return values, shapes, left
 
@@ -200,7 +194,7 @@ def _polish(
     force = (values[:, None] - 1j * w) * (values[:, None] + 1j * w) * better + values[:, None] * (better @ damping)
     slope = 2 * values[:, None] * better + better @ damping
     form, size = (better * slope).sum(axis=1), (np.abs(better) * np.abs(slope)).sum(axis=1)
-    good = np.abs(form) > _MIXED * size  # otherwise a combination of modes with nearly the same eigenvalue
+    good = np.abs(form) > MIXED * size  # otherwise a combination of modes with nearly the same eigenvalue
     values = values - np.where(good, (better * force).sum(axis=1) / np.where(good, form, 1), 0)
     shapes = np.where(good[:, None], better, shapes)
     values.imag[real], shapes.imag[real] = 0.0, 0.0  # a fused multiply-add leaves its round-off there
@@ -219,7 +213,7 @@ def _inverse_step(
     Off it by round-off: the matrix must not be singular to the last bit, as it can be beside two that nearly coalesce.
     """
     diagonal = np.arange(len(w))
-    for shift in (4 * _EPS, 1e-10, 1e-6):
+    for shift in SHIFTS:
         near = values * (1 + shift)
         dynamic = near[:, None, None] * damping * scale[:, :, None] * scale[:, None, :]
         dynamic[:, diagonal, diagonal] += (near[:, None] - 1j * w) * (near[:, None] + 1j * w) * scale**2

@@ -11,6 +11,7 @@ import numpy as np
 from vanedamp.coupling.exact.compliant_contacts import close_pressed_contacts, slide_or_hold, spring_force
 from vanedamp.coupling.exact.event_log import log_changes
 from vanedamp.coupling.exact.gap_kinematics import join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.exact.tolerances import TRAVEL
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -31,11 +32,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
-
-#: forces and accelerations below this share of the terms that they are sums of are round-off
-ROUND_OFF = 1e-12
-#: a spring's force has the round-off of the travel that its compression is a small difference of: this share of it
-TRAVEL = 1e-2
+from vanedamp.coupling.numerics.tolerances import FORCE_ROUND_OFF
 
 
 @inlined
@@ -137,7 +134,7 @@ def _decide(system, st, rec, scratch, k):
         scratch.decision[p], scratch.reaction[p] = problem.state[p], problem.force[p]
         for r in range(len(st.state)):
             scratch.acceleration[r] += system.delassus[r, scratch.listed[p]] * problem.force[p]
-    members = _list_undecided(system, scratch, k, ROUND_OFF * scale)
+    members = _list_undecided(system, scratch, k, FORCE_ROUND_OFF * scale)
     if members > 0 and not _decide_by_rates(system, st, scratch, k, members):
         return False
     for p in range(k):
@@ -150,7 +147,7 @@ def _decide(system, st, rec, scratch, k):
             st.state[r] = HELD if r < friction else TOUCHING
         elif r < friction:
             st.state[r] = SLIP_RIGHT if state == AT_LOW else SLIP_LEFT
-    close_pressed_contacts(system, st, rec, scratch, ROUND_OFF * scale)
+    close_pressed_contacts(system, st, rec, scratch, FORCE_ROUND_OFF * scale)
     return True
 
 

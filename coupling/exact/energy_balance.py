@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.peaks import highest
+from vanedamp.coupling.exact.tolerances import LAST_TERM, SAMPLE
 from vanedamp.coupling.numerics.codes import (
     AWAKE,
     CALM,
@@ -331,7 +332,7 @@ def _driven_integral(c, decay, drive, other, other_decay, other_drive):
         share = 1.0 / n
         product, c, other = share * product, share * c, share * other
         total += product * (1.0 / (n + 1.0))
-        if n > 2 and abs(product.real) + abs(product.imag) <= 1e-18 * (abs(total.real) + abs(total.imag)):
+        if n > 2 and abs(product.real) + abs(product.imag) <= LAST_TERM * (abs(total.real) + abs(total.imag)):
             break
     return total
 
@@ -341,7 +342,7 @@ def _sample(system, flows, st, rec, s, tau, constant):
     """Record response, slips and coordinates at the equidistant sampling times within [time, time + tau)."""
     each = len(rec.samples) // (len(rec.section) - 1)
     start = st.time[0]
-    begin = math.ceil(start / system.period * each - 1e-12)
+    begin = math.ceil(start / system.period * each - SAMPLE)
     for i in range(max(begin, 0), each):
         t = i * system.period / each - start
         if t >= tau:

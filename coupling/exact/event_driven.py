@@ -1,54 +1,29 @@
-"""A run of the exact engine."""
+"""A run of the exact engine of sliders."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.exact import automaton
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.exact.run import EventDrivenRun
+from vanedamp.coupling.exact.segments import event_of, segment_of
 from vanedamp.coupling.exact.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.exact.subsystem_assembly import Subsystem, add_flow, empty_flows
-from vanedamp.coupling.numerics.codes import (
-    AWAKE,
-    DONE,
-    EVALUATIONS,
-    EVENTS,
-    FLOW,
-    ILL_CONDITIONED,
-    IMPACTS,
-    LOGGED,
-    NEEDS_FLOW,
-    PAUSED,
-    PERIOD,
-    SEGMENTS,
-    UNDECIDED,
-)
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.numerics.codes import AWAKE, BOUNDED, CARRIED, FLOW, UNDECIDED
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import restart_state
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.response.segment import Begun, Event, Segment
+from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
 from vanedamp.coupling.system.system import System
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: imbalance of the ledger above which a response is not to be used: ordinary runs stay ten thousand times below
-_OPEN_LEDGER = 1e-6
-
-
-@dataclass
-class _Log:
-    """Chunks of the compiled log, kept or thrown away."""
-
-    keep: bool
-    chunks: list[np.ndarray]
-
-    def take(self, log: np.ndarray, count: int) -> None:
-        if self.keep and count:
-            self.chunks.append(log[:count].copy())
+#: parts of a system that decide its subsystems (exact.subsystem_assembly.Subsystem)
+_OF_SUBSYSTEMS = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
 
 
 def is_common(system: LineSystem, modes: int) -> bool:
@@ -59,24 +34,21 @@ def is_common(system: LineSystem, modes: int) -> bool:
     return system.modes == system.bodies == len(system.frequency) == 1 and len(system.delassus) == modes == 3
 
 
-class EngineRun:
-    """The mutable state of one run and the subsystems it has met.
+class EngineRun(EventDrivenRun):
+    """A run of sliders. system: rows of the whole; known: subsystems that it has met, and those of `reuse`."""
 
-    whole: the scene's system; system: its rows; known: subsystems that earlier runs have met, of this system or of one
-    that differs by its frequency only; new ones are added.
-    """
+    rows_of: ClassVar = staticmethod(rows_of_line)
 
     def __init__(
-        self, whole: System, system: LineSystem, initial: InitialMotion, records: Records, events: bool,
-        max_events: int, known: dict[bytes, Subsystem] | None = None,
+        self, whole: System, system: LineSystem, start: RestartState, records: Records, events: bool,
+        max_events: int,
     ) -> None:  # fmt: skip
-        self.whole, self.system, self.records, self.max_events = whole, system, records, max_events
-        self.known = {} if known is None else known
-        self.begun, self.ended = False, False
+        super().__init__(whole, records, events, max_events)
+        self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
+        self.known: dict[bytes, Subsystem] = {}
         self.flows = empty_flows(system)
-        self.log = _Log(events, [])
         modes = self.flows.eigenvalue.shape[1]
-        self.state = new_state(system, modes, initial)
+        self.state = new_state(system, modes, start)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
         self._advance_compiled = automaton.advance
@@ -84,6 +56,14 @@ class EngineRun:
             self._advance_compiled = automaton.advance.sized(
                 system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
             )
+
+    def reuse(self, earlier: EngineRun) -> None:
+        """Take over the subsystems that an earlier run has met, if its system has the same, at whatever frequency."""
+        if self.whole is earlier.whole:
+            self.flows = earlier.flows
+        pairs = ((getattr(self.whole, name), getattr(earlier.whole, name)) for name in _OF_SUBSYSTEMS)
+        if all(one is other or np.array_equal(one, other) for one, other in pairs):
+            self.known = earlier.known
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Return the code of numerics.codes.
@@ -100,57 +80,32 @@ class EngineRun:
             return UNDECIDED
         return self.advance(0, max_events)
 
-    def advance(self, periods: int, max_events: int) -> int:
-        """Advance to the end of `periods`. Return the code of numerics.codes."""
-        while True:
-            code = self._advance_compiled(
-                self.system, self.flows, self.state, self.event_functions, self.records, self.scratch, periods,
-                max_events,
-            )  # fmt: skip
-            if code == NEEDS_FLOW:
-                code = self._add_flow()
-                if code == DONE:
-                    continue
-            self.log.take(self.records.log, int(self.state.counters[LOGGED]))
-            self.state.counters[LOGGED] = 0
-            if code != PAUSED:
-                return int(code)
+    def _advance(self, periods: int, max_events: int) -> int:
+        return int(self._advance_compiled(
+            self.system, self.flows, self.state, self.event_functions, self.records, self.scratch, periods, max_events
+        ))  # fmt: skip
 
-    def _add_flow(self) -> int:
-        """Add the subsystem that the state calls for. Return DONE or ILL_CONDITIONED."""
-        try:
-            self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
-        except IllConditioned:
-            return ILL_CONDITIONED
-        return DONE
+    def _add_flow(self) -> None:
+        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
 
-    def advance_to(self, periods: int) -> Status:
-        """Advance to the end of `periods`, from the decision of the initial state. Return how that ended."""
-        code = DONE if self.begun else self.begin(self.max_events)
-        code = self.advance(periods, self.max_events) if code == DONE else code
-        self.ended = code != DONE
-        return STATUS_OF[code]
+    def _segment(self) -> Segment:
+        # roots of other segments are none of this
+        self.event_functions.status[int(self.counters[CARRIED]) :] = BOUNDED
+        return segment_of(self.whole, self.system, self._rows, self.flows, self.state)
 
-    def final(self) -> RestartState | None:
-        """Return the state at the end of the periods done; None for a run that ended within one."""
-        if self.ended:
-            return None
-        state, s, n = self.state, int(self.state.counters[FLOW]), self.system.modes
-        awake = slice(state.counters[AWAKE])
+    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
+        work = self.state, self.event_functions, self.scratch
+        return event_of(self.whole, self.system, self._rows, *work, log, since)
+
+    def _left(self) -> RestartState:
+        state, system, s = self.state, self.system, int(self.counters[FLOW])
+        n, b, dampers = system.modes, system.bodies, slice(system.bodies, system.friction_rows)
+        awake = slice(int(self.counters[AWAKE]))
         y = (state.amplitude[awake] @ self.flows.shape[s, awake]).real
         y[: len(state.constant)] += state.constant
-        return restart_state(self.system, InitialMotion(y[:n], y[n:], state.displacement, state.velocity))
-
-    def outcome(self) -> Outcome:
-        """Return the results of the run."""
-        counters = self.state.counters
-        return Outcome(
-            self.whole, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER,
-            {
-                "impacts": int(counters[IMPACTS]),
-                "segments": int(counters[SEGMENTS]),
-                "evaluations": int(counters[EVALUATIONS]),
-                "subsystems": int(np.count_nonzero(self.flows.modes)),
-            },
-            self.log.chunks, rows_of_line(self.whole),
+        elongation = np.where(np.isfinite(system.spring), state.displacement, 0.0)[dampers]
+        parts = (
+            system.scale * y[:n], system.scale * y[n:], state.displacement[:b], state.velocity[:b], elongation,
+            self.whole.travels,
         )  # fmt: skip
+        return RestartState(*map(frozen, parts))

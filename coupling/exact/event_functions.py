@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.root_search import ROUND_OFF, add_secular, expand, first_root_of_parabola, safe_step, shift
+from vanedamp.coupling.exact.root_search import add_secular, expand, first_root_of_parabola, safe_step, shift
+from vanedamp.coupling.exact.tolerances import ADHESION, RECLOSING
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -33,17 +34,8 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import secular_bound
+from vanedamp.coupling.numerics.tolerances import AT_START, CHATTER, RESOLUTION, SUM_ROUND_OFF
 
-#: shortest step in periods: the resolution of a double within a period
-RESOLUTION = 1e-15
-#: time in periods for which a root at the start of a segment is left out where a row has just let go
-AT_START = 1e3 * RESOLUTION
-#: a compliant contact ends when its spring is pulled by this share of the free travel
-ADHESION = 1e-13
-#: rest of a chatter, in periods, that is completed by a plastic impact; a body at rest does not leave for less.
-#: Relative displacement and speed are zero at its end either way: the structure's motion is changed by the order of
-#: (2 pi CHATTER)^3 of it
-CHATTER = 3e-7
 #: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
 #: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
 MOST, ENDLESS = 1_000_000, -3
@@ -135,7 +127,7 @@ def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest
     expansion, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
     """
     whole, slow = expansion.taylor[0], expansion.taylor[1]
-    noise += ROUND_OFF * abs(k0)
+    noise += SUM_ROUND_OFF * abs(k0)
     f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
     if f <= noise:
         if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
@@ -377,7 +369,7 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
         watched.k1[k] += dashpot * acceleration
         _add_drive(system, flows, st, watched, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
-    watched.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
+    watched.noise[k] = RECLOSING * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
 
 

@@ -7,15 +7,10 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.exact.tolerances import CLOSING
 from vanedamp.coupling.numerics.codes import OPEN
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-
-#: gaps closed to this share of the free travel are closed at the same instant
-SIMULTANEOUS = 1e-12
-#: speeds below this share of the largest are round-off
-ROUND_OFF = 1e-13
-#: share of the free travel below which a gap is about to close
-_NEAR = 1e-6
+from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS, SPEED_ROUND_OFF
 
 
 @inlined
@@ -43,7 +38,7 @@ def align_gaps(system, st, y):
     n = len(st.constant)
     for r in range(system.friction_rows, len(st.state)):
         scale = system.free_travel[r]
-        if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
+        if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < CLOSING * scale:
             continue
         k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
         place, speed = 0.0, 0.0
@@ -139,7 +134,7 @@ def slowest(system, st):
     fastest = st.largest_speed[0]
     for r in range(system.friction_rows):
         fastest = max(fastest, abs(st.velocity[r]))
-    return ROUND_OFF * fastest
+    return SPEED_ROUND_OFF * fastest
 
 
 @inlined

@@ -8,16 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.exact.event_log import log_impact
-from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS, close_gaps, join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.exact.gap_kinematics import close_gaps, join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.exact.tolerances import JUMP
 from vanedamp.coupling.numerics.codes import AT_LOW, CLOSED, COAST, DEPENDENT, FREE, OPEN, SPRUNG, STICK
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
+from vanedamp.coupling.numerics.tolerances import COLLAPSE, SIMULTANEOUS
 from vanedamp.coupling.response.records import IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
-
-#: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
-#: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
-COLLAPSE = 1e-13
 
 
 @inlined
@@ -190,7 +188,7 @@ def _apply_impulses(system, st, scratch, k):
             part = system.delassus[r, scratch.listed[p]] * problem.force[p]
             change += part
             size += abs(part)
-        if abs(change) > 1e-13 * size:
+        if abs(change) > JUMP * size:
             speed[r] += change
     measure_gaps(system, st)
     tiny = slowest(system, st)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.exact.tolerances import PEAK
 from vanedamp.coupling.numerics.codes import AWAKE
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
@@ -201,7 +202,7 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
             top = x + step * (v + step * (w / 2 + step * (third / 6 + step * (fourth / 24 + step * fifth / 120))))
             square = step * step
             # x has no slope there: a step that is wrong by its square root leaves its digits
-            if sixth * square * square * square < 1e-13 * abs(top):
+            if sixth * square * square * square < PEAK * abs(top):
                 return top
             t += step
         else:

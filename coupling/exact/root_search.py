@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.exact.tolerances import AT_ROOT, NEAR_ROOT
 from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
 from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
@@ -32,6 +33,7 @@ from vanedamp.coupling.numerics.exponentials import (
     secular,
     secular_bound,
 )
+from vanedamp.coupling.numerics.tolerances import SUM_ROUND_OFF
 from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
@@ -41,14 +43,10 @@ _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
 # places in the sums over modes: derivatives up to the bound of order DEGREE, a bound of the second, sizes
 _SECOND, _SIZE, _SUMS = DEGREE + 1, DEGREE + 2, DEGREE + 3
 
-#: round-off of a sum, relative to the sum of its terms' sizes
-ROUND_OFF = 4.0 * 2.0**-52
 # a step that long, in units of (second bound / last bound)^(1 / (DEGREE - 2)), leaves out a few thousandths
 _REACH = 3.6
 # modes faster than this times the first, squared, are fast
 _FAST = 4.0
-# Newton's iteration: a correction below a share leaves an error of about its square
-_NEAR, _CONVERGED = 1e-2, 1e-8
 
 
 @record
@@ -104,7 +102,7 @@ def add_secular(order, drive, driven, eigenvalue, t, period, taylor):
             for polynomial in (whole, slow):
                 polynomial[DEGREE] += left_out
             second += secular_bound(d, rate, excitation, period, 2)
-    return ROUND_OFF * noise, second
+    return SUM_ROUND_OFF * noise, second
 
 
 @inlined
@@ -179,11 +177,11 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     else:
         noise = size
     if all_slow:
-        return ROUND_OFF * noise, slow[_SECOND], -1.0, 0.0
+        return SUM_ROUND_OFF * noise, slow[_SECOND], -1.0, 0.0
     for p in range(2, DEGREE + 1):
         quiet[p] = slow[p] * _OVER_FACTORIAL[p]
     quiet[0], quiet[1] = whole[0] - fast[0], whole[1] - fast[1]
-    return ROUND_OFF * noise, slow[_SECOND] + fast[_SECOND], slow[_SECOND], fast[_SIZE]
+    return SUM_ROUND_OFF * noise, slow[_SECOND] + fast[_SECOND], slow[_SECOND], fast[_SIZE]
 
 
 @inlined
@@ -359,16 +357,16 @@ def safe_step(a, sign, f, far, noise, second, longest):
         if not 0.0 < better <= reach:
             break
         root = better
-        if abs(change) < _NEAR * root:
+        if abs(change) < NEAR_ROOT * root:
             if _remainder(a, root) > noise:
                 break
-            if abs(change) < _CONVERGED * root:
+            if abs(change) < AT_ROOT * root:
                 least, most = _bounds(a, sign, f, root)
                 if least > noise:
                     return root, True, most <= top
                 break
     # short of the lower polynomial's root: from there the function's own is seen
-    h = root * (1.0 - 0.1 * _NEAR)
+    h = root * (1.0 - 0.1 * NEAR_ROOT)
     positive, clear = _without_root(a, sign, f, h, noise, top)
     if positive:
         return h, False, clear

@@ -15,7 +15,8 @@ from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.line_system import LineSystem, row_motion
 
 
 @record
@@ -127,17 +128,19 @@ class Scratch(NamedTuple):
     problem: Problem
 
 
-def new_state(system: LineSystem, modes: int, initial: InitialMotion) -> State:
+def new_state(system: LineSystem, modes: int, start: RestartState) -> State:
     """Return the state at time zero; `modes` is the room for complex modes."""
+    p, rate = (structure / system.scale for structure in (start.displacement, start.velocity))
+    displacement, velocity = row_motion(system, start.slip, start.slip_velocity, p, rate, start.elongation)
     r, n, b = len(system.delassus), system.modes, system.bodies
     state = State(
         counters=np.zeros(COUNTERS, np.int64),
         time=np.zeros(1),
         amplitude=np.zeros(modes, complex),
         change=np.zeros(2 * modes),
-        displacement=np.array(initial.displacement),
+        displacement=displacement,
         low_word=np.zeros(r),
-        velocity=np.array(initial.velocity),
+        velocity=velocity,
         contact_impulse=np.zeros(r),
         ledger=np.zeros(len(ENERGIES)),
         largest_speed=np.zeros(1),
@@ -147,7 +150,7 @@ def new_state(system: LineSystem, modes: int, initial: InitialMotion) -> State:
         released=np.zeros(r, np.int64),
         applied_force=np.zeros(r),
         capture_speed=np.zeros(r),
-        coordinates=np.r_[initial.p, initial.p_rate],
+        coordinates=np.r_[p, rate],
         constant=np.zeros(n),
         offset=np.zeros(1),
         slip_constant=np.zeros(b),

@@ -23,26 +23,16 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
+from vanedamp.coupling.exact.complex_modes import IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.exact.peaks import GRIDS
+from vanedamp.coupling.exact.tolerances import DRIVEN, FAR, MOVES_ALIKE, SLOW, UNFELT
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with
+from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
 from vanedamp.coupling.system.line_system import LineSystem
 
-#: products of modes that change by less than this share over a period have no antiderivative worth having
-SLOW = 1e-2
-#: share of its terms below which the motion of a row is round-off
-HELD_STILL = 1e-14
 #: bytes that the subsystems of one run may take
 ROOM = 2**29
-#: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
-FAR = 1e-6
-#: least share of a coordinate in the rows, relative to the largest, that the check of cancellation assumes
-_UNFELT = 1e-8
-#: modes with |i omega_h - lambda| times the period below this are driven. Beyond, the response in step with the
-#: excitation is at most 1/NEAR times the growth in one period: less than two digits cancel. Driven modes cost time: a
-#: wider bound would slow down scenes more than 0.3 % off their resonance. numerics.exponentials.secular relies on it
-NEAR = 2e-2
 
 #: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
 _Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -289,7 +279,7 @@ def _fill(flows: Flows, system: LineSystem, s: int, subsystem: Subsystem) -> Non
     motion = functional @ full[:n] + system.of_bodies.J @ own
     terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(system.of_bodies.J) @ np.abs(own)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
-    flows.motion[s, :, :m] = np.where(np.abs(motion) <= HELD_STILL * terms, 0, motion)
+    flows.motion[s, :, :m] = np.where(np.abs(motion) <= CANCELLED * terms, 0, motion)
     flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
     flows.static[s], flows.constrained[s, : len(subsystem.kept)] = subsystem.static, subsystem.kept
     flows.response[s, :m] = system.of_structure.response @ full[:n]
@@ -316,7 +306,7 @@ def _check_split(
     by its own frequency or that of the excitation.
     """
     n, b = system.modes, system.bodies
-    size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
+    size = np.r_[1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
     stiffness = np.r_[system.of_structure.stiffness, np.zeros(b)] + system.spring[sprung] @ law**2
     rate = np.maximum(system.omega, np.sqrt(stiffness / np.r_[np.ones(n), system.of_bodies.mass]))
     size = np.r_[size, size * rate]
@@ -356,7 +346,7 @@ def _fill_forces(
     flows.closed_inverse[s][np.ix_(rigid, rigid)] = inverse
     force = -inverse @ acceleration[rigid]
     # a contact without force has none, not round-off, or it would open and close at every tick of the clock
-    force[np.abs(force) <= 1e-14 * (np.abs(inverse) @ size[rigid])] = 0.0
+    force[np.abs(force) <= CANCELLED * (np.abs(inverse) @ size[rigid])] = 0.0
     flows.force[s, rigid, :m] = force
 
 
@@ -372,7 +362,7 @@ def _excite(
     for h in np.flatnonzero(load.any(axis=0)):  # without load: free decay, at any frequency
         omega = system.frequency[h]
         apart = 1j * omega - eigenvalue
-        driven = np.abs(apart) * system.period < NEAR
+        driven = np.abs(apart) * system.period < DRIVEN
         if not driven.any():
             dynamic = stiffness + 1j * omega * damping - omega**2 * np.eye(k)
             harmonic[:, h] = np.linalg.solve(dynamic, load[:, h])
@@ -550,7 +540,7 @@ def _attachment(system: LineSystem, closed: np.ndarray) -> tuple[np.ndarray, np.
         if len(unknown):
             carrier[unknown[0]] = -functional / system.of_bodies.J[r, unknown[0]]
             known[unknown[0]] = True
-        elif np.linalg.norm(functional) > 1e-12 * np.linalg.norm(system.of_structure.J[r]):
+        elif np.linalg.norm(functional) > MOVES_ALIKE * np.linalg.norm(system.of_structure.J[r]):
             inner.append(functional)
     cluster = _connected([np.flatnonzero(system.of_bodies.J[r]) for r in remaining], b)
     numbers = np.unique(cluster[~known])
@@ -577,7 +567,7 @@ def _functional(system: LineSystem, carrier: np.ndarray) -> np.ndarray:
     """Return the functional of p in each row (r, n); exactly zero where both sides of the row move alike."""
     functional: np.ndarray = system.of_structure.J + system.of_bodies.J @ carrier
     scale = (np.abs(system.of_structure.J) + np.abs(system.of_bodies.J) @ np.abs(carrier)).max(axis=1, initial=0)
-    functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
+    functional[np.abs(functional).max(axis=1, initial=0) <= MOVES_ALIKE * scale] = 0
     return functional
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 if TYPE_CHECKING:
     from vanedamp.coupling.response.evaluation import Run
     from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.response.restart_state import RestartState
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.scene.solver_options import SolverOptions
     from vanedamp.coupling.system.system import System
@@ -39,10 +40,9 @@ class Variant(NamedTuple):
 class Method(Protocol):
     """The contract of a method.
 
-    It may also have RESTARTS = True: its runs leave a state, and `begin` takes one as a further argument `start`. And
-    WAVEFORMS = True: it takes an excitation that is no sum of the system's harmonics, whose loads (k, N), N, at angles
-    omega t (k,) in [0, 2 pi), system.assembly.loads_of returns, in place of those of the system. Other methods reject
-    such an excitation.
+    It may also have RESTARTS = True: its runs leave a state that others can begin with. And WAVEFORMS = True: it takes
+    an excitation that is no sum of the system's harmonics, whose loads (k, N), N, at angles omega t (k,) in [0, 2 pi),
+    system.assembly.loads_of returns, in place of those of the system. Other methods reject such an excitation.
 
     A method that takes bodies in the plane has PLANAR_LAWS: what it takes there apart from rigid contacts of one
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
@@ -52,10 +52,11 @@ class Method(Protocol):
     Options: type[SolverOptions]
     VARIANTS: Sequence[Variant]
 
-    def begin(self, scene: Scene, system: System, records: Records, events: bool) -> Run:
+    def begin(self, scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
         """Return a run of a scene at time zero; `scene.solver` is an instance of Options.
 
         system: of the scene; a method for bodies that only slide may take its rows (system.line_system). records: room
-        for all periods, to be filled (response.recorder); events: whether to keep a log of them. Raises InputError for
-        an impossible scene.
+        for all periods, to be filled (response.recorder); events: whether to keep a log of them. start: where the run
+        begins, of the scene or of another run; response.restart.motion_of has its coordinates. Raises InputError for an
+        impossible scene.
         """

@@ -1,4 +1,4 @@
-"""The time grid and the motion of methods that take time steps."""
+"""The equations of motion of methods that take time steps: loads on the grid of a period, matrices, and the motion."""
 
 from __future__ import annotations
 
@@ -8,85 +8,120 @@ import numpy as np
 
 from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.response.restart import motion_of
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, loads_of
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import System, on_structure
+
+
+@record
+class Sparse(NamedTuple):
+    """A square matrix (N, N) without its zeros: up to k entries in each row, the others zeros in column 0."""
+
+    column: np.ndarray  # (N, k) unsigned: no place from the end
+    value: np.ndarray  # (N, k)
 
 
 @record
 class TimeGrid(NamedTuple):
-    """The steps of an excitation period."""
+    """The steps of an excitation period, and what acts on N coordinates and u contacts in them."""
 
     step: float  # s
     phase: np.ndarray  # (steps + 1, 2) cos and sin of omega t within a period
     load: np.ndarray  # (steps + 1, N) of the excitation, N
     table: np.ndarray  # (steps + 1, 2) displacement and velocity of a base whose motion is the response
-    travel: np.ndarray  # (r,) free travel of a rigid contact's cavity, m; inf: nothing to check
+    travel: np.ndarray  # (u,) free travel of a rigid contact, m; inf: nothing to check
+    stiffness: Sparse  # (N, N)
+    damping: Sparse  # (N, N)
 
 
 @record
 class Motion(NamedTuple):
-    """The state of a run, advanced in place."""
+    """The state of a run, advanced in place. Sizes as in System."""
 
     # changes in every step
-    q: np.ndarray  # (N,) coordinates
-    v: np.ndarray  # (N,) their velocities
+    q: np.ndarray  # (N,)
+    v: np.ndarray  # (N,)
     half: np.ndarray  # (N,) velocity half a step later (central differences), or acceleration (Newmark)
-    force: np.ndarray  # (r,) of rows, N
-    elongation: np.ndarray  # (friction rows,) of Jenkins elements' springs, m
-    deepest: np.ndarray  # (1,) largest penetration relative to the free travel
-    losses: np.ndarray  # (6,) energies since the start, J
+    force: np.ndarray  # (2u,) of rows, N
     counters: np.ndarray  # (COUNTERS,) int
+    ledger: np.ndarray  # (6,) J
+    deepest: np.ndarray  # (1,) largest penetration relative to the free travel
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
+    lifted: np.ndarray  # (periods + 1, b) time without an impulse at the floor, s
+    sampled: np.ndarray  # (samples, N) coordinates
+    shut: np.ndarray  # (samples, u) int: whether contacts carry force
+
+    # constant
+    spring: np.ndarray  # (u,) stiffness of contacts, N/m; 0: rigid
+    live: np.ndarray  # int: rows that may carry a force
 
     # changes with the contacts
-    active: np.ndarray  # (r,) int: contacts that carry force
-    speed: np.ndarray  # (r,) at the beginning of the present contact, m/s
-    begun: np.ndarray  # (r,) time of that, s
-    impulse: np.ndarray  # (r,) since then, N s
+    active: np.ndarray  # (u,) int: contacts that carry force
+    speed: np.ndarray  # (u,) at the beginning of the present contact, m/s
+    begun: np.ndarray  # (u,) time of that, s
+    total: np.ndarray  # (2u,) impulse since then, N s
+    lost: np.ndarray  # (u,) energy that it took since then, J
+
+    # of a step
+    start: np.ndarray  # (2, N) coordinates and velocities as it begins
+    response: np.ndarray  # (2,) displacement and velocity of the response then
+    before: np.ndarray  # (2u,) speeds of the rows then
+    gap: np.ndarray  # (2, u) gaps of the contacts as it ends, and as it began, m
+    impulse: np.ndarray  # (2u,) of the rows
+    slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
 
     # scratch, named where each method takes it
-    coordinates: np.ndarray  # (6, N)
-    rows: np.ndarray  # (8, r)
-    listed: np.ndarray  # (r,) int: rows in the problem of a step
+    coordinates: np.ndarray  # (5, N)
+    rows: np.ndarray  # (4, 2u)
 
 
-def line_loads(scene: Scene, line: LineSystem) -> Loads | None:
-    """Return the loads (k, N) of an excitation that is no sum of sines, on sliders; None for others."""
-    signal = scene.excitation.signal
-    if signal is None:
-        return None
-    loads, size = loads_of(scene, signal), len(line.mass)
-    return lambda angle: loads(angle)[:, :size]
+def sparse(matrix: np.ndarray) -> Sparse:
+    """Return a square matrix without its zeros."""
+    most = int((matrix != 0.0).sum(axis=1).max(initial=0))
+    column, value = np.zeros((len(matrix), most), np.uint64), np.zeros((len(matrix), most))
+    for i, row in enumerate(matrix):
+        found = np.flatnonzero(row)
+        column[i, : len(found)], value[i, : len(found)] = found, row[found]
+    return Sparse(column, value)
 
 
-def line_grid(scene: Scene, line: LineSystem, steps: int) -> TimeGrid:
-    """Return the grid of `steps` steps per period of a scene of sliders."""
-    return time_grid(line, steps, line_loads(scene, line))
-
-
-def time_grid(system: LineSystem | System, steps: int, loads: Loads | None = None) -> TimeGrid:
-    """Return the grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
+def time_grid(scene: Scene, system: System, steps: int) -> TimeGrid:
+    """Return the grid of `steps` steps per period."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
-    phases = system.phases(angle)
     table = np.column_stack([system.table, 1j * system.frequency * system.table])
-    travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
-    load = (phases @ system.load).real if loads is None else loads(angle[:-1])[[*range(steps), 0]]
+    load = loads_at(scene, system)(angle[:-1])
     return TimeGrid(
         step=system.period / steps, phase=np.column_stack([np.cos(angle), np.sin(angle)]),
-        load=np.ascontiguousarray(load), table=np.ascontiguousarray((phases @ table).real),
-        travel=travel,
+        load=np.vstack([load, load[:1]]), table=np.ascontiguousarray((system.phases(angle) @ table).real),
+        travel=np.where(np.isinf(system.spring), system.free_travel, np.inf),
+        stiffness=sparse(system.stiffness), damping=sparse(system.damping),
     )  # fmt: skip
 
 
-def start(system: LineSystem, initial: InitialMotion) -> Motion:
-    """Return the motion at time zero."""
-    size, r, b = len(system.mass), len(system.J), system.bodies
-    q = np.concatenate([initial.p, initial.displacement[:b] + system.floor @ initial.p])
-    v = np.concatenate([initial.p_rate, initial.velocity[:b] + system.floor @ initial.p_rate])
-    return Motion(
-        q=q, v=v, half=np.zeros(size), force=np.zeros(r), elongation=np.zeros(system.friction_rows),
-        active=np.zeros(r, np.int64), speed=np.zeros(r), begun=np.zeros(r), impulse=np.zeros(r), deepest=np.zeros(1),
-        losses=np.zeros(6), counters=np.zeros(COUNTERS, np.int64),
-        coordinates=np.zeros((6, size)), rows=np.zeros((8, r)), listed=np.zeros(r, np.int64),
+def loads_at(scene: Scene, system: System) -> Loads:
+    """Return the loads (k, N) of the excitation at angles omega t (k,), sum of sines or not."""
+    signal = scene.excitation.signal
+    return loads_of(scene, signal) if signal else lambda angle: (system.phases(angle) @ system.load).real
+
+
+def start(system: System, begun: RestartState, records: Records, spring: np.ndarray) -> tuple[System, Motion]:
+    """Return the system whose slips of Jenkins elements are those of what draws them, and its motion at time zero.
+
+    spring: (u,) as in Motion.
+    """
+    initial = motion_of(system, begun)
+    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
+    contact, samples = np.arange(u) < system.contacts, len(records.samples)
+    return on_structure(system), Motion(
+        q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
+        counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
+        tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies), sampled=np.zeros((samples, size)),
+        shut=np.zeros((samples, u), np.int8), spring=spring,
+        live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
+        speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
+        response=np.zeros(2), before=np.zeros(2 * u), gap=np.zeros((2, u)), impulse=np.zeros(2 * u),
+        slowest=np.zeros(1), coordinates=np.zeros((5, size)), rows=np.zeros((4, 2 * u)),
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.scene.solver_options import PlanarOptions
@@ -26,13 +26,9 @@ class Options(PlanarOptions):
     """"exact": event by event, without time steps"""
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState | None = None) -> Run:
-    """Return a run by the engine, of sliders or for bodies in the plane, whose kernels are loaded when wanted."""
-    if scene.planar:
-        from vanedamp.coupling.planar.planar_run import begin_run
+def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
+    """Return a run by the engine, whose kernels are loaded when they are wanted."""
+    from vanedamp.coupling.methods.engines import engine_run
 
-        return begin_run(scene, system, records, events, scene.solver.max_events, start)
-    from vanedamp.coupling.exact.event_driven import EngineRun
-    from vanedamp.coupling.response.restart import line_start
-
-    return EngineRun(system, *line_start(scene, system, start), records, events, scene.solver.max_events)
+    options: Any = scene.solver
+    return engine_run(system, start, records, events, options.max_events, options.linearisation)

@@ -1,9 +1,11 @@
-"""Moreau-Jean time stepping: velocities and impulses over a step, contacts and friction by one exact small problem.
+"""Moreau-Jean time stepping: velocities and impulses over a step, contacts and friction by one small problem.
 
-Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part, Newton's law and Coulomb's on
-velocities; a contact takes part in a step if its gap, half a step ahead, is closed. Second order where no row is
-active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a problem of its own,
-after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, implicitly.
+Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part, Newton's law on normal
+velocities and Coulomb's on slips; a contact takes part in a step if its gap, half a step ahead, is closed. Second order
+where no row is active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a
+problem of its own, after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, by their
+mean force over the step. In the plane impulses never bring energy (Kane's paradox): all coefficients of restitution are
+smaller by one factor then, as in planar.impacts.
 """
 
 from __future__ import annotations
@@ -15,43 +17,49 @@ import numpy as np
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, line_grid, start
-from vanedamp.coupling.methods.planar.start import planar_start
-from vanedamp.coupling.methods.step_problem import list_row, solve_rows
+from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse, start, time_grid
+from vanedamp.coupling.methods.step_problem import (
+    GAUSS_SEIDEL,
+    couple_row,
+    list_row,
+    new_step_problem,
+    solve_rows,
+)
 from vanedamp.coupling.methods.step_records import (
-    apply_inverse,
     close_step,
-    damping_force,
-    end_period,
-    load_at,
+    drag_sliders,
     open_step,
+    product,
     record_start,
-    row_speed,
+    set_gaps,
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
-from vanedamp.coupling.numerics.complementarity import new_problem
-from vanedamp.coupling.planar.recorder import plane_of
+from vanedamp.coupling.planar.unit_kinematics import elongation, has_friction, is_rigid, row_speed
 from vanedamp.coupling.response.evaluation import Run
-from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
 WAVEFORMS = True
-PLANAR_LAWS = ("two_phases", "depends_on_speed")
+PLANAR_LAWS = ("yields", "two_phases", "depends_on_speed")
 
-#: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
-_TURNS, _ROUND_OFF = 20, 1e-12
-#: row of Motion.rows: whether a rigid contact is closed
-_CLOSED = 4
+#: problems that a step may take, the last with all contacts at once
+_TURNS = 20
+#: share of the speeds in a scene by which a sweep may still change one, and below which a contact counts as at rest
+_TOLERANCE, _AT_REST = 1e-13, 1e-10
+#: bisections of the factor of the coefficients; energy that impulses may bring, as a share of what they move
+_HALVINGS, _GAIN = 40, 1e-10
+#: share of the play by which round-off may open a gap
+_ROUND_OFF = 1e-12
+#: row of Motion.coordinates: velocities at the step's end; rows of Motion.rows, by units
+_FREE, _CLOSED, _APPROACH = 0, 0, 1
 
 
 class Options(SteppingOptions, PlanarOptions):
@@ -61,162 +69,286 @@ class Options(SteppingOptions, PlanarOptions):
     """"moreau": time stepping by Moreau and Jean, with impulses"""
     theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
     """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
+    contacts: Literal["exact", "gauss_seidel"] | None = None
+    """impulses of a step by pivots, "exact", or by projected Gauss-Seidel iteration, "gauss_seidel", to round-off
+    (default: "exact" for sliders, "gauss_seidel" for bodies in the plane)"""
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
     """Return a run. Raises InputError for bodies that overlap at the start."""
     options: Any = scene.solver
-    if scene.planar:
-        return _begin_planar(scene, system, options, records, events)
-    line, initial = line_start(scene, system)
-    times, theta, problem = line_grid(scene, line, options.steps_per_period), options.theta, new_problem(len(line.J))
-    matrices = moreau_matrices(line, times, theta)
+    rigid = np.isinf(system.spring)
+    moving, motion = start(system, begun, records, np.where(rigid, 0.0, system.spring))
+    times, theta = time_grid(scene, system, options.steps_per_period), options.theta
+    inverse, turned, mobility = moreau_matrices(moving, times.step, theta)
+    exact = not system.in_plane if options.contacts is None else options.contacts == "exact"
+    problem = new_step_problem(moving, mobility, exact)
     budget, deepest = options.max_events, options.penetration
 
-    def march(motion: Motion, log: np.ndarray, until: int) -> int:
-        return march_moreau(line, times, motion, records, log, problem, *matrices, theta, until, budget, deepest)
+    def march(log: np.ndarray, until: int) -> int:
+        return march_moreau(
+            moving, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest
+        )
 
-    rows = rows_of_line(system)
-    return SteppedRun(system, rows, march, start(line, initial), records, events, options.smallest_steps)
-
-
-def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
-    """Return a run of bodies in the plane."""
-    from vanedamp.coupling.methods.planar import moreau as planar  # its kernels are loaded when they are wanted
-    from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
-
-    system, initial, times = planar_start(scene, whole, options.steps_per_period)
-    theta, budget, deepest = options.theta, options.max_events, options.penetration
-    matrices = planar.step_matrices(system, times.step, theta)
-
-    def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
-        return planar.march(system, times, motion, records, log, *matrices, theta, until, budget, deepest)
-
-    motion, steps = start_steps(system, initial, records), options.smallest_steps
-    plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(system, rows_of_units(system), march, motion, records, events, steps, plane)
+    return SteppedRun(system, march, motion, records, events, options)
 
 
-def moreau_matrices(system: LineSystem, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
-    h = times.step
-    matrix = np.diag(system.mass + (h * theta) ** 2 * system.stiffness) + h * theta * system.damping
+def moreau_matrices(system: System, step: float, theta: float) -> tuple[Sparse, np.ndarray, np.ndarray]:
+    """Return the inverse of the iteration matrix, its product with J^T (N, 2u), and the rows' mobility (2u, 2u)."""
+    matrix = np.diag(system.mass) + (step * theta) ** 2 * system.stiffness + step * theta * system.damping
     inverse = np.linalg.inv(matrix)
     turned = inverse @ system.J.T
-    return inverse, turned, system.J @ turned
+    return sparse(inverse), turned, system.J @ turned
 
 
 @entry
-def march_moreau(
-    system, times, motion, records, log, problem, inverse, turned, mobility, theta, until, budget, deepest
-):
+def march_moreau(system, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
-    size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
-    q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
-    impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
+    size, h, steps = len(motion.q), times.step, len(times.phase) - 1
+    q, v, free = motion.start[0], motion.start[1], motion.coordinates[_FREE]
+    load, ahead = motion.coordinates[1], motion.coordinates[2]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
     while motion.counters[STEPS] < until:
         k = motion.counters[STEPS] % steps
-        open_step(system, times, motion, records, k, q, v, before)
+        open_step(system, times, motion, records, k)
         for i in range(size):
-            load = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
-            rhs[i] = h * (load - damping_force(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
-        apply_inverse(inverse, system.proportional, rhs, free)
+            ahead[i] = q[i] + h * theta * v[i]
         for i in range(size):
-            free[i] += v[i]
-        for r in range(rows):
-            speed[r], impulse[r] = row_speed(system, r, v), 0.0
-        if not _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
+            mean = theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i] + system.weight[i]
+            load[i] = h * (mean - product(times.damping, i, v) - product(times.stiffness, i, ahead))
+        for i in range(size):
+            free[i] = v[i] + product(inverse, i, load)
+        if not _impulses(system, motion, problem, turned, h, theta):
             return UNDECIDED
         for i in range(size):
             motion.v[i] = free[i]
             motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
-        for r in range(system.friction_rows):
-            if system.spring[r] != math.inf and system.limit[r] > 0.0:
-                motion.elongation[r] = -impulse[r] / (h * system.spring[r])
-        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
+        drag_sliders(system, motion.q)
+        set_gaps(system, motion)
+        code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code
-        if k == steps - 1:
-            code = end_period(system, times, motion, records, budget)
-            if code != DONE:
-                return code
     return DONE
 
 
 @inlined
-def _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
-    """Set the impulses (r,) of a step; `free` (N,) becomes the velocity at its end. Returns False if undecided.
+def _impulses(system, motion, problem, turned, h, theta):
+    """Set the impulses of a step and the velocities that they leave. Returns False if undecided.
 
     A contact that parts as the step begins waits. Where impulses of others drive it together, it meets a second impact
     after theirs, at its new speed: in one problem with them it would end without rebound, and since nothing opens an
     overlap without speed, bodies in a row would fly as one ever after.
     """
-    slowest = 0.0
-    for r in range(system.friction_rows, len(system.J)):
-        slowest = max(slowest, _ROUND_OFF * abs(speed[r]))
+    u, free, closed, shut = len(system.rest), motion.coordinates[_FREE], motion.rows[_CLOSED], False
+    for r in range(u):
+        motion.impulse[r], motion.impulse[u + r], motion.before[r], closed[r] = 0.0, 0.0, 0.0, 0.0
+        if has_friction(system, r):
+            motion.before[u + r] = row_speed(system, u + r, motion.v)
+        if r < system.contacts:
+            motion.before[r] = row_speed(system, r, motion.v)
+            if is_rigid(system, r):
+                ahead = motion.gap[0, r] + 0.5 * h * motion.before[r]
+                closed[r] = 1.0 if ahead <= _ROUND_OFF * system.play[r] else 0.0
+                shut = shut or closed[r] > 0.0
+    fastest = _speeds(system, motion) if shut or problem.solver == GAUSS_SEIDEL else 0.0
+    motion.slowest[0] = _AT_REST * fastest
+    if system.two_phases and shut and not _two_phases(system, motion, problem, turned, _TOLERANCE * fastest):
+        return False
     for turn in range(_TURNS):
-        last = turn == _TURNS - 1
-        count = _list_rows(system, times, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last)
+        count = _list_rows(system, motion, problem, h, theta, turn)
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
-        if not solve_rows(problem, count):
+        if not _rebound(system, motion, problem, count, turn, _TOLERANCE * fastest):
             return False
-        for a in range(count):
-            r = motion.listed[a]
-            impulse[r] += problem.force[a]
-            for i in range(len(free)):
-                free[i] += turned[i, r] * problem.force[a]
-        if not _approaching(system, motion, free, slowest):
+        _push(system, motion, problem, count, turned)
+        approaching = False
+        for r in range(system.contacts):
+            approaching = approaching or (closed[r] > 0.0 and row_speed(system, r, free) < -motion.slowest[0])
+        if not approaching:
             return True
     return True
 
 
+@kernel
+def _speeds(system, motion):
+    """Return the largest sum of the parts of a row's speed as the step begins or ends, m/s."""
+    fastest, free = 0.0, motion.coordinates[_FREE]
+    for row in range(len(system.J)):
+        size = 0.0
+        for i in range(len(free)):
+            size += abs(system.J[row, i]) * max(abs(free[i]), abs(motion.v[i]))
+        fastest = max(fastest, size)
+    return fastest
+
+
 @inlined
-def _approaching(system, motion, free, slowest):
-    """Whether a closed rigid contact still approaches."""
-    for r in range(system.friction_rows, len(system.J)):
-        if motion.rows[_CLOSED, r] > 0.0 and row_speed(system, r, free) < -slowest:
-            return True
-    return False
+def _push(system, motion, problem, count, turned):
+    """Let the impulses of a problem act."""
+    free = motion.coordinates[_FREE]
+    for a in range(count):
+        row, impulse = problem.row[a], problem.box.force[a]
+        motion.impulse[row] += impulse
+        for i in range(len(free)):
+            free[i] += turned[i, row] * impulse
 
 
 @kernel
-def _list_rows(system, times, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
-    """Set up the problem of the rows that take part in a turn. Return their number."""
-    h, count, closed = times.step, 0, motion.rows[_CLOSED]
-    for r in range(len(system.J)):
-        low, high, shift, soft = 0.0, np.inf, 0.0, 0.0
-        now = row_speed(system, r, free)
-        if turn == 0:
-            closed[r] = 0.0
-        if r < system.friction_rows:
-            if system.limit[r] == 0.0:
+def _two_phases(system, motion, problem, turned, tolerance):
+    """Let the impulses of impacts act, compression and expansion, which the loads of the step come after.
+
+    In one problem with the loads, what they press would expand as well: a body at rest would hop. Returns False if
+    they are not found.
+    """
+    u, box, approach = len(system.rest), problem.box, motion.rows[_APPROACH]
+    for turn in range(_TURNS):
+        count, approaching = 0, False
+        for r in range(system.contacts):
+            if motion.rows[_CLOSED, r] == 0.0:
                 continue
-            low, high = -h * system.limit[r], h * system.limit[r]
-            if system.spring[r] != math.inf:
-                shift, soft = motion.elongation[r] / h, 1.0 / (h * h * system.spring[r])
+            speed, slip = motion.before[r], motion.before[u + r]
+            for row in range(2 * u):
+                speed += problem.mobility[r, row] * motion.impulse[row]
+                slip += problem.mobility[u + r, row] * motion.impulse[row]
+            approaching = approaching or speed < -motion.slowest[0]
+            if speed <= motion.slowest[0] or turn == _TURNS - 1:
+                list_row(problem, count, r, speed, 0.0, math.inf, 0.0)
+                approach[r] = -speed
+                count = _list_slip(system, problem, count, r, slip, 0.0, 0.0)
+        if not approaching:
+            return True
+        for phase in range(2):
+            if not solve_rows(problem, count, 1.0, tolerance):
+                return False
+            _push(system, motion, problem, count, turned)
+            for a in range(count):
+                problem.now[a] = box.acceleration[a]
+            if phase == 0:
+                _expand(system, problem, count, approach)
+                _push(system, motion, problem, count, turned)
+    return True
+
+
+@inlined
+def _expand(system, problem, count, approach):
+    """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
+    box = problem.box
+    for a in range(count):
+        r = problem.row[a]
+        box.force[a] = restitution_at(system, r, approach[r]) * box.force[a] if r < len(system.rest) else 0.0
+    for a in range(count):
+        for c in range(count):
+            problem.now[a] += box.matrix[a, c] * box.force[c]
+        if problem.friction[a] > 0.0:
+            bound = problem.friction[a] * box.force[problem.normal[a]]
+            box.low[a], box.high[a] = -bound, bound
+
+
+@inlined
+def _list_slip(system, problem, count, r, now, bound, had):
+    """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
+
+    bound, had: of its impulse by the normal impulse of the turns before, and that impulse, N s.
+    """
+    if system.friction[r] > 0.0:
+        list_row(problem, count + 1, len(system.rest) + r, now, -bound - had, bound - had, 0.0)
+        couple_row(problem, count + 1, count, system.friction[r])
+        return count + 2
+    return count + 1
+
+
+@kernel
+def _list_rows(system, motion, problem, h, theta, turn):
+    """Set up the problem of the rows that take part in a turn. Return their number."""
+    u, count, free, slowest = len(system.rest), 0, motion.coordinates[_FREE], motion.slowest[0]
+    first = u - len(system.tangential)
+    for place in range(u):
+        r = problem.order[place]
+        if r >= system.contacts:
+            low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
+            now, soft = row_speed(system, u + r, free), 0.0
+            if r >= first:
+                stretched = elongation(system, r - first, motion.q)
+                now, soft = _on_spring(
+                    h, theta, system.tangential[r - first], 0.0, stretched, motion.before[u + r],
+                    motion.impulse[u + r], now,
+                )  # fmt: skip
+            list_row(problem, count, u + r, now, low, high, soft)
+            count += 1
+            continue
+        rigid = is_rigid(system, r)
+        if rigid and motion.rows[_CLOSED, r] == 0.0:
+            continue
+        now = row_speed(system, r, free)
+        if rigid:
+            before = motion.before[r] if turn == 0 and not system.two_phases else now
+            if turn < _TURNS - 1 and before > slowest and now > -slowest:
+                continue
+            list_row(problem, count, r, now, 0.0, math.inf, 0.0)
+            if not system.two_phases:
+                problem.asked[count] = restitution_at(system, r, -before) * min(before, 0.0)
+            bound, had = 0.0, 0.0
         else:
-            gap = system.rest[r] + row_speed(system, r, motion.q)
-            if system.spring[r] == math.inf:
-                if gap + 0.5 * h * speed[r] > 0.0:
-                    continue
-                closed[r] = 1.0
-                before = speed[r] if turn == 0 else now
-                if not last and before > slowest and now > -slowest:
-                    continue
-                shift = restitution_at(system, r, -before) * min(before, 0.0)
-            else:
-                if gap + h * min(speed[r], row_speed(system, r, free)) > 0.0:
-                    continue
-                k, c = system.spring[r], system.dashpot[r]
-                stiff = theta * (k * h * theta + c)
-                shift = (k * (gap + h * theta * (1.0 - theta) * speed[r]) + c * (1.0 - theta) * speed[r]) / stiff
-                soft = 1.0 / (h * stiff)
-        if system.spring[r] != math.inf or r < system.friction_rows:
-            low, high, shift = low - impulse[r], high - impulse[r], shift + soft * impulse[r]
-        list_row(problem, motion.listed, mobility, count, r, now + shift, low, high, soft)
-        count += 1
+            opened = motion.gap[0, r]
+            if opened + h * min(motion.before[r], now) > 0.0:
+                continue
+            now, soft = _on_spring(
+                h, theta, system.spring[r], system.dashpot[r], opened, motion.before[r], motion.impulse[r], now
+            )
+            list_row(problem, count, r, now, -motion.impulse[r], math.inf, soft)
+            bound, had = system.friction[r] * motion.impulse[r], motion.impulse[u + r]
+        count = _list_slip(system, problem, count, r, row_speed(system, u + r, free), bound, had)
     return count
+
+
+@inlined
+def _on_spring(h, theta, spring, dashpot, stretched, before, impulse, now):
+    """Return speed and compliance of a row at whose rest the impulse of a step is the mean of spring and dashpot.
+
+    stretched: elongation as the step begins, m; before, now: speeds then, and at its end without more impulses.
+    """
+    stiff = theta * (spring * h * theta + dashpot)
+    soft = 1.0 / (h * stiff)
+    begun = spring * (stretched + h * theta * (1.0 - theta) * before) + dashpot * (1.0 - theta) * before
+    return now + begun / stiff + soft * impulse, soft
+
+
+@inlined
+def _rebound(system, motion, problem, count, turn, tolerance):
+    """Find the impulses of a turn, in the plane with the largest factor of the coefficients that brings no energy.
+
+    Returns False if they are not found.
+    """
+    low, high, share = 0.0, 1.0, 1.0
+    for _ in range(_HALVINGS):
+        if not solve_rows(problem, count, share, tolerance):
+            return False
+        if system.in_plane and _brings_energy(system, motion, problem, count, turn, share):
+            high = share
+        elif share == 1.0:
+            return True
+        else:
+            low = share
+        share = 0.5 * (low + high)
+    return solve_rows(problem, count, low, tolerance)
+
+
+@inlined
+def _brings_energy(system, motion, problem, count, turn, share):
+    """Whether the impulses of rigid contacts bring energy, by the speeds before and after the step's loads.
+
+    The loads alone may let it seem so by one of them: where they pull a contact open, or turn a slip round.
+    """
+    u, early, late, terms = len(system.rest), 0.0, 0.0, 0.0
+    for a in range(count):
+        row = problem.row[a]
+        r = row - u if row >= u else row
+        if is_rigid(system, r):
+            impulse, after = problem.box.force[a], problem.box.acceleration[a] - share * problem.asked[a]
+            now = problem.now[a]
+            before = motion.before[row] if turn == 0 else now
+            early += 0.5 * impulse * (before + after)
+            late += 0.5 * impulse * (now + after)
+            terms += abs(impulse) * (abs(before) + abs(now) + abs(after))
+    return min(early, late) > _GAIN * terms

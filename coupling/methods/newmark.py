@@ -12,122 +12,118 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
-from vanedamp.coupling.methods.step_problem import list_row, solve_rows
+from vanedamp.coupling.methods.step_problem import couple_row, list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
-    apply_inverse,
     close_step,
     copy,
-    damping_force,
-    end_period,
-    load_at,
+    drag_sliders,
     open_step,
+    product,
     record_start,
-    row_speed,
+    set_gaps,
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.planar.unit_kinematics import elongation, gap, has_friction, row_speed
+from vanedamp.coupling.system.system import System
 
 
-def newmark_matrices(
-    system: LineSystem, times: TimeGrid, alpha: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility."""
-    h, beta, gamma = times.step, (1 - alpha) ** 2 / 4, 0.5 - alpha
-    matrix = np.diag(system.mass + (1 + alpha) * beta * h**2 * system.stiffness)
-    inverse = np.linalg.inv(matrix + (1 + alpha) * gamma * h * system.damping)
+def newmark_matrices(system: System, step: float, alpha: float) -> tuple[np.ndarray, Sparse, np.ndarray, np.ndarray]:
+    """Return alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility (2u, 2u).
+
+    Coordinates without mass, the sliders of Jenkins elements, have no row of J and stay where they are.
+    """
+    beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
+    matrix = np.diag(system.mass) + (1 + alpha) * beta * step**2 * system.stiffness
+    inverse = np.linalg.inv(matrix + (1 + alpha) * gamma * step * system.damping)
     turned = (1 + alpha) * inverse @ system.J.T
-    return np.array([alpha, beta, gamma]), inverse, turned, system.J @ turned
+    return np.array([alpha, beta, gamma]), sparse(inverse), turned, system.J @ turned
 
 
 @entry
 def march_newmark(
-    system, times, motion, records, log, problem, parameters, inverse, turned, mobility, slow, until, budget, deepest
+    system, times, motion, records, log, problem, parameters, inverse, turned, laws, until, budget, deepest
 ):
-    """Step until this many steps are done. slow: (friction rows,) speed below which friction is viscous, or 0."""
+    """Step until this many steps are done. Return the code of numerics.codes."""
     alpha, beta, gamma = parameters[0], parameters[1], parameters[2]
-    size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
-    q, v, rhs, accel = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
-    ahead, fast, listed = motion.coordinates[4], motion.coordinates[5], motion.listed
-    impulse, speed, before, old = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows], motion.rows[3]
+    size, h, steps = len(motion.q), times.step, len(times.phase) - 1
+    scratch, q, v = motion.coordinates, motion.start[0], motion.start[1]
+    rhs, accel, ahead, fast, last = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     if motion.counters[STEPS] == 0:
         record_start(system, motion, records)
-        first_forces(system, times, motion, slow)
-        for i in range(size):
-            motion.half[i] = net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
+        first_forces(system, times, motion, laws)
     while motion.counters[STEPS] < until:
         k = motion.counters[STEPS] % steps
-        open_step(system, times, motion, records, k, q, v, before)
-        copy(motion.force, old)
+        open_step(system, times, motion, records, k)
+        copy(motion.force, motion.impulse)
         for i in range(size):
             a = motion.half[i]
             ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
             fast[i] = v[i] + h * (1.0 - gamma) * a
+        if alpha != 0.0:
+            net_load(system, times, motion, q, v, k, last)
         for i in range(size):
-            new = load_at(system, times, k + 1, i) - damping_force(system, fast, i) - system.stiffness[i] * ahead[i]
-            rhs[i] = (1.0 + alpha) * new
-            if alpha != 0.0:
-                rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
-        apply_inverse(inverse, system.proportional, rhs, accel)
+            bound = product(times.damping, i, fast) + product(times.stiffness, i, ahead)
+            rhs[i] = (1.0 + alpha) * (times.load[k + 1, i] + system.weight[i] - bound) - alpha * last[i]
         for i in range(size):
+            accel[i] = product(inverse, i, rhs)
             ahead[i] += beta * h * h * accel[i]
             fast[i] += gamma * h * accel[i]
-        count = _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
+        count = _list_rows(system, problem, laws, h, ahead, fast, beta, gamma)
         if count > 0:
             motion.counters[SOLVES] += 1
-            if not solve_rows(problem, count):
+            if not solve_rows(problem, count, 0.0, 0.0):
                 return UNDECIDED
-        for r in range(rows):
-            motion.force[r] = 0.0
+        for row in range(len(motion.force)):
+            motion.force[row] = 0.0
         for a in range(count):
-            motion.force[listed[a]] = problem.force[a]
+            motion.force[problem.row[a]] = problem.box.force[a]
         for i in range(size):
             change = 0.0
             for a in range(count):
-                change += turned[i, listed[a]] * problem.force[a]
+                change += turned[i, problem.row[a]] * problem.box.force[a]
             motion.half[i] = accel[i] + change
             motion.q[i] = ahead[i] + beta * h * h * change
             motion.v[i] = fast[i] + gamma * h * change
-        for r in range(rows):
-            speed[r] = row_speed(system, r, v)
-            impulse[r] = 0.5 * h * (old[r] + motion.force[r])
-            if r < system.friction_rows and system.spring[r] != math.inf and system.limit[r] > 0.0:
-                motion.elongation[r] = -motion.force[r] / system.spring[r]
-        code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
+        drag_sliders(system, motion.q)
+        set_gaps(system, motion)
+        for r in range(system.contacts):
+            motion.before[r] = row_speed(system, r, v)
+        for row in range(len(motion.force)):
+            motion.impulse[row] = 0.5 * h * (motion.impulse[row] + motion.force[row])
+        code = close_step(system, times, motion, records, log, k, budget, deepest)
         if code != DONE:
             return code
-        if k == steps - 1:
-            code = end_period(system, times, motion, records, budget)
-            if code != DONE:
-                return code
     return DONE
 
 
 @kernel
-def _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma):
+def _list_rows(system, problem, laws, h, ahead, fast, beta, gamma):
     """Set up the problem of the rows that may carry force. Return their number."""
-    h, count = times.step, 0
-    for r in range(len(system.J)):
-        speed, displacement = row_speed(system, r, fast), row_speed(system, r, ahead)
-        if r < system.friction_rows:
-            if system.limit[r] == 0.0:
+    count, u, first = 0, len(system.rest), len(system.rest) - len(system.tangential)
+    for place in range(u):
+        r = problem.order[place]
+        low, high, normal = -system.limit[r], system.limit[r], -1
+        if r >= first:
+            spring = system.tangential[r - first] * beta * h * h
+            shift = elongation(system, r - first, ahead) / (beta * h * h)
+            list_row(problem, count, u + r, shift, low, high, 1.0 / spring)
+            count += 1
+            continue
+        if r < system.contacts:
+            opened = gap(system, r, ahead)
+            if opened > 0.0:
                 continue
-            low, high = -system.limit[r], system.limit[r]
-            if system.spring[r] != math.inf:
-                shift = (motion.elongation[r] + displacement - row_speed(system, r, q)) / (beta * h * h)
-                soft = 1.0 / (system.spring[r] * beta * h * h)
-            else:
-                shift, soft = speed / (gamma * h), slow[r] / (system.limit[r] * gamma * h)
-        else:
-            gap = system.rest[r] + displacement
-            if gap > 0.0:
-                continue
-            low, high = 0.0, np.inf
-            stiff = system.spring[r] * beta * h * h + system.dashpot[r] * gamma * h
-            shift = (system.spring[r] * gap + system.dashpot[r] * speed) / stiff
-            soft = 1.0 / stiff
-        list_row(problem, listed, mobility, count, r, shift, low, high, soft)
-        count += 1
+            stiff = laws.spring[r] * beta * h * h + laws.dashpot[r] * gamma * h
+            shift = (laws.spring[r] * opened + laws.dashpot[r] * row_speed(system, r, fast)) / stiff
+            list_row(problem, count, r, shift, 0.0, math.inf, 1.0 / stiff)
+            normal, count = count, count + 1
+        if has_friction(system, r):
+            slow = laws.slow[r] / (system.limit[r] * gamma * h) if normal < 0 else 0.0
+            list_row(problem, count, u + r, row_speed(system, u + r, fast) / (gamma * h), low, high, slow)
+            if normal >= 0:
+                couple_row(problem, count, normal, system.friction[r])
+            count += 1
     return count

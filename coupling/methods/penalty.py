@@ -9,17 +9,14 @@ from pydantic import Field, model_validator
 
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.central_difference import central_difference_matrix, march_central_difference
-from vanedamp.coupling.methods.equations_of_motion import Motion, line_grid, start
+from vanedamp.coupling.methods.equations_of_motion import start, time_grid
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
-from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
-from vanedamp.coupling.methods.planar.start import planar_start
+from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, penalty_laws
+from vanedamp.coupling.methods.step_problem import new_step_problem
 from vanedamp.coupling.methods.time_stepping import SteppedRun
-from vanedamp.coupling.numerics.complementarity import new_problem
-from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
-from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions
 from vanedamp.coupling.system.system import System
@@ -31,7 +28,7 @@ VARIANTS = (
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
 WAVEFORMS = True
-PLANAR_LAWS: tuple[str, ...] = ()
+PLANAR_LAWS = ("yields",)
 RUBBING_WARNING = (
     "impacts of bodies with extent on springs that rub leave other speeds than Newton's law, with any number of steps; "
     'take "exact" or "moreau" for amplitudes'
@@ -55,55 +52,38 @@ class Options(PenaltyOptions, PlanarOptions):
         return self
 
 
-def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
     """Return a run.
 
-    Raises InputError for a rigid contact of restitution 0, and in the plane for implicit schemes and for bodies that
-    overlap at the start.
+    Raises InputError for a rigid contact of restitution 0, for implicit schemes with viscous friction of contacts whose
+    normal force is unknown, and for bodies that overlap at the start.
     """
     options: Any = scene.solver
-    if scene.planar:
-        return _begin_planar(scene, system, options, records, events)
-    line, initial = line_start(scene, system)
-    times = line_grid(scene, line, options.steps_per_period)
-    soft, slow = with_penalty(line, times, options)
+    times = time_grid(scene, system, options.steps_per_period)
+    laws = penalty_laws(system, times.step, options)
+    soft, motion = start(system, begun, records, laws.spring)
     budget, deepest = options.max_events, options.penetration
     if options.scheme == "central_difference":
-        inverse = central_difference_matrix(soft, times)
+        inverse = central_difference_matrix(soft, times.step)
 
-        def march(motion: Motion, log: np.ndarray, until: int) -> int:
-            return march_central_difference(soft, times, motion, records, log, inverse, slow, until, budget, deepest)
+        def march(log: np.ndarray, until: int) -> int:
+            return march_central_difference(soft, times, motion, records, log, inverse, laws, until, budget, deepest)
 
     else:
-        problem = new_problem(len(soft.J))
-        matrices = newmark_matrices(soft, times, options.alpha if options.scheme == "hht" else 0.0)
         if options.slip_velocity is None:
-            slow = np.zeros_like(slow)  # implicit: Coulomb's law as it is
+            laws = laws._replace(slow=np.zeros_like(laws.slow))  # implicit: Coulomb's law as it is
+        elif system.friction.any():
+            raise InputError(
+                f'solver.slip_velocity: scheme = "{options.scheme}" takes it of sliders only; leave it out for '
+                'Coulomb\'s law as it is, or take scheme = "central_difference"'
+            )
+        alpha = options.alpha if options.scheme == "hht" else 0.0
+        parameters, inverse, turned, mobility = newmark_matrices(soft, times.step, alpha)
+        problem = new_step_problem(soft, mobility)
 
-        def march(motion: Motion, log: np.ndarray, until: int) -> int:
-            return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, until, budget, deepest)
+        def march(log: np.ndarray, until: int) -> int:
+            return march_newmark(
+                soft, times, motion, records, log, problem, parameters, inverse, turned, laws, until, budget, deepest
+            )
 
-    rows = rows_of_line(system)
-    return SteppedRun(system, rows, march, start(soft, initial), records, events, options.smallest_steps)
-
-
-def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
-    """Return a run of bodies in the plane."""
-    from vanedamp.coupling.methods.planar import penalty as planar  # its kernels are loaded when they are wanted
-    from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
-
-    if options.scheme != "central_difference":
-        raise InputError(
-            f'solver.scheme: "{options.scheme}" takes sliders only; bodies with extent, stiffness or dashpot take '
-            '"central_difference"'
-        )
-    system, initial, times = planar_start(scene, whole, options.steps_per_period)
-    forces, inverse = planar.penalty_forces(system, times.step, options), planar.step_matrix(system, times.step)
-    budget, deepest = options.max_events, options.penetration
-
-    def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
-        return planar.march(system, times, motion, records, log, forces, inverse, until, budget, deepest)
-
-    motion, steps = start_steps(system, initial, records, forces.spring), options.smallest_steps
-    plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(system, rows_of_units(system), march, motion, records, events, steps, plane)
+    return SteppedRun(system, march, motion, records, events, options)

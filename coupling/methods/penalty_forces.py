@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from vanedamp.coupling.methods.equations_of_motion import TimeGrid
-from vanedamp.coupling.methods.step_records import damping_force, load_at, row_speed
+from vanedamp.coupling.methods.step_records import product, set_gaps
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
+from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.planar.unit_kinematics import has_friction, row_speed
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.system import SURFACES, System
 from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 
 class PenaltyOptions(SteppingOptions):
-    """The options of methods with penalties. Their defaults are those of `with_penalty`."""
+    """The options of methods with penalties. Their defaults are those of `penalty_laws`."""
 
     contact_steps: Annotated[Real, Field(ge=4)] | None = None
     """duration of a rigid contact in time steps; or give `contact_stiffness` [-]"""
@@ -34,27 +34,39 @@ class PenaltyOptions(SteppingOptions):
         return self
 
 
-def with_penalty(system: LineSystem, times: TimeGrid, options: PenaltyOptions) -> tuple[LineSystem, np.ndarray]:
-    """Return rigid contacts as springs and dashpots, and the slip speed (friction rows,) of regularised friction.
+@record
+class PenaltyLaws(NamedTuple):
+    """The laws of the units (u,)."""
 
-    Raises InputError for a restitution of 0, and for one that depends on the speed.
+    spring: np.ndarray  # (u,) of contacts, N/m; 0: none
+    dashpot: np.ndarray  # (u,) N s/m
+    slow: np.ndarray  # (u,) slip speed below which friction is viscous, m/s; nan: as drag says
+    drag: np.ndarray  # (u,) of that dashpot along the contact, N s/m
+
+
+def penalty_laws(system: System, step: float, options: PenaltyOptions) -> PenaltyLaws:
+    """Return rigid contacts as springs and dashpots, and the slip speeds of regularised friction.
+
+    A contact's spring is that of its own mobility: where both corners of a face hit at once, the contact is shorter and
+    its restitution another one. Raises InputError for a restitution of 0, and for one that depends on the speed.
     """
     if system.restitution_at:
         raise InputError(
             "contact.law: its restitution depends on the speed, but a dashpot has one restitution; "
             f'take solver.method = "exact", "moreau" or "solve_ivp", not "{options.method}"'
         )
-    spring, dashpot = system.spring.copy(), system.dashpot.copy()
-    for r in range(system.friction_rows, len(spring)):
-        if np.isinf(spring[r]):
-            reduced = 1 / system.delassus[r, r]
-            spring[r], dashpot[r] = contact_spring(reduced, system.restitution[r], times.step, options)
-    slips = slice(0, system.friction_rows)
-    # four times the speed at which an explicit step becomes unstable (docs/accuracy.md)
-    slow = 2 * system.limit[slips] * np.diag(system.delassus)[slips] * times.step
-    if options.slip_velocity is not None:
-        slow = np.full(len(slow), options.slip_velocity)
-    return system._replace(spring=spring, dashpot=dashpot), slow
+    u, mobility = len(system.rest), np.diag(system.delassus)
+    spring, dashpot = np.where(np.isinf(system.spring), 0.0, system.spring), system.dashpot.copy()
+    for r in np.flatnonzero(np.isinf(system.spring[: system.contacts])):
+        try:
+            spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
+        except InputError as error:
+            owner = SURFACES[system.surface[r]] if system.without_body[r] else "damper"
+            raise InputError(f"{owner}[{system.body[r]}].{error}") from None
+    slow = np.full(u, np.nan if options.slip_velocity is None else options.slip_velocity)
+    with np.errstate(divide="ignore"):
+        # a quarter of the dashpot at which an explicit step becomes unstable (docs/accuracy.md)
+        return PenaltyLaws(spring=spring, dashpot=dashpot, slow=slow, drag=1 / (2 * mobility[u:] * step))
 
 
 def contact_spring(reduced: float, restitution: float, step: float, options: PenaltyOptions) -> tuple[float, float]:
@@ -69,37 +81,83 @@ def contact_spring(reduced: float, restitution: float, step: float, options: Pen
     return spring, 2 * damping_ratio(restitution) * np.sqrt(spring * reduced)
 
 
+@inlined
+def set_forces(system, laws, motion, gap, drawn, rate, h):
+    """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows, and their impulses.
+
+    drawn: (2u,) displacement of what draws the sliders of Jenkins elements, by their rows. They follow in motion.q
+    where their springs would go beyond their bounds. h: time since the last forces, s.
+    """
+    u, sliders, q = len(system.rest), len(system.tangential), motion.q
+    for j in range(sliders):
+        row, at, spring = 2 * u - sliders + j, len(q) - sliders + j, system.tangential[j]
+        most = system.limit[u - sliders + j] / spring
+        stretched = min(max(drawn[row] - q[at], -most), most)
+        q[at] = drawn[row] - stretched
+        _put(motion, row, -spring * stretched, h)
+    for r in range(u - sliders):
+        bound = system.limit[r]
+        if r < system.contacts:
+            push = 0.0
+            if gap[r] < 0.0:
+                push = max(-laws.spring[r] * gap[r] - laws.dashpot[r] * rate[r], 0.0)
+            _put(motion, r, push, h)
+            bound = system.friction[r] * push
+        drag = 0.0
+        if bound > 0.0:
+            slip, slow = rate[u + r], laws.slow[r]
+            if slow > 0.0:
+                drag = bound * slip / slow
+            elif slow == 0.0:
+                drag = bound * np.sign(slip)
+            else:
+                drag = laws.drag[r] * slip
+        if has_friction(system, r):
+            _put(motion, u + r, -min(max(drag, -bound), bound), h)
+
+
+@inlined
+def _put(motion, row, force, h):
+    """Set the force of a row, and its impulse by the mean of that and the last one."""
+    motion.impulse[row] = 0.5 * h * (motion.force[row] + force)
+    motion.force[row] = force
+
+
+@inlined
+def set_rows(system, motion, q, v):
+    """Set gaps and speeds (motion.before) of the rows that may have forces, at coordinates q and velocities v.
+
+    motion.rows[0]: displacements of what draws the sliders of Jenkins elements.
+    """
+    u = len(system.rest)
+    set_gaps(system, motion)
+    for r in range(u):
+        if r < system.contacts:
+            motion.before[r] = row_speed(system, r, v)
+        if has_friction(system, r):
+            motion.before[u + r] = row_speed(system, u + r, v)
+        if r >= u - len(system.tangential):
+            motion.rows[0, u + r] = row_speed(system, u + r, q)
+
+
 @kernel
-def first_forces(system, times, motion, slow):
-    """Set the forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
-    for r in range(len(system.J)):
-        row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
+def first_forces(system, times, motion, laws):
+    """Set the forces as a run begins, and the accelerations (motion.half) that they and the loads give."""
+    set_rows(system, motion, motion.q, motion.v)
+    set_forces(system, laws, motion, motion.gap[0], motion.rows[0], motion.before, 0.0)
+    net_load(system, times, motion, motion.q, motion.v, 0, motion.half)
+    for i in range(len(motion.q)):
+        motion.half[i] /= system.mass[i]
 
 
 @inlined
-def row_force(system, motion, r, displacement, speed, slow, moved):
-    """Set the force of row r by its law. moved: displacement of a Jenkins element since its last force."""
-    if r >= system.friction_rows:
-        gap = system.rest[r] + displacement
-        push = -system.spring[r] * gap - system.dashpot[r] * speed
-        motion.force[r] = max(push, 0.0) if gap < 0.0 else 0.0
-    elif system.limit[r] == 0.0:
-        motion.force[r] = 0.0
-    elif system.spring[r] != math.inf:
-        push = -system.spring[r] * (motion.elongation[r] + moved)
-        motion.force[r] = min(max(push, -system.limit[r]), system.limit[r])
-        motion.elongation[r] = -motion.force[r] / system.spring[r]
-    elif slow[r] > 0.0:
-        motion.force[r] = -system.limit[r] * min(max(speed / slow[r], -1.0), 1.0)
-    else:
-        motion.force[r] = -system.limit[r] * np.sign(speed)
-
-
-@inlined
-def net_load(system, times, motion, q, v, k, i):
-    """Return the sum of the forces on coordinate i at step k of the period."""
-    force = load_at(system, times, k, i) - damping_force(system, v, i) - system.stiffness[i] * q[i]
-    for r in range(len(system.J)):
-        if motion.force[r] != 0.0:
-            force += system.J[r, i] * motion.force[r]
-    return force
+def net_load(system, times, motion, q, v, k, load):
+    """Set the sum (N,) of the forces on the coordinates at step k of the period."""
+    for i in range(len(q)):
+        bound = product(times.damping, i, v) + product(times.stiffness, i, q)
+        load[i] = times.load[k, i] + system.weight[i] - bound
+    for a in range(len(motion.live)):
+        row = motion.live[a]
+        if motion.force[row] != 0.0:
+            for i in range(len(q)):
+                load[i] += system.J[row, i] * motion.force[row]

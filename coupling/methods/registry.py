@@ -10,13 +10,14 @@ from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed
+from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import most_periods
 from vanedamp.files.toml_input import InputError
 
@@ -52,21 +53,20 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
-    _check_bodies(scene, method)
     system = assemble(scene)
+    _check_bodies(scene, system)
     records = new_records(
         system, most_periods(scene), samples_per_period, isinstance(scene.structure, Rom), deflects(scene, system)
     )
-    further = {} if start is None else {"start": at_speed_of(scene, start)}
-    return method.begin(scene, system, records, events, **further)
+    return method.begin(scene, system, records, events, start_of(scene, system, start))
 
 
-def _check_bodies(scene: Scene, method: Method) -> None:
+def _check_bodies(scene: Scene, system: System) -> None:
     """Raise InputError for bodies in the plane, or a contact law of theirs, that a method does not take."""
     for number, damper in enumerate(scene.damper):
         if damper.shape == "auto":
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
-    if not scene.planar:
+    if not system.in_plane:
         return
     laws = {name: getattr(part, "PLANAR_LAWS", None) for name, part in METHODS.all().items()}
     law, name = scene.contact, scene.solver.method
@@ -91,8 +91,6 @@ def _check_bodies(scene: Scene, method: Method) -> None:
 
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
-    if scene.planar and scene.yields:
-        return "runs of bodies in the plane whose contacts are springs leave no state for another"
     return _why_not(scene.solver.method, "RESTARTS")
 
 

@@ -1,27 +1,177 @@
-"""The small complementarity problem of a time step: the rows that take part in it, and its solution."""
+"""The small complementarity problem of a time step: the rows that take part in it, and its solution in three ways.
+
+The speeds A f + b of the rows and their forces (or impulses) f obey the conditions of numerics.complementarity. The
+force of another row may widen the bounds: low - mu f_N <= f <= high + mu f_N, Coulomb's law where f_N is the force of
+the contact's normal. Without such rows, pivots solve the problem (BOX); with them, Lemke's method does (LEMKE, Glocker
+and Pfeiffer 1996). Projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998) solves both, one force after the
+other, and shares nothing with them.
+"""
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
+import numpy as np
+
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.numerics.complementarity import solve_box
+from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.complementarity import Problem, new_problem, solve_box
+from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke, solve_lemke
+from vanedamp.coupling.system.system import System
+
+BOX, LEMKE, GAUSS_SEIDEL = range(3)
+#: sweeps that an iteration may take
+_SWEEPS = 100_000
+
+
+@record
+class StepProblem(NamedTuple):
+    """A problem of up to k rows of the units (u,), with the space to solve it."""
+
+    solver: int  # BOX, LEMKE or GAUSS_SEIDEL
+    order: np.ndarray  # (u,) int: units in the order in which they enter
+    mobility: np.ndarray  # (2u, 2u) of all rows
+    row: np.ndarray  # (k,) int: the rows that take part
+    now: np.ndarray  # (k,) their speeds without the unknown forces
+    asked: np.ndarray  # (k,) what restitution asks for beside, less than zero
+    friction: np.ndarray  # (k,) mu
+    normal: np.ndarray  # (k,) int: place of the row of f_N
+    box: Problem
+    lemke: Lemke
+    place: np.ndarray  # (k,) int, scratch: first unknown of each row
+    weight: np.ndarray  # (k,) scratch: size of its force, of size one in Lemke's method
+
+
+def new_step_problem(system: System, mobility: np.ndarray, exact: bool = True) -> StepProblem:
+    """Return room for the problem of all units of a system. mobility: (2u, 2u) of the rows."""
+    u, k, coupled = len(system.rest), len(mobility), bool(system.friction[: system.contacts].any())
+    elements, contacts = np.arange(system.contacts, u), np.arange(system.contacts)
+    return StepProblem(
+        solver=(LEMKE if coupled else BOX) if exact else GAUSS_SEIDEL,
+        order=np.concatenate([elements, contacts] if exact else [contacts, elements]), mobility=mobility,
+        row=np.zeros(k, np.int64), now=np.zeros(k), asked=np.zeros(k), friction=np.zeros(k),
+        normal=np.zeros(k, np.int64), box=new_problem(k), lemke=new_lemke(2 * k if exact and coupled else 0),
+        place=np.zeros(k, np.int64), weight=np.zeros(k),
+    )  # fmt: skip
 
 
 @inlined
-def list_row(problem, listed, mobility, count, r, free, low, high, soft):
-    """Enter row r as number `count`: its motion without forces, bounds of its force, compliance of its own."""
-    listed[count] = r
-    problem.b[count] = free
-    problem.low[count], problem.high[count], problem.forced[count] = low, high, 0
+def list_row(problem, count, row, now, low, high, soft):
+    """Enter a row as number `count`: its speed without forces, bounds of its force, compliance of its own."""
+    box = problem.box
+    problem.row[count], problem.now[count], problem.asked[count], problem.friction[count] = row, now, 0.0, 0.0
+    box.low[count], box.high[count] = low, high
     for a in range(count + 1):
-        problem.matrix[count, a] = mobility[r, listed[a]]
-        problem.matrix[a, count] = problem.matrix[count, a]
-    problem.matrix[count, count] += soft
+        box.matrix[count, a] = problem.mobility[row, problem.row[a]]
+        box.matrix[a, count] = box.matrix[count, a]
+    box.matrix[count, count] += soft
+
+
+@inlined
+def couple_row(problem, count, normal, friction):
+    """Let the force of row number `normal` widen the bounds of row number `count`."""
+    problem.friction[count], problem.normal[count] = friction, normal
 
 
 @kernel
-def solve_rows(problem, count):
-    """Solve the problem, of a single row in closed form. Return whether there is a solution."""
-    if count > 1:
-        return solve_box(problem, count, 0.0)
-    problem.force[0] = min(max(-problem.b[0] / problem.matrix[0, 0], problem.low[0]), problem.high[0])
+def solve_rows(problem, count, share, tolerance):
+    """Solve the problem of the first rows with a share of what restitution asks for: box.force, box.acceleration.
+
+    tolerance: by how much a sweep of the iteration may still change a speed, m/s. Returns False without a solution.
+    """
+    box = problem.box
+    for a in range(count):
+        box.b[a], box.forced[a] = problem.now[a] + share * problem.asked[a], 0
+    if count == 1:
+        box.force[0] = min(max(-box.b[0] / box.matrix[0, 0], box.low[0]), box.high[0])
+        box.acceleration[0] = box.b[0] + box.matrix[0, 0] * box.force[0]
+        return True
+    if problem.solver == BOX:
+        return solve_box(box, count, 0.0)
+    if problem.solver == LEMKE:
+        return _solve_lemke(problem, count)
+    return _iterate(problem, count, tolerance)
+
+
+@kernel
+def _iterate(problem, count, tolerance):
+    """Solve the problem by projected Gauss-Seidel iteration. Returns False if it does not converge."""
+    box = problem.box
+    for a in range(count):
+        box.force[a], box.acceleration[a] = 0.0, box.b[a]
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for a in range(count):
+            wide = 0.0
+            if problem.friction[a] > 0.0:
+                wide = problem.friction[a] * box.force[problem.normal[a]]
+            own = box.matrix[a, a]
+            wanted = min(max(box.force[a] - box.acceleration[a] / own, box.low[a] - wide), box.high[a] + wide)
+            change = wanted - box.force[a]
+            if change != 0.0:
+                box.force[a] = wanted
+                for c in range(count):
+                    box.acceleration[c] += box.matrix[c, a] * change
+            largest = max(largest, abs(change) * own)
+        if largest <= tolerance:
+            return True
+    return False
+
+
+@kernel
+def _solve_lemke(problem, count):
+    """Solve the problem by Lemke's method, with one unknown for a normal and two for a row of two bounds.
+
+    A normal has its force above the least. A row of two bounds has its force above the lower one, complementary to its
+    speed to the right, and its speed to the left, complementary to the distance from the upper bound.
+    """
+    box, lemke, size, scale = problem.box, problem.lemke, 0, 0.0
+    for a in range(count):
+        root = math.sqrt(box.matrix[a, a])
+        problem.place[a], problem.weight[a] = size, 1.0 / root
+        size += 1 if box.high[a] == math.inf else 2
+        scale = max(scale, abs(box.b[a]) / root, abs(box.low[a]) * root)
+    scale = scale if scale > 0.0 else 1.0
+    for i in range(size):
+        for j in range(size):
+            lemke.matrix[i, j] = 0.0
+    for a in range(count):
+        i, weight, speed = problem.place[a], problem.weight[a], box.b[a]
+        for c in range(count):
+            part = box.matrix[a, c]
+            speed += part * _least(problem, c)
+            lemke.matrix[i, problem.place[c]] += weight * problem.weight[c] * part
+            if problem.friction[c] > 0.0:
+                normal = problem.normal[c]
+                entry = weight * problem.weight[normal] * problem.friction[c] * part
+                lemke.matrix[i, problem.place[normal]] -= entry
+        lemke.q[i] = weight * speed / scale
+        if box.high[a] < math.inf:
+            room, wide, normal = box.high[a] - box.low[a], 2.0 * problem.friction[a], problem.normal[a]
+            lemke.matrix[i, i + 1], lemke.matrix[i + 1, i] = 1.0, -1.0
+            if wide > 0.0:
+                lemke.matrix[i + 1, problem.place[normal]] = wide * problem.weight[normal] / weight
+                room += wide * box.low[normal]
+            lemke.q[i + 1] = room / (weight * scale)
+    if not solve_lemke(lemke, size, 0):
+        return False
+    for a in range(count):
+        box.force[a] = lemke.z[problem.place[a]] * problem.weight[a] * scale + box.low[a]
+    for a in range(count):
+        if problem.friction[a] > 0.0:
+            box.force[a] -= problem.friction[a] * box.force[problem.normal[a]]
+    for a in range(count):
+        box.acceleration[a] = box.b[a]
+        for c in range(count):
+            box.acceleration[a] += box.matrix[a, c] * box.force[c]
     return True
+
+
+@inlined
+def _least(problem, a):
+    """Return the force of a row where its unknown is zero and so is that of its normal."""
+    least = problem.box.low[a]
+    if problem.friction[a] > 0.0:
+        least -= problem.friction[a] * problem.box.low[problem.normal[a]]
+    return least

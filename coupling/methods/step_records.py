@@ -1,128 +1,150 @@
-"""The records of a step of any stepping method: energies, harmonic, peaks, impacts, penetration."""
+"""The records of a step of any stepping method: energies, harmonic, peaks, impacts, tilts, penetration."""
 
 from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
+from vanedamp.coupling.numerics.codes import (
+    DIVERGED,
+    DONE,
+    EVENT_BUDGET,
+    IMPACTS,
+    LOGGED,
+    PENETRATION,
+    PERIOD,
+    STEPS,
+)
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.response.recorder import note_step, put_section
+from vanedamp.coupling.planar.unit_kinematics import elongation, gap
+from vanedamp.coupling.response.recorder import note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
+from vanedamp.coupling.system.system import FLOOR
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
 
 
 @inlined
-def response_of(system, times, k, q):
-    """Return the displacement at the response, at step k of the period."""
-    x = times.table[k, 0]
-    for i in range(system.modes):
-        x += system.response[i] * q[i]
-    return x
+def product(matrix, i, vector):
+    """Return entry i of the product of a matrix (equations_of_motion.Sparse) and a vector."""
+    total = 0.0
+    for a in range(matrix.value.shape[1]):
+        total += matrix.value[i, a] * vector[matrix.column[i, a]]
+    return total
 
 
 @inlined
-def rate_of(system, times, k, v):
-    """Return the velocity at the response, at step k of the period."""
-    rate = times.table[k, 1]
-    for i in range(system.modes):
-        rate += system.response[i] * v[i]
-    return rate
+def copy(source, target):
+    """Copy as many numbers as the target has."""
+    for i in range(len(target)):
+        target[i] = source[i]
 
 
 @inlined
-def row_speed(system, r, v):
-    """Return the velocity of row r."""
-    speed = 0.0
-    for i in range(len(v)):
-        speed += system.J[r, i] * v[i]
-    return speed
+def drag_sliders(system, q):
+    """Let the sliders of Jenkins elements follow, in q, where their springs would go beyond their bounds."""
+    sliders = len(system.tangential)
+    for j in range(sliders):
+        most = system.limit[len(system.limit) - sliders + j] / system.tangential[j]
+        stretched = elongation(system, j, q)
+        q[len(q) - sliders + j] += stretched - min(max(stretched, -most), most)
+
+
+@inlined
+def set_gaps(system, motion):
+    """Set the gaps at the end of a step; those of the last one are where it began."""
+    for r in range(system.contacts):
+        motion.gap[1, r] = motion.gap[0, r]
+        motion.gap[0, r] = gap(system, r, motion.q)
 
 
 @kernel
 def record_start(system, motion, records):
-    """Record section and ledger at the start of a period."""
-    n, b, springs, slip, speed = system.modes, system.bodies, 0.0, motion.rows[0], motion.rows[1]
-    for k in range(b):
-        slip[k], speed[k] = row_speed(system, k, motion.q), row_speed(system, k, motion.v)
-    for r in range(len(system.J)):
-        if system.spring[r] != math.inf:
-            pressed = motion.elongation[r] if r < system.friction_rows else min(row_gap(system, r, motion.q), 0.0)
-            springs += 0.5 * system.spring[r] * pressed * pressed
-    put_section(
-        system, records, motion.counters[PERIOD], motion.q[:n], motion.v[:n], slip[:b], speed[:b], springs,
-        motion.losses,
-    )  # fmt: skip
+    """Record section, energies and ledger at the start of a period, those of all springs included."""
+    springs = 0.0
+    for r in range(system.contacts):
+        motion.gap[0, r] = gap(system, r, motion.q)
+        if motion.spring[r] > 0.0:
+            springs += 0.5 * motion.spring[r] * min(motion.gap[0, r], 0.0) ** 2
+    for j in range(len(system.tangential)):
+        springs += 0.5 * system.tangential[j] * elongation(system, j, motion.q) ** 2
+    record_section(system, records, motion.counters[PERIOD], motion.q, motion.v, springs, motion.ledger)
 
 
 @inlined
-def row_gap(system, r, q):
-    """Return the displacement of row r."""
-    return system.rest[r] + row_speed(system, r, q)
+def open_step(system, times, motion, records, k):
+    """Keep the state at the start of step k of the period in motion.start; take a sample."""
+    copy(motion.q, motion.start[0])
+    copy(motion.v, motion.start[1])
+    if k == 0:
+        motion.response[0], motion.response[1] = _response(system, times, k, motion.q, motion.v)
+    each = len(records.samples) // max(len(records.peak) - 1, 1)
+    if each > 0 and k % ((len(times.phase) - 1) // each) == 0:
+        row = motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)
+        put_sample(system, motion, records, row, motion.response[0], motion.q, motion.active, 0)
 
 
 @inlined
-def open_step(system, times, motion, records, k, q, v, before):
-    """Keep the state at the start of step k of the period in q, v (N,) and before (friction rows,); take a sample."""
-    copy(motion.q, q)
-    copy(motion.v, v)
-    copy(motion.elongation, before)
-    record_sample(system, times, motion, records, k, q)
+def close_step(system, times, motion, records, log, k, budget, deepest):
+    """Follow contacts and account for step k of the period, with motion.impulse and gap; close the last one's period.
 
-
-@inlined
-def close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest):
-    """Follow contacts and account for step k from the state that `open_step` kept; speed (r,) of the rows then.
-
-    Returns DONE, DIVERGED or PENETRATION.
+    Returns DONE, DIVERGED, PENETRATION or EVENT_BUDGET.
     """
-    follow_contacts(system, times, motion, records, log, k, speed, impulse)
-    return account_step(system, times, motion, records, k, q, v, impulse, before, deepest)
+    _follow_contacts(system, times, motion, records, log, k)
+    code = _account(system, times, motion, records, k, deepest)
+    if code != DONE or k < len(times.phase) - 2:
+        return code
+    total = 0.0
+    for i in range(len(motion.ledger)):
+        total += abs(motion.ledger[i])
+    if not total < math.inf:
+        return DIVERGED
+    motion.counters[PERIOD] += 1
+    record_start(system, motion, records)
+    return EVENT_BUDGET if motion.counters[IMPACTS] >= budget else DONE
 
 
 @inlined
-def account_step(system, times, motion, records, k, q, v, impulse, before, deepest):
-    """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
+def _response(system, times, k, q, v):
+    """Return displacement and velocity of the response at step k of the period."""
+    x, rate = times.table[k, 0], times.table[k, 1]
+    for i in range(system.modes):
+        x += system.response[i] * q[i]
+        rate += system.response[i] * v[i]
+    return x, rate
 
-    before: (friction rows,) elongations of Jenkins springs. Returns DONE, DIVERGED or PENETRATION.
-    """
-    h, n, p = times.step, system.modes, motion.counters[PERIOD]
-    c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
-    x0, x1 = response_of(system, times, k, q), response_of(system, times, k + 1, motion.q)
-    rate0, rate1 = rate_of(system, times, k, v), rate_of(system, times, k + 1, motion.v)
-    _record_response(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
-    size = abs(x1)
+
+@inlined
+def _account(system, times, motion, records, k, deepest):
+    """Account for step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
+    h, p, q, v = times.step, motion.counters[PERIOD], motion.start[0], motion.start[1]
+    x1 = _record_response(system, times, motion, records, k)
+    size, deep, hit = abs(x1), 0.0, False
+    work, viscous = 0.0, 0.0
     for i in range(len(q)):
         moved = motion.q[i] - q[i]
         size = max(size, abs(motion.v[i]))
-        motion.losses[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
-        for j in range(n if i < n else 0):
-            if system.damping[i, j] != 0.0:
-                motion.losses[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
-    deep = 0.0
-    for r in range(len(system.J)):
-        moved, now = 0.0, system.rest[r]
-        contact = r >= system.friction_rows
-        if impulse[r] == 0.0 and not contact:
-            continue
-        for i in range(len(q)):
-            moved += system.J[r, i] * (motion.q[i] - q[i])
-            now += system.J[r, i] * motion.q[i]
-        loss = -impulse[r] / h * moved
-        if contact:
-            deep = max(deep, -now / times.travel[r])
-            if system.spring[r] == math.inf:
-                motion.losses[IMPACT_LOSS] += loss
-            else:
-                motion.losses[CONTACT] += loss - 0.5 * system.spring[r] * (
-                    min(now, 0.0) ** 2 - min(now - moved, 0.0) ** 2
-                )
-        elif system.spring[r] == math.inf:
-            motion.losses[FRICTION] += loss
-        else:
-            motion.losses[FRICTION] += loss - 0.5 * system.spring[r] * (motion.elongation[r] ** 2 - before[r] ** 2)
+        work += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
+        viscous += 0.5 * (product(times.damping, i, v) + product(times.damping, i, motion.v)) * moved
+    motion.ledger[EXCITATION] += work
+    motion.ledger[VISCOUS] += viscous
+    for r in range(system.contacts):
+        now = motion.gap[0, r]
+        deep = max(deep, -now / times.travel[r])
+        if motion.spring[r] > 0.0:
+            stored = min(now, 0.0) ** 2 - min(motion.gap[1, r], 0.0) ** 2
+            motion.ledger[CONTACT] -= 0.5 * motion.spring[r] * stored
+        elif motion.impulse[r] > 0.0 and motion.before[r] < -motion.slowest[0]:
+            hit = True
+    _account_forces(system, motion, h, hit)
+    for j in range(len(system.tangential)):
+        stored = elongation(system, j, motion.q) ** 2 - elongation(system, j, q) ** 2
+        motion.ledger[FRICTION] -= 0.5 * system.tangential[j] * stored
     motion.deepest[0] = max(motion.deepest[0], deep)
+    note_tilts(system, motion, motion.q, p)
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0 and not _stands(system, motion, b):
+            motion.lifted[p, b] += h
     motion.counters[STEPS] += 1
     if not size < _BOUND:
         return DIVERGED
@@ -130,108 +152,73 @@ def account_step(system, times, motion, records, k, q, v, impulse, before, deepe
 
 
 @inlined
-def _record_response(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
-    """Record peak, mean square, harmonic and momentum of a step."""
+def _record_response(system, times, motion, records, k):
+    """Record peak, mean square, harmonic and momentum of step k of the period. Return the response at its end."""
+    h, p, v = times.step, motion.counters[PERIOD], motion.start[1]
+    x0, rate0 = motion.response[0], motion.response[1]
+    x1, rate1 = _response(system, times, k + 1, motion.q, motion.v)
+    motion.response[0], motion.response[1] = x1, rate1
+    c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
     note_step(records, p, h, x0, x1, rate0, rate1)
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
     m0, m1 = 0.0, 0.0
-    for i in range(system.modes, len(v)):
-        m0 += system.mass[i] * v[i]
-        m1 += system.mass[i] * after[i]
+    for b in range(len(system.along)):
+        m0 += system.mass[system.along[b]] * v[system.along[b]]
+        m1 += system.mass[system.along[b]] * motion.v[system.along[b]]
     records.momentum[p] += h / 2.0 * complex(m0 * c0 + m1 * c1, -m0 * s0 - m1 * s1)
+    return x1
 
 
 @inlined
-def follow_contacts(system, times, motion, records, log, k, speed, impulse):
-    """Count and log impacts: contacts that have begun to carry force, with the speeds (r,) at the step's start.
+def _account_forces(system, motion, h, hit):
+    """Enter what the forces of the rows take. hit: whether rigid contacts that approached have pushed in this step.
 
-    An impact ends when its contact carries no force any more, which completes its entry in the log.
+    What contacts take is then an impact's loss.
     """
-    h, p = times.step, motion.counters[PERIOD]
-    for r in range(system.friction_rows, len(system.J)):
-        pushed = impulse[r] > 0.0
-        if pushed and motion.active[r] == 0 and speed[r] < 0.0:
+    u = len(system.rest)
+    for a in range(len(motion.live)):
+        row = motion.live[a]
+        if motion.impulse[row] != 0.0:
+            moved, unit = 0.0, row - u if row >= u else row
+            for i in range(len(motion.q)):
+                moved += system.J[row, i] * (motion.q[i] - motion.start[0, i])
+            loss = -motion.impulse[row] / h * moved
+            if row == unit:
+                entry = CONTACT if motion.spring[unit] > 0.0 else IMPACT_LOSS
+            else:
+                entry = IMPACT_LOSS if hit and unit < system.contacts else FRICTION
+            motion.ledger[entry] += loss
+            motion.lost[unit] += loss
+
+
+@inlined
+def _stands(system, motion, b):
+    """Whether the floor pushes a body in this step."""
+    for r in range(system.contacts):
+        if system.body[r] == b and system.surface[r] == FLOOR and motion.impulse[r] > 0.0:
+            return True
+    return False
+
+
+@inlined
+def _follow_contacts(system, times, motion, records, log, k):
+    """Count contacts that begin to carry force, and log those that have ended, as planar.impacts.log_event does."""
+    u, p = len(system.rest), motion.counters[PERIOD]
+    for r in range(system.contacts):
+        pushed, before = motion.impulse[r] > 0.0, motion.before[r]
+        if pushed and motion.active[r] == 0 and before < 0.0:
             motion.counters[IMPACTS] += 1
             records.impacts[p] += 1
-            mobility = 0.0
-            for i in range(len(system.mass)):
-                mobility += system.J[r, i] ** 2 / system.mass[i]
-            records.collided[p] += 0.5 * speed[r] ** 2 / mobility
-            motion.speed[r], motion.impulse[r] = speed[r], 0.0
-            motion.begun[r] = (p * (len(times.phase) - 1) + k) * h
+            records.collided[p] += 0.5 * before * before / system.delassus[r, r]
+            motion.speed[r], motion.total[r], motion.total[u + r], motion.lost[r] = before, 0.0, 0.0, 0.0
+            motion.begun[r] = (p * (len(times.phase) - 1) + k) * times.step
         if pushed:
-            motion.impulse[r] += impulse[r]
+            motion.total[r] += motion.impulse[r]
+            motion.total[u + r] += motion.impulse[u + r]
         elif motion.active[r] == 1 and motion.counters[LOGGED] < len(log):
             entry = log[motion.counters[LOGGED]]
             entry[0], entry[1], entry[2], entry[3] = motion.begun[r], IMPACT, r, motion.speed[r]
-            entry[4], entry[5] = speed[r], motion.impulse[r]
+            entry[4], entry[5], entry[6], entry[7] = before, motion.total[r], motion.total[u + r], motion.lost[r]
             motion.counters[LOGGED] += 1
         motion.active[r] = 1 if pushed else 0
-
-
-@inlined
-def record_sample(system, times, motion, records, k, q):
-    """Keep a sample if step k of the period begins at one."""
-    steps, b = len(times.phase) - 1, system.bodies
-    each = len(records.samples) // max(len(records.peak) - 1, 1)
-    if each == 0:
-        return
-    stride = steps // each
-    if k % stride == 0 and k // stride < each:
-        row = motion.counters[PERIOD] * each + k // stride
-        entry, p = records.samples[row], records.coordinates[row]
-        entry[0] = response_of(system, times, k, q)
-        for i in range(len(p)):
-            p[i] = q[i]
-        for i in range(b):
-            entry[1 + i] = row_speed(system, i, q)
-
-
-@inlined
-def apply_inverse(inverse, diagonal, vector, result):
-    """Set result = inverse vector; a diagonal inverse is used as such."""
-    for i in range(len(vector)):
-        if diagonal:
-            result[i] = inverse[i, i] * vector[i]
-        else:
-            result[i] = 0.0
-            for j in range(len(vector)):
-                result[i] += inverse[i, j] * vector[j]
-
-
-@inlined
-def damping_force(system, v, i):
-    """Return the viscous force on coordinate i."""
-    if i >= system.modes:
-        return 0.0
-    force = 0.0
-    for j in range(system.modes):
-        force += system.damping[i, j] * v[j]
-    return force
-
-
-@inlined
-def load_at(system, times, k, i):
-    """Return the load on coordinate i at step k of the period, weight included, N."""
-    return times.load[k, i] + system.weight[i]
-
-
-@inlined
-def copy(source, target):
-    """Copy (N,) numbers."""
-    for i in range(len(target)):
-        target[i] = source[i]
-
-
-@inlined
-def end_period(system, times, motion, records, budget):
-    """Close a period. Returns DONE, DIVERGED or EVENT_BUDGET."""
-    total = 0.0
-    for i in range(len(motion.losses)):
-        total += abs(motion.losses[i])
-    if not total < math.inf:
-        return DIVERGED
-    motion.counters[PERIOD] += 1
-    record_start(system, motion, records)
-    return EVENT_BUDGET if motion.counters[IMPACTS] >= budget else DONE

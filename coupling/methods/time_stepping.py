@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.methods.equations_of_motion import Motion
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
-from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, Rows
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
+from vanedamp.coupling.response.recorder import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
@@ -20,45 +22,21 @@ _OPEN_LEDGER = 0.1
 _SLICE = 100_000
 
 #: step the motion until a number of steps is done, with this log; returns a code of numerics.codes
-March = Callable[[Any, np.ndarray, int], int]
-
-
-class Stepped(Protocol):
-    """What a run reads of its motion."""
-
-    @property
-    def counters(self) -> np.ndarray:
-        """Counters (COUNTERS,) of numerics.codes."""
-
-    @property
-    def active(self) -> np.ndarray:
-        """Whether each row or unit (r,) is in contact."""
-
-    @property
-    def deepest(self) -> np.ndarray:
-        """Largest penetration (1,), relative to the free travel."""
+March = Callable[[np.ndarray, int], int]
 
 
 class SteppedRun:
     """A run of a stepping method, which marches a motion by its steps per period and fills the records."""
 
     def __init__(
-        self,
-        system: System,
-        rows: Rows,
-        march: March,
-        motion: Stepped,
-        records: Records,
-        events: bool,
-        steps: int,
-        plane: Plane | None = None,
+        self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
     ) -> None:
-        self.system, self.rows, self.march, self.plane = system, rows, march, plane
-        self.motion, self.records = motion, records
-        self.steps = steps
+        self.system, self.march, self.motion, self.records = system, march, motion, records
+        self.steps = options.smallest_steps
+        self.plane = plane_of(system, motion, options.linearisation) if system.in_plane else None
         # a contact logs at most one impact per step
-        self.slice = max(_SLICE // max(len(motion.active), 1), 1)
-        self.log = np.zeros((_SLICE if events else 0, LINE_WIDTH if plane is None else WIDTH))
+        self.slice = max(_SLICE // max(system.contacts, 1), 1)
+        self.log = np.zeros((_SLICE if events else 0, WIDTH))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:
@@ -66,8 +44,8 @@ class SteppedRun:
         counters = self.motion.counters
         while counters[PERIOD] < periods:
             until = min(periods * self.steps, int(counters[STEPS]) + self.slice)
-            code = self.march(self.motion, self.log, until)
-            self.chunks.append(self.log[: counters[LOGGED]].copy())
+            code = self.march(self.log, until)
+            self.chunks.append(self.log[: counters[LOGGED], : WIDTH if self.plane else LINE_WIDTH].copy())
             counters[LOGGED] = 0
             if code != DONE:
                 return STATUS_OF[code]
@@ -81,7 +59,8 @@ class SteppedRun:
         }  # fmt: skip
         return Outcome(
             self.system, self.records, int(counters[PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
-            [chunk for chunk in self.chunks if len(chunk)], self.rows, float(self.motion.deepest[0]), self.plane,
+            [chunk for chunk in self.chunks if len(chunk)], rows_of_units(self.system),
+            float(self.motion.deepest[0]), self.plane,
         )  # fmt: skip
 
     def final(self) -> None:

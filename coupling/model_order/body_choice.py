@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
+from vanedamp.coupling.methods.engines import reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state, run_of, why_no_restart
 from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.evaluation import Run
@@ -197,8 +198,6 @@ def _begin(scene: Scene, index: int, state: RestartState, periods: int, earlier:
 
     earlier: runs of the same scene, whose flows serve again.
     """
-    from vanedamp.coupling.planar.planar_run import PlanarRun  # its kernels are loaded when they are wanted
-
     share, lift = _TILTS[index], _LIFT
     if abs(share) == _SMALL:
         play = min(cavity.play for cavity in scene.cavity if cavity.play is not None)
@@ -206,8 +205,7 @@ def _begin(scene: Scene, index: int, state: RestartState, periods: int, earlier:
         lift = min(max(fallen / play, _BARELY), _LIFT)
     blocks = _watched(_changed(scene, {"shape": "block"}), periods)
     run = run_of(blocks, start=_tilted(scene, state, share, lift))
-    if earlier and isinstance(run, PlanarRun) and isinstance(earlier[-1], PlanarRun):
-        run.flows = earlier[-1].flows
+    reuse_subsystems(run, earlier[-1] if earlier else None)
     return run
 
 

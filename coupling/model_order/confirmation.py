@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import respond, why_no_restart
+from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
@@ -66,16 +66,11 @@ def confirmed(choice: Choice, scenes: Sequence[Scene], peak: float) -> Confirmed
         if (rung.modes, rung.attached) == (whole.modes, whole.attached):
             break
         difference, several = _worst([pair.compare(rung) for pair in pairs])
-        found = _with(choice, rung, difference, several, _from_one_start(pairs))
+        found = _with(choice, rung, difference, several)
         if _SAFETY * difference <= tolerance:
             return found
         alike = alike or (found if several else None)
     return alike or _with(choice, whole, 0.0, False)
-
-
-def _from_one_start(pairs: Sequence[_Pair]) -> str:
-    """Return the end of a sentence on runs that leave no state for another."""
-    return "" if why_no_restart(pairs[0].whole) is None else ", from one start: other steady states were not tried"
 
 
 def _worst(found: Sequence[tuple[float, bool]]) -> tuple[float, bool]:
@@ -83,7 +78,7 @@ def _worst(found: Sequence[tuple[float, bool]]) -> tuple[float, bool]:
     return max(found)
 
 
-def _with(choice: Choice, rung: Rung, difference: float, several: bool, remark: str = "") -> Confirmed:
+def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confirmed:
     """Return the choice of a model, with the sentence on its runs."""
     what = f"{rung.modes} mode{'s' * (rung.modes != 1)}"
     if rung.attached:
@@ -91,7 +86,7 @@ def _with(choice: Choice, rung: Rung, difference: float, several: bool, remark: 
     sentence = choice.sentence
     if rung != choice.chosen:
         sentence = f"{what}, as the estimate's choice did not hold in runs: {sentence}"
-    sentence += f"; in runs of both {100 * difference:.2g} % off the whole model's mean amplitude{remark}"
+    sentence += f"; in runs of both {100 * difference:.2g} % off the whole model's mean amplitude"
     if several:
         sentence += ", as both have several steady states and the start decides which is reached"
     values = {item.name: getattr(choice, item.name) for item in fields(Choice)} | {"chosen": rung, "sentence": sentence}
@@ -118,7 +113,7 @@ class _Pair:
         """Return the difference of mean amplitudes, and whether one that is too large is of common steady states."""
         made = self._with(rung)
         own, whole = [respond(made)], [self.reference]
-        if not why_no_restart(made) and own[0].final is not None and whole[0].final is not None:
+        if own[0].final is not None and whole[0].final is not None:
             small, large = basis_of(made), basis_of(self.whole)
             own.append(respond(made, start=_in_modes(whole[0].final, large, small)))
             whole.append(respond(self.whole, start=_in_modes(own[0].final, small, large)))

@@ -17,12 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE, OUT
-from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.tolerances import DEPENDENCE, FORCE_ROUND_OFF
 
 NONE = np.int64(-1)
-_ROUND_OFF = 1e-12
-_DEPENDENCE = 1e-9
 
 
 @entry
@@ -48,7 +47,7 @@ def solve_box(problem, k, scale):
         for j in range(k):
             a[i] += problem.matrix[i, j] * f[j]
         scale = max(scale, abs(a[i]), abs(problem.b[i]))
-    tolerance = _ROUND_OFF * scale
+    tolerance = FORCE_ROUND_OFF * scale
     for i in range(k):
         if state[i] == OUT and not _drive(problem, k, i, tolerance):
             return False
@@ -89,27 +88,7 @@ def _drive(problem, k, i, tolerance):
             state[i] = AT_HIGH if way > 0.0 else AT_LOW
             return True
         _respond(problem, k, i, way)
-        step, stops, at_bound = (bound - f[i]) * way, i, True
-        if da[i] * way > 0.0 and -a[i] / da[i] <= step:
-            step, at_bound = -a[i] / da[i], False
-        for j in range(k):
-            if j == i or state[j] == OUT:
-                continue
-            if state[j] == FREE:
-                if df[j] != 0.0:
-                    room = ((problem.high[j] if df[j] > 0.0 else problem.low[j]) - f[j]) / df[j]
-                    if room < step:
-                        step, stops, at_bound = max(room, 0.0), j, True
-            elif state[j] == DEPENDENT:
-                # a row that FREE rows held takes over at once when they no longer do
-                if abs(da[j]) > _DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
-                    step, stops, at_bound = 0.0, j, False
-            elif problem.forced[j] == 0 and (
-                (state[j] == AT_LOW and da[j] < 0.0) or (state[j] == AT_HIGH and da[j] > 0.0)
-            ):
-                room = max(-a[j] / da[j], 0.0)
-                if room < step and not _dependent_beside(problem, k, j, i):
-                    step, stops, at_bound = room, j, False
+        step, stops, at_bound = _longest_step(problem, k, i, way, bound)
         if step == np.inf:
             return False
         for j in range(k):
@@ -124,6 +103,39 @@ def _drive(problem, k, i, tolerance):
         if stops == i:
             return True
     return False
+
+
+@kernel
+def _longest_step(problem, k, i, way, bound):
+    """Return the step of f_i before a condition breaks, the row that stops it, and whether its force is at a bound."""
+    f, a, state = problem.force, problem.acceleration, problem.state
+    df, da = problem.d_force, problem.d_acceleration
+    step, stops, at_bound = (bound - f[i]) * way, i, True
+    if da[i] * way > 0.0 and -a[i] / da[i] <= step:
+        step, at_bound = -a[i] / da[i], False
+    for j in range(k):
+        if j == i or state[j] == OUT:
+            continue
+        if state[j] == FREE:
+            if df[j] != 0.0:
+                room = ((problem.high[j] if df[j] > 0.0 else problem.low[j]) - f[j]) / df[j]
+                if room < step:
+                    step, stops, at_bound = max(room, 0.0), j, True
+        elif state[j] == DEPENDENT:
+            # a row that FREE rows held takes over at once when they no longer do
+            if abs(da[j]) > DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
+                step, stops, at_bound = 0.0, j, False
+        elif problem.forced[j] == 0 and _falls_to_zero(state[j], da[j]):
+            room = max(-a[j] / da[j], 0.0)
+            if room < step and not _dependent_beside(problem, k, j, i):
+                step, stops, at_bound = room, j, False
+    return step, stops, at_bound
+
+
+@inlined
+def _falls_to_zero(state, change):
+    """Whether the acceleration of a row at a bound changes towards zero."""
+    return (state == AT_LOW and change < 0.0) or (state == AT_HIGH and change > 0.0)
 
 
 @kernel
@@ -142,11 +154,11 @@ def _respond(problem, k, i, way):
         for l in range(k):
             da[j] += problem.matrix[j, l] * df[l]
             size += abs(problem.matrix[j, l] * df[l])
-        if abs(da[j]) <= _ROUND_OFF * size:
+        if abs(da[j]) <= FORCE_ROUND_OFF * size:
             da[j] = 0.0  # a row that FREE rows hold would come in and go out for ever
     for p in range(count):
         da[problem.free[p]] = 0.0
-    if da[i] * way <= _DEPENDENCE * problem.matrix[i, i]:
+    if da[i] * way <= DEPENDENCE * problem.matrix[i, i]:
         da[i] = 0.0
 
 
@@ -164,14 +176,14 @@ def _free_rows(problem, k, but, also):
 @kernel
 def _dependent(problem, k, i):
     """Whether the FREE rows determine the acceleration of row i."""
-    return _rest(problem, _free_rows(problem, k, i, NONE), i) <= _DEPENDENCE * problem.matrix[i, i]
+    return _rest(problem, _free_rows(problem, k, i, NONE), i) <= DEPENDENCE * problem.matrix[i, i]
 
 
 @kernel
 def _dependent_beside(problem, k, j, i):
     """Whether the FREE rows together with row i determine the acceleration of row j."""
     also = NONE if _dependent(problem, k, i) else i
-    return _rest(problem, _free_rows(problem, k, j, also), j) <= _DEPENDENCE * problem.matrix[j, j]
+    return _rest(problem, _free_rows(problem, k, j, also), j) <= DEPENDENCE * problem.matrix[j, j]
 
 
 @kernel

@@ -14,15 +14,8 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.tolerances import PIVOT, PIVOT_GROWTH, RESIDUAL, RESIDUAL_LARGEST
 
-#: entries of the tableau below this are round-off, for problems scaled to numbers of size one
-_PIVOT = 1e-11
-#: round-off of the tableau relative to the largest entry that it has had: forces of a wedge make it grow to 1e8
-_GROWN = 5e-13
-#: share of its terms by which a row of a solution may be wrong
-_RESIDUAL = 1e-9
-#: round-off of a solution relative to its largest term: forces of a wedge nearly balance each other
-_ROUND_OFF = 1e-14
 #: covering vectors that are tried, and the ratio that spreads their entries
 _ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 
@@ -56,7 +49,7 @@ def solve_lemke(problem, k, first):
     judged by how far the tableau grows.
     first: number of the covering vector to begin with, 0 or more.
     """
-    for grown in (0.0, _GROWN):
+    for grown in (0.0, PIVOT_GROWTH):
         for attempt in range(first, first + _ATTEMPTS):
             if _solve(problem, k, attempt, grown) and _fits(problem, k):
                 return True
@@ -67,10 +60,10 @@ def solve_lemke(problem, k, first):
 def _solve(problem, k, attempt, grown):
     """Solve the problem by one covering vector: that of ones, or another one for later attempts.
 
-    grown: round-off relative to the largest entry so far, beside _PIVOT.
+    grown: round-off relative to the largest entry so far, beside PIVOT.
     """
     t, basis, cover, last, noise = problem.tableau, problem.basis, 2 * k, 2 * k + 1, 0.0
-    lowest, leaving = -_PIVOT, -1
+    lowest, leaving = -PIVOT, -1
     for i in range(k):
         for j in range(2 * k + 1):
             t[i, j] = 0.0
@@ -111,7 +104,7 @@ def _solve(problem, k, attempt, grown):
             for i in range(k):
                 for j in range(2 * k + 2):
                     noise = max(noise, grown * abs(t[i, j]))
-        leaving, least = -1, max(_PIVOT, noise)
+        leaving, least = -1, max(PIVOT, noise)
         for i in range(k):
             if t[i, entering] > least and (leaving < 0 or _before(t, basis, i, leaving, entering, k, noise)):
                 leaving = i
@@ -132,7 +125,7 @@ def _fits(problem, k):
             part = problem.matrix[i, j] * problem.z[j]
             error += part
             size += abs(part)
-        if abs(error) > max(_RESIDUAL * max(size, 1.0), _ROUND_OFF * largest):
+        if abs(error) > max(RESIDUAL * max(size, 1.0), RESIDUAL_LARGEST * largest):
             return False
     return True
 
@@ -141,7 +134,7 @@ def _fits(problem, k):
 def _before(t, basis, i, other, entering, k, noise):
     """Whether row i leaves the basis before another one: smaller ratio, covering variable, lexicographic order."""
     last, a, b = 2 * k + 1, t[i, entering], t[other, entering]
-    tie = max(_PIVOT * a * b, noise * (a + b))
+    tie = max(PIVOT * a * b, noise * (a + b))
     difference = t[i, last] * b - t[other, last] * a
     if abs(difference) > tie:
         return difference < 0.0

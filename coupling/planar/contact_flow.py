@@ -4,7 +4,7 @@ The forces of closed contacts keep their gaps (and the slips of those that stick
 presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
 the projection of the accelerations is oblique. Only what is stretched, xi = B q with B a basis of the rows of stiffness
 and damping, moves by a differential equation of its own, whose modes are complex and may grow; everything else follows
-by quadrature. A closed contact that yields is a spring and a dashpot whose force has the direction W_N - sigma mu W_T.
+by quadrature. A closed compliant contact is a spring and a dashpot whose force has the direction W_N - sigma mu W_T.
 Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
 
 All is computed in coordinates sqrt(M) q, where the mass matrix is one.
@@ -17,23 +17,22 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eig, null_space, orth
 
-from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
+from vanedamp.coupling.exact.complex_modes import IllConditioned
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
+from vanedamp.coupling.planar.tolerances import (
+    APART,
+    FASTEST,
+    HELD_ROUND_OFF,
+    RANK,
+    REFINED,
+    SINGULAR,
+    SLOWEST,
+    SQUARED,
+    STIFFEST,
+)
 from vanedamp.coupling.system.system import System
-
-#: share of their size below which singular values are zero: rows that depend on each other
-_DEPENDENT = 1e-9
-#: share of a load that accelerates what is held, above which forces are found without the square of the rows' condition
-_SQUARED = 1e-13
-#: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
-_SLOW = 1e-6
-#: and those beyond this many times it: forces would be, and following them would not end
-_FAST = 1e6
-#: ratio of frequencies above which modes are polished, and the largest step of that, relative to a mode
-_APART, _POLISHED = 30.0, 1e-6
-#: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
-_STIFF = 1e4
 
 
 @record
@@ -55,8 +54,8 @@ class ContactFlows(NamedTuple):
     force_constant: np.ndarray  # (s, 2u)
     force_held: np.ndarray  # (s, 2u, N)
     self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
-    snap: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
-    snap_rate: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
+    close_gaps: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
+    stop_rows: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
     held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
     drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
     loss: np.ndarray  # (s, m, m): G^T C G
@@ -76,7 +75,7 @@ def empty_flows(system: System, capacity: int = 8) -> ContactFlows:
         key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
         project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
-        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), snap=f(size, u), snap_rate=f(size, 2 * u),
+        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), close_gaps=f(size, u), stop_rows=f(size, 2 * u),
         held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
         fastest=f(),
     )  # fmt: skip
@@ -116,7 +115,7 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
         return np.zeros((0, len(root)))
     if np.linalg.matrix_rank(both[:, touched]) == len(touched):
         return np.eye(len(root))[touched]
-    basis: np.ndarray = orth(both.T, rcond=1e-12).T
+    basis: np.ndarray = orth(both.T, rcond=RANK).T
     return basis
 
 
@@ -125,9 +124,9 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
     root = np.sqrt(system.mass)
     rows = system.J / root
     units = np.arange(u)
-    yields = np.isfinite(system.spring)
-    closed = np.flatnonzero((state < OPEN) & (units < system.contacts) & ~yields)
-    pressed = np.flatnonzero((state < OPEN) & yields)
+    compliant = np.isfinite(system.spring)
+    closed = np.flatnonzero((state < OPEN) & (units < system.contacts) & ~compliant)
+    pressed = np.flatnonzero((state < OPEN) & compliant)
     stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
     way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
     kept = np.r_[closed, u + stick]
@@ -149,18 +148,18 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
     if len(holds):
         stretch = system.elongation[holds] / root
         mobility = (stretch[:, : size - sliders] ** 2).sum(axis=1)
-        if (system.tangential[holds] * mobility).max() > (_STIFF * system.frequency[0]) ** 2:
+        if (system.tangential[holds] * mobility).max() > (STIFFEST * system.frequency[0]) ** 2:
             raise IllConditioned("the spring of a friction damper is as good as rigid")
         stiffness = stiffness + stretch.T @ (system.tangential[holds, None] * stretch)
     basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
         # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
-        turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=_DEPENDENT), full_matrices=False)
-        allowed = turned[:, sine > _DEPENDENT]
+        turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=SINGULAR), full_matrices=False)
+        allowed = turned[:, sine > SINGULAR]
     k = allowed.shape[1]
     held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
-    held[np.abs(held) < 1e-15] = 0.0
+    held[np.abs(held) < HELD_ROUND_OFF] = 0.0
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
     inner[:, size - sliders :] = 0.0  # sliders rest, or follow
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
@@ -194,7 +193,7 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
         for part in (motion, bend, bend_held):
             part[a] = root[a] * (row[:-sliders] @ part[:-sliders])
     # a coordinate that constraints hold is at rest, not at round-off
-    motion[np.abs(motion) <= 1e-15 * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
+    motion[np.abs(motion) <= HELD_ROUND_OFF * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
     flows.key[s], flows.modes[s] = state, count
     flows.eigenvalue[s, :count] = rate
     both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
@@ -206,7 +205,7 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
     flows.motion[s, :, :count] = motion / root[:, None]
     turned = system.J @ flows.motion[s, :, :count]
     terms = np.abs(system.J) @ np.abs(flows.motion[s, :, :count])
-    flows.rows[s, :, :count] = np.where(np.abs(turned) <= 1e-14 * terms, 0, turned)
+    flows.rows[s, :, :count] = np.where(np.abs(turned) <= CANCELLED * terms, 0, turned)
     flows.bend[s], flows.bend_held[s] = bend / root, bend_held / root[:, None] * root
     flows.force[s], flows.force_constant[s], flows.force_held[s] = 0.0, 0.0, 0.0
     for part, target in ((net, flows.force[s, :, :count]), (net_constant, flows.force_constant[s])):
@@ -224,17 +223,17 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
     flows.self_stress[s] = 0.0
     if len(kept):
         lever = np.linalg.norm(wrench, axis=0)
-        balanced = null_space(wrench / lever, rcond=_DEPENDENT)
+        balanced = null_space(wrench / lever, rcond=SINGULAR)
         spread = np.zeros((2 * u, len(kept)))
         _spread(spread, balanced @ balanced.T / lever[:, None] * lever, closed, stick, drag, u)
         flows.self_stress[s][:, kept] = spread
-    touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~yields)
-    flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
-    flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
+    touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~compliant)
+    flows.close_gaps[s], flows.stop_rows[s] = 0.0, 0.0
+    flows.close_gaps[s][:, touching] = np.linalg.pinv(rows[touching], rcond=SINGULAR) / root[:, None]
     still_rows = np.r_[touching, u + stick]
-    flows.snap_rate[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=_DEPENDENT) / root[:, None]
-    free = drawn - drawn @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
-    flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(drawn, axis=1)
+    flows.stop_rows[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=SINGULAR) / root[:, None]
+    free = drawn - drawn @ np.linalg.pinv(constraints, rcond=SINGULAR) @ constraints
+    flows.held[s] = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
     speeds = flows.motion[s, :, :count] * rate
     drag = system.damping @ speeds
     flows.drag[s, :, :count] = drag
@@ -260,10 +259,10 @@ def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np
         return np.zeros((0, size)), np.eye(size)
     mobility = constraints @ wrench
     scale = 1 / np.linalg.norm(constraints, axis=1)
-    inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=_DEPENDENT) * scale * scale[:, None]
+    inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=SINGULAR) * scale * scale[:, None]
     carried = -inverse @ constraints
     oblique = np.eye(size) + wrench @ carried
-    if _yielding(constraints, oblique, scale) > _SQUARED:
+    if _yielding(constraints, oblique, scale) > SQUARED:
         carried, oblique = _forces_of_near_dependent(constraints, wrench, scale, carried, oblique)
         if _yielding(constraints, oblique, scale) > LOST:
             raise IllConditioned("its friction forces have no solution")
@@ -286,13 +285,13 @@ def _forces_of_near_dependent(
     returned.
     """
     wrench = wrench * scale
-    free = null_space(constraints * scale[:, None], rcond=_DEPENDENT)
-    normal = null_space(wrench.T, rcond=_DEPENDENT)
+    free = null_space(constraints * scale[:, None], rcond=SINGULAR)
+    normal = null_space(wrench.T, rcond=SINGULAR)
     meeting = normal.T @ free  # cosines
-    if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < _DEPENDENT:
+    if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < SINGULAR:
         return carried, oblique
     oblique = free @ np.linalg.solve(meeting, normal.T)
-    carried = np.linalg.pinv(wrench, rcond=_DEPENDENT) @ (oblique - np.eye(len(oblique))) * scale[:, None]
+    carried = np.linalg.pinv(wrench, rcond=SINGULAR) @ (oblique - np.eye(len(oblique))) * scale[:, None]
     return carried, oblique
 
 
@@ -308,11 +307,11 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np
     matrix = np.block([[np.zeros((k, k)), np.eye(k) * scale], [-stiffness / scale, -damping]])
     values, vectors = eig(matrix)
     vectors /= np.linalg.norm(vectors, axis=0)
-    if np.abs(values).max() > _FAST * omega:
+    if np.abs(values).max() > FASTEST * omega:
         raise IllConditioned("a mode is too fast for the excitation")
-    if np.abs(values).min() < _SLOW * omega or np.linalg.cond(vectors) > DEFECTIVE:
+    if np.abs(values).min() < SLOWEST * omega or np.linalg.cond(vectors) > DEFECTIVE:
         raise IllConditioned("its modes are one to round-off, or it has no stiffness")
-    if np.abs(values).max() > _APART * np.abs(values).min():
+    if np.abs(values).max() > APART * np.abs(values).min():
         values, shapes = _polish(values, vectors[:k], stiffness, damping)
         vectors = np.vstack([shapes, shapes * values / scale])
         vectors /= np.linalg.norm(vectors, axis=0)
@@ -345,7 +344,7 @@ def _polish(
                 change = np.linalg.solve(system / size[:, None], np.r_[-(force @ shape), 0.0] / size)
             except np.linalg.LinAlgError:
                 break
-            if not max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= _POLISHED:
+            if not max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= REFINED:
                 break
             shape, value = shape + change[:-1], value + change[-1]
         values[n], shapes[:, n] = value, shape

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.event_functions import AT_START, ENDLESS, MOST, RESOLUTION, step_or_stop
-from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.exact.event_functions import ENDLESS, MOST, step_or_stop
 from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
@@ -32,14 +31,10 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs, yields
+from vanedamp.coupling.numerics.tolerances import AT_START, RESOLUTION, SUM_ROUND_OFF
+from vanedamp.coupling.planar.tolerances import AT_REST, DECIDED, DRIFT, FLAT
+from vanedamp.coupling.planar.unit_kinematics import has_friction, is_compliant
 
-#: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
-_ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
-#: what counts as zero where contacts have just been decided: of a gap, as a share of the play; of a speed
-_ZERO = 1e-12
-#: gap, as a share of the play, at which a contact that yields and touches without force has closed or opened
-_DRIFT = 2 * SIMULTANEOUS
 #: exponent of the growth of modes until the period's end above which the search looks less far
 _GROWN = 20.0
 #: angle by which the fastest mode turns in the longest segment: the integrals over one follow every turn
@@ -62,7 +57,7 @@ def next_event(system, flows, st, guards):
     shortest = RESOLUTION * system.period
     eigenvalue, modes = flows.eigenvalue[s], flows.modes[s]
     grows = math.exp(flows.growth[s] * left)
-    count = _watch(system, flows, st, guards, s, grows)
+    count = _list_functions(system, flows, st, guards, s, grows)
     st.counters[SEGMENTS] += 1
     most = st.counters[EVALUATIONS] + MOST
     while True:
@@ -96,7 +91,7 @@ def next_event(system, flows, st, guards):
 
 
 @inlined
-def _watch(system, flows, st, guards, s, grows):
+def _list_functions(system, flows, st, guards, s, grows):
     """Set up the event functions of the segment. Returns how many."""
     u, count = len(system.rest), ZERO
     for r in range(u):
@@ -109,17 +104,17 @@ def _watch(system, flows, st, guards, s, grows):
                 on_gap, on_rate = system.spring[r], system.dashpot[r]
                 count = _add(system, flows, st, guards, s, r, POSITION, RECLOSES, on_gap, on_rate, grows, count)
             elif state == TOUCHING:
-                if yields(system, r):  # nothing presses it now
+                if is_compliant(system, r):  # nothing presses it now
                     count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
                     count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
             else:
                 count = _add(system, flows, st, guards, s, r, FORCE, PARTS, 1.0, 0.0, grows, count)
-        if state == STICK and rubs(system, r):
+        if state == STICK and has_friction(system, r):
             bound = system.friction[r]
             count = _add(system, flows, st, guards, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
             count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, bound, 1.0, grows, count)
         slips = (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]
-        if slips and rubs(system, r):
+        if slips and has_friction(system, r):
             way = 1.0 if state == SLIP_RIGHT else -1.0
             count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
     return count
@@ -132,42 +127,17 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
     Where a contact is leaving, it is the gap and its rate times them. Returns the number of functions so far. One whose
     force never comes near its bound is left out.
     """
-    u, size, modes = len(system.rest), len(st.q), flows.modes[s]
-    k0, k1, k2, noise, leaves, unit = 0.0, 0.0, 0.0, 0.0, False, 1.0
-    if order == FORCE:
-        k0 = on_normal * st.force[r] + on_slip * st.force[u + r] + system.limit[r]
-        noise = abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r]) + system.limit[r]
-        if yields(system, r):  # its force is a small difference of displacements
-            noise += abs(on_normal) * system.spring[r] * system.play[r]
-    elif what == CLOSES:
-        k0, noise = system.rest[r], abs(system.rest[r])
-        for i in range(size):
-            part = system.J[r, i] * st.q[i]
-            k0 += part
-            noise += abs(part)
-            k1 += system.J[r, i] * st.v[i]
-            k2 += system.J[r, i] * st.bend[i]
-    elif order == POSITION:
-        leaves, unit = True, abs(on_normal)
-        k0, noise = on_normal * system.rest[r], abs(on_normal * system.rest[r])
-        for i in range(size):
-            part, speed = on_normal * system.J[r, i] * st.q[i], on_slip * system.J[r, i] * st.v[i]
-            k0 += part + speed
-            noise += abs(part) + abs(speed)
-            k1 += system.J[r, i] * (on_normal * st.v[i] + on_slip * st.bend[i])
-            k2 += on_normal * system.J[r, i] * st.bend[i]
-    else:
-        for i in range(size):
-            part = on_slip * system.J[u + r, i] * st.v[i]
-            k0 += part
-            noise += abs(part)
-            k1 += on_slip * system.J[u + r, i] * st.bend[i]
+    k0, k1, k2, noise = _polynomial(system, st, r, order, what, on_normal, on_slip)
+    leaves, unit = order == POSITION and what != CLOSES, 1.0
+    if leaves:
+        unit = abs(on_normal)
     if st.state[r] == TOUCHING:  # as far as round-off of its gap may have it drift
-        k0 += _DRIFT * system.play[r]
+        k0 += DRIFT * system.play[r]
+    u = len(system.rest)
     # derivatives at the start, and bounds of them at all later times
     first, second, third, second_bound, third_bound, fourth_bound, swing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     value = k0
-    for j in range(modes):
+    for j in range(flows.modes[s]):
         rate = flows.eigenvalue[s, j]
         if order == FORCE:
             g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
@@ -201,17 +171,9 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
     second += k2 if order == POSITION else 0.0
     guards.unit[k], guards.order[k], guards.what[k], guards.status[k] = r, order, what, BOUNDED
     guards.k0[k], guards.k1[k], guards.k2[k], guards.no_root_before[k] = k0, k1, k2, 0.0
-    guards.noise[k] = _ROUND_OFF * (noise + swing)
-    falls = first < -_NOTHING * second_bound * system.period
-    if order == POSITION:
-        falls = falls and first < -AT_REST * st.scale[0] * unit
-    zero = (
-        _NOTHING * (noise + swing)
-        if order == FORCE
-        else _ZERO * (system.play[r] * unit if order == POSITION else st.scale[0])
-    )
-    if st.fresh[r] != 0 and not falls and value <= zero:
-        guards.no_root_before[k] = _leave(
+    guards.noise[k] = SUM_ROUND_OFF * (noise + swing)
+    if _begins_at_zero(system, st, r, order, unit, value, first, second_bound, noise + swing):
+        guards.no_root_before[k] = _first_step(
             system.period, first, second, third, second_bound * grows + abs(k2), third_bound * grows,
             fourth_bound * grows,
         )  # fmt: skip
@@ -222,7 +184,57 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
 
 
 @inlined
-def _leave(period, first, second, third, second_bound, third_bound, fourth_bound):
+def _polynomial(system, st, r, order, what, on_normal, on_slip):
+    """Return the coefficients of an event function's polynomial, and the sizes of the terms of the first."""
+    u, size = len(system.rest), len(st.q)
+    k0, k1, k2, noise = 0.0, 0.0, 0.0, 0.0
+    if order == FORCE:
+        k0 = on_normal * st.force[r] + on_slip * st.force[u + r] + system.limit[r]
+        noise = abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r]) + system.limit[r]
+        if is_compliant(system, r):  # its force is a small difference of displacements
+            noise += abs(on_normal) * system.spring[r] * system.play[r]
+    elif what == CLOSES:
+        k0, noise = system.rest[r], abs(system.rest[r])
+        for i in range(size):
+            part = system.J[r, i] * st.q[i]
+            k0 += part
+            noise += abs(part)
+            k1 += system.J[r, i] * st.v[i]
+            k2 += system.J[r, i] * st.bend[i]
+    elif order == POSITION:
+        k0, noise = on_normal * system.rest[r], abs(on_normal * system.rest[r])
+        for i in range(size):
+            part, speed = on_normal * system.J[r, i] * st.q[i], on_slip * system.J[r, i] * st.v[i]
+            k0 += part + speed
+            noise += abs(part) + abs(speed)
+            k1 += system.J[r, i] * (on_normal * st.v[i] + on_slip * st.bend[i])
+            k2 += on_normal * system.J[r, i] * st.bend[i]
+    else:
+        for i in range(size):
+            part = on_slip * system.J[u + r, i] * st.v[i]
+            k0 += part
+            noise += abs(part)
+            k1 += on_slip * system.J[u + r, i] * st.bend[i]
+    return k0, k1, k2, noise
+
+
+@inlined
+def _begins_at_zero(system, st, r, order, unit, value, first, second_bound, noise):
+    """Whether a function of a contact that has just been decided is zero at the start, and does not fall."""
+    if st.fresh[r] == 0:
+        return False
+    falls = first < -FLAT * second_bound * system.period
+    zero = FLAT * noise
+    if order == POSITION:
+        falls = falls and first < -AT_REST * st.scale[0] * unit
+        zero = DECIDED * (system.play[r] * unit)
+    elif order == VELOCITY:
+        zero = DECIDED * st.scale[0]
+    return not falls and value <= zero
+
+
+@inlined
+def _first_step(period, first, second, third, second_bound, third_bound, fourth_bound):
     """A safe step of a function that begins at zero: by the first of its derivatives that is not round-off.
 
     The decision of the contacts at this instant says that it rises.
@@ -230,10 +242,10 @@ def _leave(period, first, second, third, second_bound, third_bound, fourth_bound
     shortest = AT_START * period
     omega = 2.0 * math.pi / period
     step = shortest
-    if first > _NOTHING * second_bound / omega:
+    if first > FLAT * second_bound / omega:
         step = first / second_bound if second_bound > 0.0 else period
-    elif second > _NOTHING * max(third_bound / omega, second_bound):
+    elif second > FLAT * max(third_bound / omega, second_bound):
         step = 1.5 * second / third_bound if third_bound > 0.0 else period
-    elif third > 0.0 and second > -_NOTHING * max(third_bound / omega, second_bound):
+    elif third > 0.0 and second > -FLAT * max(third_bound / omega, second_bound):
         step = 2.0 * third / fourth_bound if fourth_bound > 0.0 else period
     return max(step, shortest)

@@ -17,100 +17,95 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.event_functions import CHATTER
-from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import (
+from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE
+from vanedamp.coupling.planar.contact_decisions import extend_basis, loaded_acceleration
+from vanedamp.coupling.planar.friction_problem import solve_rows
+from vanedamp.coupling.planar.tolerances import (
+    ADDED_ENERGY,
     AT_REST,
+    CANCELLED_ENERGY,
+    FRICTION_EDGE,
+    STEP_SCALE,
+    WEDGED,
+)
+from vanedamp.coupling.planar.unit_kinematics import (
+    has_friction,
+    is_closed,
+    is_compliant,
     is_rigid,
-    is_shut,
-    loaded_acceleration,
     row_speed,
-    rubs,
-    solve_rows,
-    span,
     speed_scale,
-    yields,
 )
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
 
-#: energy that an impact may bring, as a share of what is in it, before it is solved again
-_GAIN = 1e-12
-#: round-off of a sum, relative to the sum of its terms' sizes, over the share above
-_CANCELLED = 4.0 * 2.0**-52 / _GAIN
-#: factor of the coefficients below which it is zero: of a wedged block, whose contacts cannot part all together
-_WEDGED = 1e-6
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
-#: share by which friction is short of its bound where a contact sticks
-_EDGE = 1e-9
-#: share of CHATTER that a flight must last at least to be flown, however elastic it is
-_SHORTEST = 0.1
-#: share of the motion by which a step is measured, at least: round-off is below what a pivot resolves then
-_ROUGH = 1e-4
+#: least length of a flight that is not ended, times CHATTER, however elastic it is
+_SHORTEST_FLIGHT = 0.1
 #: what a closed contact does in a short step: it pushes, or its slip turns without
 _PUSHES, _TURNS = 1, 2
-#: how much more than the loads alone the forces of other contacts may press
+#: how much more than the loads the forces of other contacts may press
 _FAR = 100.0
 
 
 @kernel
 def collide(system, st, rec, log, work):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count = len(system.rest), _list_shut(system, st, work)
+    u, count = len(system.rest), _list_closed(system, st, work)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
     # speeds as they are, round-off included, always have a solution
     if system.two_phases and not _compress(system, work, count, tiny) and not _compress(system, work, count, 0.0):
         return False
-    if not _rebound(system, st, work, count, 1.0, tiny):
+    if not _solve_restitution(system, st, work, count, 1.0, tiny):
         st.counters[REDUCED] += 1
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if _rebound(system, st, work, count, middle, tiny):
+            if _solve_restitution(system, st, work, count, middle, tiny):
                 low = middle
             else:
                 high = middle
         # without rebound the speeds as they are have a solution here, too
-        wedged = low <= _WEDGED
-        if not _rebound(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
+        wedged = low <= WEDGED
+        if not _solve_restitution(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
     _apply(system, st, work)
     for p in range(count):
         r = work.listed[p]
         if work.impulse[r] > 0.0 or work.before_impact[r] < -tiny:
-            _note(system, st, rec, log, work, r)
-    _account(system, st, work)
-    return _catch(system, st, work, count, tiny)
+            _log_impact(system, st, rec, log, work, r)
+    _add_loss(system, st, work)
+    return _complete_chatter(system, st, work, count, tiny)
 
 
 @inlined
-def _list_shut(system, st, work):
+def _list_closed(system, st, work):
     """List the contacts whose gaps are zero. Returns how many they are."""
     count = ZERO
     for r in range(system.contacts):
-        if is_rigid(system, r) and is_shut(system, st, r):
+        if is_rigid(system, r) and is_closed(system, st, r):
             work.listed[count], work.way[count] = r, 0
             count += 1
     return count
 
 
 @kernel
-def _rebound(system, st, work, count, share, tiny):
-    """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
+def _solve_restitution(system, st, work, count, factor, tiny):
+    """Find impulses for this factor of the coefficients. Returns False if there are none, or they add energy."""
     if system.two_phases:
-        return _expand(system, st, work, count, share, tiny) and not _brings_energy(system, st, work)
+        return _expand(system, st, work, count, factor, tiny) and not _adds_energy(system, st, work)
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
         normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-        work.speed[r] = normal + share * _restitution(system, st, work, r) * min(normal, 0.0)
+        work.speed[r] = normal + factor * _restitution(system, st, work, r) * min(normal, 0.0)
         work.speed[u + r] = work.before_impact[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0, system.limit) and not _brings_energy(system, st, work)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit) and not _adds_energy(system, st, work)
 
 
 @kernel
@@ -131,7 +126,7 @@ def _compress(system, work, count, tiny):
 
 
 @kernel
-def _expand(system, st, work, count, share, tiny):
+def _expand(system, st, work, count, factor, tiny):
     """Find the impulses of both phases: in expansion a contact has at least its coefficient's part of compression.
 
     With that part as given, the rest is the same problem: the more than it and the speed complement each other.
@@ -142,7 +137,7 @@ def _expand(system, st, work, count, share, tiny):
         work.speed[row] = work.compressed[row] if abs(work.compressed[row]) > tiny else 0.0
     for p in range(count):
         r = work.listed[p]
-        given = share * _restitution(system, st, work, r) * work.compression[r]
+        given = factor * _restitution(system, st, work, r) * work.compression[r]
         work.bound[r] = system.friction[r] * given
         work.least[r] = given
         for row in range(2 * u):
@@ -165,8 +160,8 @@ def _restitution(system, st, work, r):
 
 
 @inlined
-def _brings_energy(system, st, work):
-    """Whether the impulses bring more energy than round-off of what there is.
+def _adds_energy(system, st, work):
+    """Whether the impulses add more energy than round-off of what there is.
 
     By the velocities that they change: of a wedged block, large impulses nearly balance each other.
     """
@@ -178,8 +173,8 @@ def _brings_energy(system, st, work):
             pushed += part
             terms += abs(part)
         loss -= pushed * (st.v[i] + 0.5 * pushed / system.mass[i])
-        there += 0.5 * system.mass[i] * st.v[i] * st.v[i] + _CANCELLED * terms * abs(st.v[i])
-    return loss < -_GAIN * there
+        there += 0.5 * system.mass[i] * st.v[i] * st.v[i] + CANCELLED_ENERGY * terms * abs(st.v[i])
+    return loss < -ADDED_ENERGY * there
 
 
 @inlined
@@ -193,15 +188,15 @@ def _apply(system, st, work):
 
 
 @inlined
-def _account(system, st, work):
-    """Enter what the impulses took, J: the loss of an impact is one, since shares of single rows may be negative."""
+def _add_loss(system, st, work):
+    """Enter the loss of the whole impact by its impulses, J: contributions of single rows may be negative."""
     for r in range(len(work.impulse)):
         if work.impulse[r] != 0.0:
             st.ledger[IMPACT_LOSS] -= 0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
 
 
 @inlined
-def _note(system, st, rec, log, work, r):
+def _log_impact(system, st, rec, log, work, r):
     """Count and log an impact of a rigid contact, with the energy that it takes."""
     u = len(system.rest)
     before, after, loss = work.before_impact[r], row_speed(system, r, st.v), 0.0
@@ -231,7 +226,7 @@ def log_event(system, st, log, kind, r, before, after, normal, tangential, loss)
 
 
 @kernel
-def _catch(system, st, work, count, tiny):
+def _complete_chatter(system, st, work, count, tiny):
     """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
     The step is one of Moreau's scheme, and one for all of them: over steps of several lengths the forces of contacts at
@@ -242,10 +237,10 @@ def _catch(system, st, work, count, tiny):
     for p in range(count):
         speed = row_speed(system, work.listed[p], st.v)
         if tiny < speed < slow:
-            near, flight = True, min(flight, max(1.0 - restitution_at(system, work.listed[p], speed), _SHORTEST))
+            near, flight = True, min(flight, max(1.0 - restitution_at(system, work.listed[p], speed), _SHORTEST_FLIGHT))
     if not near:
         return True
-    if not _step(system, st, work, count, flight):
+    if not _short_step(system, st, work, count, flight):
         return False
     near = False
     for p in range(count):
@@ -253,34 +248,34 @@ def _catch(system, st, work, count, tiny):
         work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else 0
         near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
     if near:
-        _stop(system, st, work, count, tiny, slow, 1.0 - _EDGE)
+        _stop(system, st, work, count, tiny, slow, 1.0 - FRICTION_EDGE)
     return True
 
 
 @kernel
-def jam(system, st, rec, log, work):
+def stop_wedged(system, st, rec, log, work):
     """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
 
     They are those of a step of Moreau's scheme in the limit of short ones. Slips that the loads turn within it stop.
     Returns False if there are none.
     """
-    u, count = len(system.rest), _list_shut(system, st, work)
+    u, count = len(system.rest), _list_closed(system, st, work)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     slow = _FAR * _accelerate(system, st, work)
-    if not _step(system, st, work, count, 1.0):
+    if not _short_step(system, st, work, count, 1.0):
         return False
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
     _apply(system, st, work)
     for p in range(count):
         if work.impulse[work.listed[p]] > 0.0:
-            _note(system, st, rec, log, work, work.listed[p])
-    _account(system, st, work)
+            _log_impact(system, st, rec, log, work, work.listed[p])
+    _add_loss(system, st, work)
     for p in range(count):
         r, slip = work.listed[p], work.speed[u + work.listed[p]]
         for o in range(2 * u):
             slip += system.delassus[u + r, o] * work.impulse[o]
-        turns = rubs(system, r) and slip * row_speed(system, u + r, st.v) < 0.0
+        turns = has_friction(system, r) and slip * row_speed(system, u + r, st.v) < 0.0
         turns = turns and abs(row_speed(system, r, st.v)) <= tiny
         work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else (_TURNS if turns else 0)
     _stop(system, st, work, count, tiny, slow, math.inf)
@@ -293,7 +288,7 @@ def _accelerate(system, st, work):
     u, largest = len(system.rest), 0.0
     for r in range(u - len(system.tangential)):
         work.sliding[r] = 0
-        if r >= system.contacts or (yields(system, r) and rubs(system, r) and st.state[r] < OPEN):
+        if r >= system.contacts or (is_compliant(system, r) and has_friction(system, r) and st.state[r] < OPEN):
             slip = row_speed(system, u + r, st.v)
             work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
     loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
@@ -303,13 +298,13 @@ def _accelerate(system, st, work):
 
 
 @inlined
-def _step(system, st, work, count, share):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme, a share of CHATTER long. False if there are none.
+def _short_step(system, st, work, count, fraction):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme, a fraction of CHATTER long. False if none exist.
 
     Speeds of so short a step may be so small that round-off of the motion contradicts rows that depend on each other:
     then they are measured by the motion.
     """
-    u, ahead, motion = len(system.rest), CHATTER * system.period * share, 0.0
+    u, ahead, motion = len(system.rest), CHATTER * system.period * fraction, 0.0
     for i in range(len(st.v)):
         motion += system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
@@ -317,7 +312,7 @@ def _step(system, st, work, count, share):
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
     return solve_rows(system, work, count, work.speed, 0.0, system.limit) or solve_rows(
-        system, work, count, work.speed, _ROUGH * math.sqrt(motion), system.limit
+        system, work, count, work.speed, STEP_SCALE * math.sqrt(motion), system.limit
     )
 
 
@@ -325,7 +320,7 @@ def _step(system, st, work, count, share):
 def _stop(system, st, work, count, tiny, slow, most):
     """Stop contacts that push or turn (work.slips), those that stick with their slips, and whom that drives together.
 
-    most: share of its bound below which friction counts as that of a contact that sticks.
+    most: fraction of its bound below which friction counts as that of a contact that sticks.
     """
     u, found, loss = len(system.rest), 0, 0.0
     for i in range(len(st.v)):
@@ -353,7 +348,7 @@ def _stop(system, st, work, count, tiny, slow, most):
 @inlined
 def _stop_row(system, st, work, row, found):
     """Take a row's speed out of the velocities, and keep it stopped. Returns the number of directions stopped."""
-    more = span(system, work, row, found)
+    more = extend_basis(system, work, row, found)
     if more > found:
         part = 0.0
         for i in range(len(st.v)):

@@ -14,19 +14,19 @@ import numpy as np
 from vanedamp.coupling.numerics.codes import FLOW, LEAVING, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
-from vanedamp.coupling.planar.contact_decisions import row_speed, yields
 from vanedamp.coupling.planar.exponential_integrals import integrate, response_after, set_up
-from vanedamp.coupling.planar.recorder import note_tilts
-from vanedamp.coupling.response.recorder import note_response
+from vanedamp.coupling.planar.tolerances import PEAK
+from vanedamp.coupling.planar.unit_kinematics import is_compliant, row_speed
+from vanedamp.coupling.response.recorder import note_response, note_tilts
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.system.system import FLOOR
 
 _TURN = 1.5
-#: modes from which on the integrals are taken in closed form, where none is slower than this share of the excitation:
+#: number of modes from which on integrals are taken in closed form, if none is slower than this times the excitation:
 #: in such a mode closed forms are differences of large numbers
 _MANY, _SLOW = 6, 0.01
-#: steps to a peak, and their size, as a share of a piece, at which it is found: its height is off by the square
-_STEPS, _FINE = 50, 1e-9
+#: most steps to a peak
+_STEPS = 50
 _NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
 
 
@@ -105,7 +105,7 @@ def _add_closed_forms(system, flows, st, rec, work, tau, pieces, x0, rate0):
                 low, high = (t, high) if (rate > 0.0) == (rate0 > 0.0) else (low, t)
                 step = t - rate / bend if bend != 0.0 else low
                 step = step if low < step < high else 0.5 * (low + high)
-                if abs(step - t) <= _FINE * h:
+                if abs(step - t) <= PEAK * h:
                     break
                 t = step
             note_response(rec, period, x)
@@ -114,10 +114,10 @@ def _add_closed_forms(system, flows, st, rec, work, tau, pieces, x0, rate0):
 
 @inlined
 def _is_sprung(system, st):
-    """Whether a contact that yields is closed: its force has integrals of its own."""
+    """Whether a compliant contact is closed: its force has integrals of its own."""
     sprung = False
     for r in range(system.contacts):
-        sprung = sprung or (yields(system, r) and st.state[r] < OPEN)
+        sprung = sprung or (is_compliant(system, r) and st.state[r] < OPEN)
     return sprung
 
 
@@ -147,7 +147,7 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
     friction, contact = 0.0, 0.0
     for r in range(u):
         state = st.state[r]
-        if yields(system, r) and state < OPEN:
+        if is_compliant(system, r) and state < OPEN:
             rate = row_speed(system, r, v)
             taken = system.dashpot[r] * rate * rate
             contact += taken

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
-from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
+from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.response.records import ENERGIES, Records
@@ -24,7 +25,7 @@ class PlanarState(NamedTuple):
     time: np.ndarray  # (1,) within the period, s
     q: np.ndarray  # (N,)
     v: np.ndarray  # (N,)
-    # (u,) int: OPEN; LEAVING, a contact that yields and has ended before its gap is open; TOUCHING, closed but others
+    # (u,) int: OPEN; LEAVING, a compliant contact that has ended before its gap is open; TOUCHING, closed but others
     # carry its force, or nothing presses it; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
     # contact without friction counts. A friction element sticks or slips
     state: np.ndarray
@@ -34,7 +35,7 @@ class PlanarState(NamedTuple):
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
-    pushed: np.ndarray  # (2u,) impulse of a contact that yields since it closed, N s
+    pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
     lost: np.ndarray  # (u,) what it has taken since then, J
     ledger: np.ndarray  # (6,) J
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
@@ -92,7 +93,7 @@ class Scratch(NamedTuple):
     first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
     doubt: np.ndarray  # (u,) int: doubtful now
     sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
-    resting: np.ndarray  # (u,) int: whether a contact that yields touches without speed, and what it does then
+    resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and what it does then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)
@@ -109,12 +110,15 @@ class Scratch(NamedTuple):
 
 
 def new_state(system: System, modes: int, initial: Motion, records: Records) -> PlanarState:
-    """Return the state at time zero."""
+    """Return the state at time zero. A spring that is compressed pushes, or lags behind the body that leaves it."""
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
-    samples = len(records.samples)
+    samples, sprung = len(records.samples), np.isfinite(system.spring)
+    gap, speed = system.rest + system.J[:u] @ initial.q, system.J[:u] @ initial.v
+    pushes = np.where(sprung, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
+    state = np.where(sprung & (gap < -SIMULTANEOUS * system.play), np.where(pushes, SLIP_RIGHT, LEAVING), OPEN)
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
-        state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
+        state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),

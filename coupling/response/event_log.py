@@ -36,12 +36,15 @@ class Rows(NamedTuple):
 
 
 def rows_of_units(system: System) -> Rows:
-    """Return the rows of a log by units, whose speeds are those of gaps."""
+    """Return the rows of a log by units: speeds are those of gaps in the plane, and of bodies along their line."""
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    return Rows(places, system.without_body, system.other, np.ones(len(places)), system.spring)
+    on_body, sign = np.flatnonzero(~system.without_body[: system.contacts]), np.ones(len(places))
+    if not system.in_plane:  # gaps that close as their body moves on to the right
+        sign[on_body] = np.sign(system.J[on_body, system.along[system.body[on_body]]])
+    return Rows(places, system.without_body, system.other, sign, system.spring)
 
 
 def rows_of_line(system: System) -> Rows:
@@ -50,15 +53,11 @@ def rows_of_line(system: System) -> Rows:
     floors = [(body, SURFACES[FLOOR], -1) for body in range(system.bodies)]
     dampers = [(number, "casing", -1) for number in range(system.dampers)]
     first = len(floors) + len(dampers)
-    # gaps that close as their body moves on to the right
-    on_body = np.flatnonzero(~system.without_body[:c])
-    sign = np.ones(c)
-    sign[on_body] = np.sign(system.J[on_body, system.along[system.body[on_body]]])
     return Rows(
         [*floors, *dampers, *units.places[:c]],
         np.r_[np.zeros(len(floors), bool), np.ones(len(dampers), bool), system.without_body[:c]],
         np.r_[np.full(first, -1), system.other[:c]],
-        np.r_[np.ones(first), sign], np.r_[np.full(first, np.inf), system.spring[:c]],
+        np.r_[np.ones(first), units.sign[:c]], np.r_[np.full(first, np.inf), system.spring[:c]],
     )  # fmt: skip
 
 

@@ -1,62 +1,140 @@
-"""The recorder of all methods: section and ledger of a period, and the peak within a step."""
+"""The recorder of all runs: sections and ledger of a period, samples, tilts, and the peak within a step."""
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.compiler.jit import entry, inlined, summing
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined
+from vanedamp.coupling.response.evaluation import Plane
+from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.records import STORED
+from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.system.system import FLOOR, System
+
+
+class Kept(Protocol):
+    """The results in the plane that a run has kept, of every method."""
+
+    @property
+    def tilt(self) -> np.ndarray:
+        """(periods, b) largest |tilt| in the cavity, rad."""
+
+    @property
+    def lifted(self) -> np.ndarray:
+        """(periods, b) time off the floor, s."""
+
+    @property
+    def sampled(self) -> np.ndarray:
+        """(n, N) coordinates."""
+
+    @property
+    def shut(self) -> np.ndarray:
+        """(n, u) whether contacts are closed."""
+
+
+def plane_of(system: System, kept: Kept, linearisation: float) -> Plane:
+    """Return the results in the plane of a run."""
+    samples = partial(_samples, system, kept.sampled, kept.shut)
+    return Plane(kept.tilt, kept.lifted, system.neglected, linearisation, samples)
+
+
+def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarray) -> PlanarSamples:
+    """Return the first samples in the plane, as many as there are of the response x (n,)."""
+    q, contacts, extended = sampled[: len(x)], system.contacts, np.flatnonzero(system.tilt >= 0)
+    base = x - q @ system.response if system.table.any() else np.zeros(len(x))
+    gap = system.rest[:contacts] + q @ system.J[:contacts].T
+    rotation = q @ system.turn.T
+    lift, tilt, across = (np.full(rotation.shape, np.nan) for _ in range(3))
+    tilt[:, extended] = q[:, system.tilt[extended]] - rotation[:, extended]
+    first = system.along[0]
+    for body in extended:
+        stands = np.flatnonzero((system.body == body) & (system.surface == FLOOR))
+        lift[:, body] = gap[:, stands].mean(axis=1)
+        across[:, body] = -q[:, :first] @ system.J[stands, :first].mean(axis=0)
+    return PlanarSamples(
+        body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T + rotation * system.height,
+        floor_across=across,
+        floor_rotation=rotation, contact_gap=gap, contact_closed=shut[: len(x), :contacts].astype(bool),
+        contacts=tuple(rows_of_units(system).places[:contacts]),
+    )  # fmt: skip
 
 
 @entry
-def record_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger):
-    """Record section and ledger at the start of a period, for every method: the entry from Python."""
-    put_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger)
+def record_section(system, records, period, q, v, springs, ledger):
+    """Record section and ledger at the start of a period.
+
+    q, v: (N,) coordinates and their rates; springs: energy in those of units, J; ledger: (6,) J, whose stored energy is
+    set.
+    """
+    size, bodies, entry, part = len(q), len(system.along), records.section[period], records.parts[period]
+    x, rate, momentum, energy = 0.0, 0.0, 0.0, springs
+    for i in range(size):
+        x += system.response[i] * q[i]
+        rate += system.response[i] * v[i]
+        force = 0.0
+        for k in range(size):
+            force += system.stiffness[i, k] * q[k]
+        energy += 0.5 * q[i] * force
+    for i in range(system.modes):
+        energy += 0.5 * system.mass[i] * v[i] * v[i]
+    part[0] = energy
+    for b in range(bodies):
+        at = system.along[b]
+        part[1 + b] = 0.0
+        for i in range(at, at + (3 if system.tilt[b] >= 0 else 1)):
+            part[1 + b] += 0.5 * system.mass[i] * v[i] * v[i] - system.weight[i] * q[i]
+        energy += part[1 + b]
+        momentum += system.mass[at] * v[at]
+        slip, speed = q[at], v[at]
+        for i in range(size):
+            slip -= system.floor[b, i] * q[i]
+            speed -= system.floor[b, i] * v[i]
+        entry[3 + b], entry[3 + bodies + b] = slip, speed
+    put_response(system, records, period, x, rate, momentum, energy, ledger)
 
 
 @inlined
-def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger):
-    """Record section and ledger at the start of a period, in compiled functions.
-
-    p, p_rate: (n,) modal coordinates and their rates; slip, slip_velocity: (b,) of the bodies; springs: energy in all
-    springs of rows, J; ledger: (6,) J, whose stored energy is set.
-    """
-    n, b, entry, part = system.modes, system.bodies, records.section[period], records.parts[period]
-    x, rate, energy = _structure(system.response, system.stiffness, p, p_rate)
-    energy, momentum = energy + springs, 0.0
+def put_response(system, records, period, x, rate, momentum, energy, ledger):
+    """Record the response, of which x and rate are those of the modes, the bodies' momentum, stored energy, ledger."""
+    entry = records.section[period]
     for h in range(len(system.table)):
         x += system.table[h].real
         rate -= system.frequency[h] * system.table[h].imag
-    part[0] = energy
-    for k in range(b):
-        velocity, height = slip_velocity[k] + _dot(system.floor[k], p_rate), slip[k]
-        if system.weight[n + k] != 0.0:
-            height += _dot(system.floor[k], p)
-        momentum += system.mass[n + k] * velocity
-        part[1 + k] = 0.5 * system.mass[n + k] * velocity * velocity - system.weight[n + k] * height
-        energy += part[1 + k]
-        entry[3 + k], entry[3 + b + k] = slip[k], slip_velocity[k]
     entry[0], entry[1], entry[2] = x, rate, momentum
     ledger[STORED] = energy
     for i in range(len(ledger)):
         records.ledger[period, i] = ledger[i]
 
 
-@summing
-def _structure(response, stiffness, p, p_rate):
-    """Return the response of the modes, its rate, and the energy of the structure."""
-    x, rate, energy = 0.0, 0.0, 0.0
-    for i in range(len(p)):
-        x += response[i] * p[i]
-        rate += response[i] * p_rate[i]
-        energy += 0.5 * (p_rate[i] * p_rate[i] + stiffness[i] * p[i] * p[i])
-    return x, rate, energy
+@inlined
+def put_sample(system, st, rec, row, x, q, state, opened):
+    """Keep a sample of the response x and the coordinates q; state: (u,) of the contacts, `opened` where they are."""
+    rec.samples[row, 0] = x
+    for b in range(len(system.along)):
+        slip = q[system.along[b]]
+        for i in range(len(q)):
+            slip -= system.floor[b, i] * q[i]
+        rec.samples[row, 1 + b] = slip
+    for i in range(len(q)):
+        st.sampled[row, i] = q[i]
+    for i in range(rec.coordinates.shape[1]):
+        rec.coordinates[row, i] = q[i]
+    for r in range(system.contacts):
+        st.shut[row, r] = 0 if state[r] == opened else 1
 
 
-@summing
-def _dot(a, b):
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
+@inlined
+def note_tilts(system, st, q, period):
+    """Note the tilt of each body in its cavity, where it is the largest of the period so far."""
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0:
+            tilt = q[system.tilt[b]]
+            for i in range(len(q)):
+                tilt -= system.turn[b, i] * q[i]
+            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
 
 
 @entry

@@ -1,4 +1,4 @@
-"""Restart states from the motion at the end of a run, and back."""
+"""Where every run begins: the state of its scene, or that of another run as far as it fits; and the way back."""
 
 from __future__ import annotations
 
@@ -9,90 +9,119 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import check_start
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem, initial_motion, line_system, row_motion
+from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import SURFACES, System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
+#: overlap relative to the play up to which a contact is closed
+_ROUND_OFF = 1e-12
 
-def line_start(scene: Scene, system: System, start: RestartState | None = None) -> tuple[LineSystem, InitialMotion]:
-    """Return the rows of a scene whose bodies only slide, and its motion at time zero: its own or that of a state.
 
-    Raises InputError for bodies or a structure that begin beyond a contact, or a state of a scene of another size.
+def start_of(scene: Scene, system: System, state: RestartState | None = None) -> RestartState:
+    """Return the state that a run begins with: that of the scene, or another run's, moved to where it fits.
+
+    Structure beyond a stop and bodies beyond a surface are moved back (`_inside`), and springs of friction dampers are
+    unloaded to the limits of their sliders. Raises InputError for a scene that begins beyond a surface or a stop, and
+    for a state of a scene of another size.
     """
-    line = line_system(system)
-    if start is not None:
-        return line, restart_from(line, start)
-    motion = initial_motion(scene, line)
-    check_start(system, motion.displacement[line.friction_rows :])
-    return line, motion
+    if state is None:
+        return _checked(system, _of_scene(scene, system))
+    return fitted(system, at_speed_of(scene, state))
 
 
-def restart_state(system: LineSystem, last: InitialMotion) -> RestartState:
-    """Return the restart state of a run from its last motion."""
-    b, friction, slip, scale = system.bodies, system.friction_rows, last.displacement, system.scale
-    return RestartState(
-        frozen(scale * last.p), frozen(scale * last.p_rate), frozen(slip[:b]), frozen(last.velocity[:b]),
-        frozen(np.where(np.isfinite(system.spring), slip, 0.0)[b:friction]), frozen(system.free_travel[friction:]),
+def fitted(system: System, state: RestartState) -> RestartState:
+    """Return a state as another system can begin with it, in its own modes: see `start_of`."""
+    _check_size(system, state)
+    p = state.displacement / system.scale
+    stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
+    moved = before_stops(system.J[stops, : system.modes], system.rest[stops], p)
+    if np.any(moved != p):
+        state = replace(state, displacement=frozen(system.scale * moved))
+    most = system.grip / system.casing_spring
+    return _inside(system, replace(state, elongation=frozen(np.clip(state.elongation, -most, most))))
+
+
+def motion_of(system: System, state: RestartState) -> Motion:
+    """Return the coordinates (N,) of a state, and their rates."""
+    n = system.modes
+    parts = (
+        (state.displacement, state.slip, state.lift, state.tilt),
+        (state.velocity, state.slip_velocity, state.lift_velocity, state.tilt_rate),
+    )
+    motion = Motion(*np.zeros((2, len(system.mass))))
+    for q, (structure, slip, lift, tilt) in zip(motion, parts, strict=True):
+        q[:n] = structure / system.scale
+        floor, rise, turn = system.floor @ q, system.rise @ q, system.turn @ q
+        for b, x in enumerate(system.along):
+            q[x] = slip[b] + floor[b]
+            if system.tilt[b] >= 0:
+                q[x + 1], q[x + 2] = lift[b] + rise[b], tilt[b] + turn[b]
+    place_sliders(system, motion.q, state.elongation[_drawn(system)])
+    return motion
+
+
+def state_at(system: System, motion: Motion) -> RestartState:
+    """Return the state of coordinates (N,) and their rates."""
+    n, extended = system.modes, system.tilt >= 0
+    elongation = np.zeros(system.dampers)
+    elongation[_drawn(system)] = system.elongation @ motion.q
+    (slip, lift, tilt), rates = (
+        (
+            q[system.along] - system.floor @ q,
+            np.where(extended, q[system.along + extended] - system.rise @ q, 0.0),
+            np.where(extended, q[system.along + 2 * extended] - system.turn @ q, 0.0),
+        )
+        for q in motion
     )  # fmt: skip
-
-
-def restart_from(system: LineSystem, start: RestartState) -> InitialMotion:
-    """Return the motion at the start of a run of another scene.
-
-    Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch,
-    and so is a structure beyond a rigid stop, by the shortest way; springs of friction dampers are unloaded to the
-    limits of their sliders. Raises InputError for a scene of another size.
-    """
-    b, friction = system.bodies, system.friction_rows
-    check_size(system, start)
-    p, rate = (array / system.scale for array in (start.displacement, start.velocity))
-    limit, spring = system.limit[b:friction], system.spring[b:friction]
-    elongation = np.where(np.isfinite(spring), np.clip(start.elongation, -limit / spring, limit / spring), 0.0)
-    stops = np.isinf(system.spring) & ~system.of_bodies.J.any(axis=1) & (np.arange(len(system.J)) >= friction)
-    p = before_stops(system.of_structure.J[stops], system.rest[stops], p)
-    slip = _inside(system, start, p)
-    return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
-
-
-def marked_with_speed(scene: Scene, state: RestartState) -> RestartState:
-    """Return a state that a scene has left with the speed of its modes, if these depend on one."""
-    structure = scene.structure
-    if not isinstance(structure, Rom) or not greatest_speed(structure):
-        return state
-    return replace(state, speed=frozen([scene.speed]))
-
-
-def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
-    """Return a state in the modes of the scene's own speed, as structure and bodies are where they were.
-
-    A state of another number of modes stays as it is (`check_size` refuses it). Raises InputError for a speed that the
-    model does not have.
-    """
-    structure = scene.structure
-    if not (start.speed.size and isinstance(structure, Rom)) or start.speed[0] == scene.speed:
-        return start
-    transfer = modal_transfer(structure, float(start.speed[0]), scene.speed)
-    if transfer.shape[1] != len(start.displacement):
-        return start
-    return replace(
-        start, displacement=frozen(transfer @ start.displacement), velocity=frozen(transfer @ start.velocity),
-        speed=frozen([scene.speed]),
+    parts = (
+        system.scale * motion.q[:n], system.scale * motion.v[:n], slip, rates[0], elongation, system.travels,
+        *((lift, rates[1], tilt, rates[2]) if system.in_plane else np.zeros((4, 0))),
     )  # fmt: skip
+    return RestartState(*map(frozen, parts))
 
 
-def check_size(system: LineSystem | System, start: RestartState, planar: bool = False) -> None:
-    """Raise InputError for a state of a scene of another size; planar: whether its bodies move in the plane."""
-    n, b, dampers = system.modes, system.bodies, system.dampers
-    sizes = (n, n, b, b, dampers, len(system.travels), *4 * (b if planar else 0,))
-    found = tuple(len(getattr(start, entry.name)) for entry in fields(start) if entry.name != "speed")
-    if found[:6] != sizes[:6]:
+def _of_scene(scene: Scene, system: System) -> RestartState:
+    """Return the state that a scene asks for."""
+    n, bodies = system.modes, scene.damper
+    rise = [damper.form.rise(damper, damper.tilt) for damper in bodies]  # on its lower corner
+    parts = (
+        # an initial state is that of a rigid structure: others have none
+        np.full(n, scene.initial.displacement), np.full(n, scene.initial.velocity),
+        [damper.position for damper in bodies], [damper.velocity for damper in bodies],
+        np.zeros(system.dampers), system.travels,
+    )  # fmt: skip
+    across = (
+        [damper.lift + up for damper, up in zip(bodies, rise, strict=True)],
+        [damper.lift_velocity for damper in bodies],
+        [damper.tilt for damper in bodies], [damper.tilt_rate for damper in bodies],
+    )  # fmt: skip
+    return RestartState(*map(frozen, (*parts, *(across if system.in_plane else ()))))
+
+
+def _checked(system: System, state: RestartState) -> RestartState:
+    """Return a state in which nothing overlaps a surface or a stop. Raises InputError for others."""
+    u = system.contacts
+    gaps = system.rest[:u] + system.J[:u] @ motion_of(system, state).q
+    for unit in np.flatnonzero(gaps < -_ROUND_OFF * system.play[:u]):
+        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
+        if system.without_body[unit]:
+            raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
+        raise InputError(f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt")
+    return state
+
+
+def _check_size(system: System, state: RestartState) -> None:
+    """Raise InputError for a state of a scene of another size, or of other bodies."""
+    n, b = system.modes, system.bodies
+    sizes = (n, n, b, b, system.dampers, *4 * (b if system.in_plane else 0,))
+    found = tuple(len(getattr(state, entry.name)) for entry in fields(state) if entry.name not in ("gap", "speed"))
+    if found[:5] != sizes[:5]:
         raise InputError(
             f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
-            f"fit a scene of {n}, {b} and {dampers}"
+            f"fit a scene of {n}, {b} and {system.dampers}"
         )
     if found != sizes:
         raise InputError(
@@ -112,18 +141,70 @@ def before_stops(stops: np.ndarray, gaps: np.ndarray, p: np.ndarray) -> np.ndarr
     return p
 
 
-def _inside(system: LineSystem, start: RestartState, p: np.ndarray) -> np.ndarray:
-    """Return slips (b,) of bodies inside their cavities: pushed in from the left walls, then from the right ones.
+def _inside(system: System, state: RestartState) -> RestartState:
+    """Return a state whose bodies are inside their cavities, which may be smaller than those that it comes from.
 
-    A compliant wall stays pressed if its gap has not changed.
+    Sliders are pushed in from the left walls, then from the right ones. Where bodies move in the plane, all of a cavity
+    go back by one factor to where they stand flat in its middle. A compliant contact stays pressed in the same cavity.
     """
-    friction = system.friction_rows
-    slip, still, unloaded = np.array(start.slip), np.zeros(system.bodies), np.zeros(friction - system.bodies)
-    pressed = np.isfinite(system.spring[friction:]) & (system.free_travel[friction:] == start.gap)
-    contacts = friction + np.flatnonzero(~pressed)
-    for order, body, sign in ((contacts, system.right_body, 1.0), (contacts[::-1], system.left_body, -1.0)):
+    u, still = system.contacts, np.zeros(system.bodies)
+    flat = {"slip": still} | (dict.fromkeys(("lift", "tilt"), still) if system.in_plane else {})
+    J, rest = system.J[:u], system.rest[:u]
+    middle = rest + J @ motion_of(system, replace(state, **flat)).q
+    shifts = J @ motion_of(system, replace(state, displacement=0.0 * state.displacement)).q
+    same = state.gap == system.travels if len(state.gap) == u else False
+    fixed = (np.isfinite(system.spring[:u]) & same) | ~J[:, system.modes :].any(axis=1)
+    over = ~fixed & (middle + shifts < -_ROUND_OFF * system.play[:u])
+    if not over.any():
+        return state
+    moved = {name: np.array(getattr(state, name)) for name in flat}
+    if not system.in_plane:
+        moved["slip"] = _pushed(J[:, system.along], middle, fixed, moved["slip"])
+    for cavity in set(system.cavity.tolist()) if system.in_plane else ():
+        inside = np.flatnonzero(system.cavity == cavity)
+        hit = over & np.isin(system.body[:u], inside)
+        factor = max((middle[hit] / -shifts[hit]).min(initial=1.0), 0.0)
+        for values in moved.values():
+            values[inside] *= factor
+    return replace(state, **{name: frozen(values) for name, values in moved.items()})
+
+
+def _pushed(J: np.ndarray, middle: np.ndarray, fixed: np.ndarray, slip: np.ndarray) -> np.ndarray:
+    """Return slips (b,) by which no gap middle + J slip is below zero. J: (u, b); fixed: (u,) gaps that stay."""
+    rows = np.flatnonzero(~fixed)
+    for order, sign in ((rows, 1.0), (rows[::-1], -1.0)):
         for r in order:
-            gap = row_motion(system, slip, still, p, 0.0 * p, unloaded)[0][r]
-            if gap < 0.0 and body[r] >= 0:
-                slip[body[r]] -= sign * gap
+            for body in np.flatnonzero(sign * J[r] > 0.0):
+                slip[body] -= min(middle[r] + J[r] @ slip, 0.0) / J[r, body]
     return slip
+
+
+def marked_with_speed(scene: Scene, state: RestartState) -> RestartState:
+    """Return a state that a scene has left with the speed of its modes, if these depend on one."""
+    structure = scene.structure
+    if not isinstance(structure, Rom) or not greatest_speed(structure):
+        return state
+    return replace(state, speed=frozen([scene.speed]))
+
+
+def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
+    """Return a state in the modes of the scene's own speed, as structure and bodies are where they were.
+
+    A state of another number of modes stays as it is (`start_of` rejects it). Raises InputError for a speed that the
+    model does not have.
+    """
+    structure = scene.structure
+    if not (start.speed.size and isinstance(structure, Rom)) or start.speed[0] == scene.speed:
+        return start
+    transfer = modal_transfer(structure, float(start.speed[0]), scene.speed)
+    if transfer.shape[1] != len(start.displacement):
+        return start
+    return replace(
+        start, displacement=frozen(transfer @ start.displacement), velocity=frozen(transfer @ start.velocity),
+        speed=frozen([scene.speed]),
+    )  # fmt: skip
+
+
+def _drawn(system: System) -> np.ndarray:
+    """Return the numbers (j,) of the friction dampers that are Jenkins elements."""
+    return system.body[len(system.body) - len(system.tangential) :]

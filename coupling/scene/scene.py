@@ -29,6 +29,7 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.display import Displayed
+from vanedamp.files.key_tables import documented
 from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import (
@@ -123,6 +124,7 @@ class Continuation:
     """dotted path of an axis (default: the excitation frequency, or else the speed of rotation, or the only axis)"""
 
 
+@documented
 @dataclass(frozen=True, config=STRICT, repr=False)
 class Scene(OpenRecord, Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""

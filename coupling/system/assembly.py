@@ -1,4 +1,4 @@
-"""From a scene to its system, and to the motion that it begins with."""
+"""From a scene to its system."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_la
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
-from vanedamp.coupling.system.system import FLOOR, SURFACES, System, surface_code
+from vanedamp.coupling.system.system import FLOOR, System, surface_code
 from vanedamp.coupling.system.units import (
     Body,
     ElementParts,
@@ -30,12 +30,9 @@ from vanedamp.coupling.system.units import (
     element_units,
     friction_elements,
 )
-from vanedamp.files.toml_input import InputError
 
 #: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
-#: relative tolerance of the play by which a contact may overlap at the start
-_ROUND_OFF = 1e-12
 
 #: loads (k, N) on the coordinates of a system, N, at angles omega t (k,) in [0, 2 pi)
 Loads = Callable[[np.ndarray], np.ndarray]
@@ -87,7 +84,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         viscous=basis.damping, response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
         period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
-        two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
+        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
     return _with_scales(system)
 
@@ -299,37 +296,6 @@ def with_sine(scene: Scene) -> Scene:
     return replace(scene, excitation=plain)
 
 
-def initial_motion(scene: Scene, system: System) -> Motion:
-    """Return the motion that a scene begins with. Raises InputError for what would overlap a surface or a stop."""
-    n, size = system.modes, len(system.mass)
-    q, v = np.zeros(size), np.zeros(size)
-    # an initial state is that of a rigid structure: others have none
-    q[:n], v[:n] = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
-    for k, damper in enumerate(scene.damper):
-        x, form = system.along[k], damper.form
-        q[x] = damper.position + system.floor[k] @ q
-        v[x] = damper.velocity + system.floor[k] @ v
-        if form.extended:
-            # a tilted block stands on its corner unless it is lifted higher
-            lifted = damper.lift + form.rise(damper, damper.tilt)
-            q[x + 1 : x + 3] = lifted + system.rise[k] @ q, damper.tilt + system.turn[k] @ q
-            v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
-    place_sliders(system, q, np.zeros(len(system.tangential)))
-    gaps = system.rest + system.J[: len(system.rest)] @ q
-    check_start(system, gaps[: system.contacts])
-    return Motion(q, v)
-
-
-def check_start(system: System, gaps: np.ndarray) -> None:
-    """Raise InputError where a contact begins overlapped. gaps: (contacts,) m."""
-    for unit in np.flatnonzero(gaps < -_ROUND_OFF * system.play[: len(gaps)]):
-        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
-        if system.without_body[unit]:
-            raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
-        raise InputError(f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt")
-
-
 def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:
     """Place the sliders of Jenkins elements in q (N,) so that their springs have an elongation (j,), m."""
-    sliders = slice(len(q) - len(elongation), None)
-    q[sliders] += system.elongation @ q - elongation
+    q[len(q) - len(elongation) :] += system.elongation @ q - elongation

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import Part, System
+from vanedamp.coupling.system.system import FLOOR, Part, System
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -73,11 +72,6 @@ class LineSystem(NamedTuple):
         return self.friction_rows - self.bodies
 
     @property
-    def travels(self) -> np.ndarray:
-        """Free travel (c,) of each gap, m."""
-        return self.free_travel[self.friction_rows :]
-
-    @property
     def order(self) -> np.ndarray:
         """Multiples (e,) of omega that the harmonics are."""
         return np.rint(self.frequency / self.omega).astype(int)
@@ -131,28 +125,16 @@ def line_system(system: System) -> LineSystem:
     )  # fmt: skip
 
 
+def rows_of_units(system: System) -> np.ndarray:
+    """Return the row (u,) of line_system that each unit is: the gap of a contact, the slip of a friction element."""
+    unit, first = np.arange(len(system.rest)), system.bodies + system.dampers
+    elements = system.body + np.where(system.surface == FLOOR, 0, system.bodies)
+    return np.where(unit < system.contacts, first + unit, elements)
+
+
 def _body_of(moved: np.ndarray) -> np.ndarray:
     """Return which body (k,) widens each gap as it moves on, of rows (k, b) of the bodies; -1: none."""
     return np.where((moved > 0.0).any(axis=1), (moved > 0.0).argmax(axis=1) if moved.shape[1] else -1, -1)
-
-
-class InitialMotion(NamedTuple):
-    """Motion at time zero: modal coordinates (n,) and their rates, displacements (r,) and velocities of the rows."""
-
-    p: np.ndarray
-    p_rate: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-
-
-def initial_motion(scene: Scene, system: LineSystem) -> InitialMotion:
-    """Return the motion that a scene begins with."""
-    n, initial = system.modes, scene.initial
-    p, p_rate = np.full(n, initial.displacement / system.scale), np.full(n, initial.velocity / system.scale)
-    slip = np.array([damper.position for damper in scene.damper])
-    speed = np.array([damper.velocity for damper in scene.damper])
-    unloaded = np.zeros(system.friction_rows - system.bodies)
-    return InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
 
 
 def row_motion(

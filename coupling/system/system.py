@@ -85,6 +85,7 @@ class System(NamedTuple):
     dashpot: np.ndarray  # (u,) N s/m
     tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
     elongation: np.ndarray  # (j, N) of these springs
+    in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body that of its own table
@@ -148,12 +149,8 @@ class System(NamedTuple):
 
     @property
     def travels(self) -> np.ndarray:
-        """Free travel (c,) of each gap along a cavity, from left to right, and of each stop and other element, m."""
-        along, surface = ~self.across, self.surface[: self.contacts]
-        one = np.where(surface <= BODY, -1, np.arange(self.contacts))  # a face has several contacts, but one gap
-        pairs = np.column_stack([surface, self.body[: self.contacts], one])[along]
-        first = np.sort(np.unique(pairs, axis=0, return_index=True)[1])
-        return np.asarray(self.play[: self.contacts][along][first])
+        """Free travel (contacts,) of each contact, m: along its cavity or across it."""
+        return self.play[: self.contacts]
 
     @property
     def order(self) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from vanedamp.coupling.transients.ring_down_segments import Segment
+from vanedamp.coupling.transients.ring_down_segments import Followed
 
 #: points a period of the fastest mode between which the sign of the speed is followed
 _LOOKS = 16
@@ -51,20 +51,20 @@ class TurningPoints:
         """Where the coordinate has come to rest; None if it moves, or never has."""
         return self._stop if self._sign else None
 
-    def add(self, segment: Segment, start: float, duration: float) -> None:
-        """Follow a segment that begins at a time `start` and takes `duration`, s."""
+    def add(self, segment: Followed) -> None:
+        """Follow a segment."""
         if segment.fastest == 0.0:
             now = segment.energy(0.0)
             if now.kinetic > _STILL**2 * max(now.structure, self._energy):
                 # other modes move, and this one has become so small beside them that the engine leaves it out
                 self._sign, self._stop = 0.0, None
                 return
-        looks = max(int(np.ceil(duration * segment.fastest * _LOOKS / (2 * np.pi))), 2)
-        times = np.linspace(0.0, duration, looks + 1)
+        looks = max(int(np.ceil(segment.duration * segment.fastest * _LOOKS / (2 * np.pi))), 2)
+        times = np.linspace(0.0, segment.duration, looks + 1)
         for first in range(0, looks, _LOOKS):
-            self._follow(segment, start, times[first : first + _LOOKS + 1])
+            self._follow(segment, times[first : first + _LOOKS + 1])
 
-    def _follow(self, segment: Segment, start: float, times: np.ndarray) -> None:
+    def _follow(self, segment: Followed, times: np.ndarray) -> None:
         """Follow the sign of the speed from one of the times (k,) within a segment to the next."""
         speeds = segment.speed(times)
         largest = float(np.abs(speeds).max())
@@ -74,12 +74,12 @@ class TurningPoints:
         signs = np.where(np.abs(speeds) <= _STILL * self._speed, 0.0, np.sign(speeds))
         for k in np.flatnonzero(np.diff(signs, prepend=np.nan)):
             if signs[k] == 0.0:
-                self._stop = self._stop or _point(segment, start, times[k])
+                self._stop = self._stop or _point(segment, times[k])
                 continue
             if self._sign == -signs[k]:
                 # between two segments an impact has turned it
                 turn = _root(segment, times[k - 1], times[k]) if k and self._stop is None else times[k]
-                self._turn(self._stop or _point(segment, start, turn))
+                self._turn(self._stop or _point(segment, turn))
             elif not self._sign and self._stop is not None:
                 self.found.append(self._stop)  # released at rest
             self._sign, self._stop = float(signs[k]), None
@@ -92,14 +92,14 @@ class TurningPoints:
             self.found.append(point)
 
 
-def _root(segment: Segment, before: float, after: float) -> float:
+def _root(segment: Followed, before: float, after: float) -> float:
     """Return the time between two at which the speed vanishes."""
     return float(brentq(lambda t: segment.speed(np.array([t]))[0], before, after, xtol=1e-16 * after, rtol=1e-15))
 
 
-def _point(segment: Segment, start: float, t: float) -> TurningPoint:
+def _point(segment: Followed, t: float) -> TurningPoint:
     energy = segment.energy(t)
-    return TurningPoint(float(start + t), segment.coordinate(t), energy.total, energy.structure)
+    return TurningPoint(float(segment.start + t), segment.coordinate(t), energy.total, energy.structure)
 
 
 def without_rebounds(points: list[TurningPoint]) -> list[TurningPoint]:

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.exact.event_driven import EngineRun
-from vanedamp.coupling.exact.subsystem_assembly import Subsystem
+from vanedamp.coupling.methods.engines import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
@@ -24,7 +23,7 @@ from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy
 from vanedamp.coupling.response.event_log import named_bodies
 from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import at_speed_of, line_start
+from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean, deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
@@ -127,7 +126,8 @@ class _Run(Iterator[int]):
     def __init__(self, scene: Scene, table: Table, course: Course, start: RestartState | None) -> None:
         self.scene, self.table, self.course, self.state = scene, table, course, start
         self.over_speed = table.quantity != "frequency"
-        self.system, self.known = seen_only(assemble(scene)), dict[bytes, Subsystem]()
+        self.system = seen_only(assemble(scene))
+        self.run: Run | None = None
         self.status, self.done, self.events, self.tilted, self.open_ledger = Status.OK, 0, 0, False, np.inf
         p, b = len(course.time), self.system.bodies
         travel = {cavity.name: cavity.gap for cavity in scene.cavity}
@@ -157,23 +157,21 @@ class _Run(Iterator[int]):
         state = self.state
         if self.over_speed:
             self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
-            system = seen_only(assemble(self.scene))
-            if not _alike(system, self.system):
-                self.known = {}
-            self.system = system
+            self.system = seen_only(assemble(self.scene))
             if self.state is not None:
                 state = at_speed_of(self.scene, self.state)
                 # fewer modes than the model has may not hold the motion: what they lose is no work of the rotation
                 self.rotation -= 0.5 * (_square(state.velocity) - _square(self.state.velocity))
         else:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
-        scene, system, solver = self.scene, self.system, self.scene.solver
+        scene, system = self.scene, self.system
+        solver: Any = scene.solver
         records, left = new_records(system, 1, 0, deflected=self.deflected), solver.max_events - self.events
-        if scene.planar:
-            from vanedamp.coupling.planar.planar_run import begin_run
-
-            return begin_run(scene, system, records, True, left, state)
-        return EngineRun(system, *line_start(scene, system, state), records, True, left, self.known)
+        start = start_of(scene, system, state)
+        run = engine_run(system, start, records, True, left, solver.linearisation)
+        reuse_subsystems(run, self.run)
+        self.run = run
+        return run
 
     def _record(self, k: int, outcome: Outcome) -> None:
         records, b = outcome.records, self.system.bodies
@@ -221,12 +219,6 @@ class _Run(Iterator[int]):
 
 def _square(values: np.ndarray) -> float:
     return float(values @ values)
-
-
-def _alike(system: System, other: System) -> bool:
-    """Whether two systems have the same subsystems (exact.subsystem_assembly.Subsystem)."""
-    names = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
-    return all(np.array_equal(getattr(system, name), getattr(other, name)) for name in names)
 
 
 def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
+from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, Rotation, hertz_of
 from vanedamp.coupling.scene.scene import Scene
@@ -115,8 +115,6 @@ def ramped(scene: Scene) -> Scene:
             f'solver.method: run-ups are those of the exact engine, not of "{scene.solver.method}"; take "exact"'
         )
     check_waveform(scene, "exact")
-    if reason := why_no_restart(scene):
-        raise InputError(f"ramp: a period begins with the motion that the one before has left, which {reason}")
     order, near = excitation.engine_order, excitation.resonance_near
     if table.quantity == _FREQUENCY:
         if order is not None:

@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from vanedamp.coupling.exact.event_driven import EngineRun
-from vanedamp.coupling.methods.registry import respond, run_of
+from vanedamp.coupling.methods.engines import engine_run
+from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.model_order.selection import warnings_of
-from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.evaluation import evaluate
-from vanedamp.coupling.response.records import STORED, VISCOUS
+from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Response, Status
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import Walk
+from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -27,7 +29,7 @@ from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, without_rebounds
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
-from vanedamp.coupling.transients.ring_down_segments import Walk
+from vanedamp.coupling.transients.ring_down_segments import Followed
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -130,14 +132,16 @@ def _rung_down(
     record: RingDown, free: Scene, system: System, start: RestartState, report: Callable[[int], Any]
 ) -> RingDown:
     """Return the record with the free motion from a state on."""
-    began, mode = time.perf_counter(), record.linear.mode
-    run = run_of(free, events=True, start=start)
-    assert isinstance(run, EngineRun | PlanarRun)
-    walk, turning, done = Walk(run, mode, free.time.simulated), TurningPoints(), 0
-    for segment, since, duration in walk:
-        turning.add(segment, since, duration)
-        if int(since / system.period) > done:
-            report(done := int(since / system.period))
+    began, mode, periods = time.perf_counter(), record.linear.mode, free.time.simulated
+    options: Any = free.solver
+    records = new_records(system, periods, 0, deflected=deflects(free, system))
+    begun = start_of(free, system, start)
+    run = engine_run(system, begun, records, True, options.max_events, options.linearisation)
+    walk, turning, done = Walk(run, periods), TurningPoints(), 0
+    for segment in walk:
+        turning.add(Followed(segment, mode))
+        if segment.period > done:
+            report(done := segment.period)
     outcome = run.outcome()
     response = evaluate(free, outcome, walk.status, 0, began)
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import why_no_restart
-from vanedamp.coupling.planar.restart import planar_restart_state
-from vanedamp.coupling.response.restart import before_stops, line_start, restart_state
+from vanedamp.coupling.response.restart import before_stops, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.excitation import Excitation
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
-from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.ramp_course import MOST_PERIODS
@@ -37,8 +35,6 @@ def table_of(scene: Scene) -> RingDownTable:
         raise InputError('ring_down: a prescribed motion does not ring down; take structure.model = "rigid" or "rom"')
     if scene.solver.method != "exact":
         raise InputError(f'ring_down: is for solver.method "exact", not "{scene.solver.method}"')
-    if reason := why_no_restart(scene):
-        raise InputError(f"ring_down: {reason}")
     if table.at is not None and not isinstance(scene.structure, Rom):
         raise InputError("ring_down.at: a structure of one mode has no interface labels; leave it out")
     if table.start != "steady":
@@ -84,7 +80,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     with their bodies, and leaves the springs of friction dampers unloaded. Raises InputError.
     """
     system = assemble(scene)
-    state, scale = _initial(scene, system), system.scale
+    state, scale = start_of(scene, system), system.scale
     if table.impulse is None and table.displacement is None:
         return state
     at = table.at or forced_label(scene)
@@ -104,7 +100,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     n = system.modes
     slip = state.slip_velocity - system.floor[:, :n] @ rate
     moved = {"velocity": state.velocity + scale * rate, "slip_velocity": slip}
-    if scene.planar:
+    if system.in_plane:
         extended = system.tilt >= 0
         moved["lift_velocity"] = state.lift_velocity - np.where(extended, system.rise[:, :n] @ rate, 0.0)
         moved["tilt_rate"] = state.tilt_rate - np.where(extended, system.turn[:, :n] @ rate, 0.0)
@@ -131,11 +127,3 @@ def check_impacts(free: Scene, system: System, start: RestartState) -> None:
             f"ring_down: begins at {speed.max():.3g} m/s between walls, and takes about {impacts:.2g} impacts; at most "
             f"{_MOST_IMPACTS}: begin slower, or take fewer periods"
         )
-
-
-def _initial(scene: Scene, system: System) -> RestartState:
-    """Return the state that the scene begins with."""
-    if not scene.planar:
-        return restart_state(*line_start(scene, system))
-    motion = initial_motion(scene, system)
-    return planar_restart_state(system, motion.q, motion.v)

@@ -22,6 +22,7 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import stringify_signature
 
 import vanedamp
+from vanedamp.files.key_tables import KeyedDocstring
 
 FOLDER = Path(__file__).parent.parent / "reference" / "api"
 
@@ -185,7 +186,10 @@ def _names_of(value: Any) -> Iterable[str]:
 
 
 def process(_app: Sphinx, _what: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
-    """Turn a docstring into reStructuredText, in place."""
+    """Turn a docstring into reStructuredText, in place; keys of files have pages of their own."""
+    own = vars(value).get("__doc__") if inspect.isclass(value) else None
+    if isinstance(own, KeyedDocstring):
+        lines[:] = own.plain.splitlines()
     lines[:] = [*restructured("\n".join(lines), _names_of(value)).splitlines(), ""]
 
 

@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from vanedamp.files.key_tables import documented
 from vanedamp.files.toml_input import (
     STRICT,
     Direction,
@@ -339,6 +340,7 @@ class InterfaceTable:
         return {key: group for key, group in given.items() if isinstance(group, str) and group != "normal"}
 
 
+@documented
 @dataclass(frozen=True, config=STRICT)
 class Case:
     """Everything that modes and reduction of a structure need."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from argparse import Namespace
 from collections.abc import Mapping
@@ -15,8 +14,8 @@ from vanedamp.studies.commands.support.messages import print_cavities, print_war
 
 def run(arguments: Namespace, case: Case) -> None:
     """Compute the modes, and what follows from them."""
-    if arguments.vtk and importlib.util.find_spec("pyvista") is None:  # before the work
-        raise ModuleNotFoundError("--vtk writes with it", name="pyvista")
+    if arguments.vtk:  # loads matplotlib and meshio, and says before the work what is missing
+        from vanedamp.studies.report.pictures import save_vtk
 
     analysis = modal_analysis(assemble(case))
     result = analysis.to_json()
@@ -25,8 +24,6 @@ def run(arguments: Namespace, case: Case) -> None:
         if arguments.output:
             analysis.save(arguments.output)
         if arguments.vtk:
-            from vanedamp.studies.report.pictures import save_vtk  # pyvista, for this file only
-
             mesh, cell_type = analysis.mesh()
             save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, arguments.vtk)
 

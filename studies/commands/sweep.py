@@ -56,7 +56,7 @@ def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:
         if not response.reference > 0:
             print(
                 f"{response.name}: nothing excites the structure, or a waveform without linear curves: there is no "
-                "undamped maximum to compare with"
+                "maximum without bodies to compare with"
             )
             continue
         print(response.sentence)

@@ -115,7 +115,7 @@ def fig12(curves: Curves) -> list[Claim]:
 def _level(reduced: Curve, rigid: Curve) -> Claim:
     top, other = reduced.peak(), rigid.peak()
     return claim(
-        "The averaged amplitudes of both models agree, at about half of the undamped maximum.",
+        "The averaged amplitudes of both models agree, at about half of the maximum without bodies.",
         f"highest means: reduced model {top}, rigid model {other}",
         verdict(abs(top.height - other.height) < 0.1 and 0.35 < top.height < 0.6, abs(top.height - other.height) < 0.2),
         figures={"reduced": top.height, "rigid": other.height, "confidence": top.confidence},
@@ -127,11 +127,11 @@ def onset(curve: Curve) -> Claim:
     apart = float(np.max(np.abs(curve.mean / curve.undamped - 1)[below])) if below.any() else math.inf
     at = int(np.argmax(~below))
     return claim(
-        "Up to an onset the damped curve is the undamped one.",
+        "Up to an onset the damped curve is the one without bodies.",
         f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
         f"by at most {apart:.2%} over {below.sum()} points",
         verdict(apart < 0.01 and below.sum() > 5),
-        "The onset is where an undamped amplitude reaches half of the gap, for a body that starts at rest in the "
+        "The onset is where an amplitude without bodies reaches half of the gap, for a body that starts at rest in the "
         "middle; one that is already flying goes on down to lower frequencies.",
         {"onset_hz": curve.onset, "difference": apart},
     )
@@ -150,7 +150,7 @@ def drop(curve: Curve) -> Claim:
         verdict(0.9 < median < 1.1 and high < 1.2, median < 1.1),
         "It drops through the fixed curve: the impacts not only attach mass, they take energy as well, the more the "
         "wider the gap (reference/10 stays close to the fixed curve). Farther up they end, and a body at rest in "
-        "the middle leaves the undamped curve.",
+        "the middle leaves the curve without bodies.",
         {"at_resonance": left, "ratio_low": low, "ratio_median": median, "ratio_high": high},
     )
 

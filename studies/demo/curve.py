@@ -31,10 +31,10 @@ class Peak:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the undamped maximum X.
+    """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the maximum without bodies X.
 
     X (m, `reference`) is the resonance's, as the paper has it, whether or not the frequencies reach it; where the scene
-    names no level of a resonance, the undamped maximum over the frequencies.
+    names no level of a resonance, the maximum without bodies over the frequencies.
 
     largest, mean, confidence  absolute maxima, means of the periods' peaks, half widths of their 95 % confidence
                                intervals (0 where there are too few periods)

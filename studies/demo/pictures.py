@@ -25,7 +25,7 @@ def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linea
 
 
 def draw_linear(axes: Axes, curve: Curve) -> None:
-    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=DARK, linewidth=1.4, label="undamped")
+    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=DARK, linewidth=1.4, label="without bodies")
     axes.plot(curve.frequency, 100 * curve.fixed, "--", color=GREY, linewidth=1.4, label="bodies fixed")
 
 
@@ -41,7 +41,7 @@ def draw_damped(axes: Axes, curve: Curve, label: str, colour: str) -> None:
 def finish(axes: Axes, title: str, ylabel: bool = True) -> None:
     axes.set_xlabel("excitation frequency, Hz")
     if ylabel:
-        axes.set_ylabel("amplitude / undamped maximum, %")
+        axes.set_ylabel("amplitude / maximum without bodies, %")
     axes.set_ylim(0, 105)
     axes.margins(x=0)
     axes.set_title(title)

@@ -31,7 +31,7 @@ def response_figure(
     """
     reference = response.reference
     lines = [
-        trace("undamped", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
+        trace("without bodies", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
         trace("fixed", linear.x, linear.fixed / reference, _FIXED, hoverinfo="skip"),
     ]
     points = [
@@ -81,7 +81,7 @@ def key_figures(response: ForcedResponse) -> list[Figure]:
     """Return the key figures of a curve for people, those of the headline that `vanedamp sweep` prints."""
     headline = response.headline
     return [
-        Figure("undamped maximum X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
+        Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
         Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at)),
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),
@@ -101,13 +101,13 @@ def remarks(sweep: Sweep, response: ForcedResponse, complete: bool) -> list[str]
 
 
 def _most_reduced(response: ForcedResponse) -> str:
-    """Return the frequency at which the damped mean is the least share of the undamped amplitude."""
+    """Return the frequency at which the damped mean is the least share of the amplitude without bodies."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(response.undamped > 0, response.damped_mean / response.undamped, np.nan)
     if not np.isfinite(share).any():
         return "-"
     best = int(np.nanargmin(share))
-    return _at(f"to {share[best]:.3f} of undamped", response.x[best])
+    return _at(f"to {share[best]:.3f} of that without bodies", response.x[best])
 
 
 def _at(text: str, frequency: Any) -> str:

@@ -115,7 +115,7 @@ _MEASURES_OF_DAMPER = (
     _Measure("restitution", "restitution", "", 1.0),
 )
 _LEVELS = (
-    _Measure("resonance_amplitude", "level: undamped resonance", "µm", 1e-6, around=20.0),
+    _Measure("resonance_amplitude", "level: resonance without bodies", "µm", 1e-6, around=20.0),
     _Measure("force", "level: force", "N", 1.0, around=20.0),
     _Measure("base_acceleration", "level: base acceleration", "m/s²", 1.0, around=20.0),
     _Measure("load_factor", "level: factor of the loads", "", 1.0, around=20.0),

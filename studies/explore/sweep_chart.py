@@ -38,7 +38,7 @@ class Best:
 
     places    a place on every axis: of the frequency and of the starts those of its highest amplitude
     amplitude highest mean of the periods' peaks, m
-    relative  over the undamped maximum; nan where there is none
+    relative  over the maximum without bodies; nan where there is none
     designs   number of designs, and how many of them are left out: with points that are not ok
     left_out
     """
@@ -69,7 +69,7 @@ def best_design(sweep: Sweep) -> Best | None:
         return None
     peak = np.where(ok, sweep.amplitude_mean_dynamic, 0.0).max(axis=over)
     relative = peak / _undamped_maximum(sweep, swept, over)
-    # designs that share their undamped maximum rank by either figure
+    # designs that share their maximum without bodies rank by either figure
     figure = relative if np.isfinite(relative[complete]).all() else peak
     chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
     places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
@@ -82,7 +82,7 @@ def best_design(sweep: Sweep) -> Best | None:
 
 
 def _undamped_maximum(sweep: Sweep, swept: str | None, over: tuple[int, ...]) -> np.ndarray:
-    """Return the undamped maximum of each design, m; nan where there is none."""
+    """Return the maximum without bodies of each design, m; nan where there is none."""
     if swept is None or "undamped_peak" not in sweep.peaks:
         top = sweep.amplitude_undamped.max(axis=over)
     else:
@@ -104,7 +104,7 @@ def best_sentence(sweep: Sweep, best: Best | None) -> str:
     highest = "highest mean amplitude" if swept or any(map(is_start, sweep.axes)) else "mean amplitude"
     text = f"Best of {best.designs} designs: {design or 'the only one'}, {highest} {1e6 * best.amplitude:.4g} µm"
     if np.isfinite(best.relative):
-        text += f", {best.relative:.3f} of the undamped {'maximum' if swept else 'amplitude'}"
+        text += f", {best.relative:.3f} of the {'maximum' if swept else 'amplitude'} without bodies"
     if swept is not None:
         text += f", at {setting(swept, sweep.axes[swept][best.places[swept]], units[swept])}"
     if best.left_out:
@@ -141,7 +141,7 @@ def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, in
     between = linear.x if text else factor * linear.x
     at_points = {"customdata": response.x.tolist(), "marker": {"size": 5}}
     for curve, at, values, colour, more in (
-        ("undamped", between, linear.undamped, _LINEAR, {}),
+        ("without bodies", between, linear.undamped, _LINEAR, {}),
         ("fixed", between, linear.fixed, _LINEAR, {}),
         ("damped_max", x, response.damped_max, _CHOSEN, at_points),
         ("damped_mean", x, response.damped_mean, _CHOSEN, at_points | {"mode": "lines+markers"}),

@@ -37,7 +37,7 @@ class Optimum:
 
     @property
     def reduction(self) -> float:
-        """Share of the undamped amplitude that is taken away, as designed."""
+        """Share of the amplitude without bodies that is taken away, as designed."""
         return 1.0 - self.amplitude
 
     @property
@@ -65,7 +65,7 @@ class Optimisation:
 
     study              the [optimise] table and the scene, as plain data
     mass, amplitude    kg of the structure and m of X: what mass ratio and gap ratio refer to
-    reference          m, undamped amplitude in the band: its maximum, at the points or between them, or its mean
+    reference          m, amplitude without bodies in the band: its maximum, at the points or between them, or its mean
     resonance_frequency  Hz of the resonance that X and mass are of
     nominal, robust    the best design as it is, and the best within the tolerances
     map_*              axes (a,), (b,) and amplitudes (a, b) of designs as they are, with the bodies of `nominal`

@@ -253,11 +253,11 @@ def _sentence(
 ) -> str:
     table = study.table
     if table.over_band == "mean":
-        of = "the undamped mean in the band"
+        of = "the mean without bodies in the band"
     elif headlines["nominal"].undamped_at_edge:
-        of = f"the highest undamped amplitude in the band, {study.reference:.3g} m"
+        of = f"the highest amplitude without bodies in the band, {study.reference:.3g} m"
     else:
-        of = "the undamped maximum (worst in the band)"
+        of = "the maximum without bodies (worst in the band)"
     text = f"{_format_design(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
     if asdict(table.tolerances) != _NONE:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"

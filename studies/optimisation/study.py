@@ -23,6 +23,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, settled_after, timed
+from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 
@@ -55,7 +56,7 @@ class Variables:
     mass_ratio: Bounds = (0.005, 0.05)
     """mass of all bodies over that of the structure [-]"""
     gap_ratio: Bounds = (0.1, 1.5)
-    """free travel over X, the undamped maximum of the resonance [-]"""
+    """free travel over X, the maximum without bodies of the resonance [-]"""
     bodies: Counts = (1, 1)
     """number of bodies"""
 
@@ -178,6 +179,7 @@ class Design(NamedTuple):
     bodies: int
 
 
+@documented
 @dataclass(frozen=True, config=STRICT, repr=False)
 class StudyFile(Scene):
     """A scene, and what is best for it."""

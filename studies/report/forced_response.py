@@ -40,7 +40,7 @@ class LinearCurves(NamedTuple):
 class ForcedResponse:
     """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
 
-    reference          what amplitudes are divided by in charts: the undamped maximum over the range
+    reference          what amplitudes are divided by in charts: the maximum without bodies over the range
     undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks, from the static
                        deflection under the bodies' loads, which linear amplitudes leave out, too

@@ -26,7 +26,7 @@ def responses_figure(
     linear: Sequence[LinearCurves] | None = None,
     shown: Collection[str] | None = None,
 ) -> go.Figure:
-    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the undamped maximum.
+    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
 
     linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
     first; the others wait for `curves.js`, and the table beside the chart is its legend. Default: all, with a legend.

@@ -45,7 +45,7 @@ def map_figure(sweep: Sweep) -> go.Figure:
         sweep, map_panels(sweep), map_axes(sweep), coloraxis="coloraxis",
         hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra></extra>",
     )  # fmt: skip
-    bar = {"title": {"text": "mean amplitude /<br>undamped maximum"}}
+    bar = {"title": {"text": "mean amplitude /<br>maximum without bodies"}}
     return figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
 
 

@@ -30,7 +30,7 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
             marker={"symbol": symbol, "size": 15, "color": colour, "line": {"color": "#111827", "width": 1.5}},
         )  # fmt: skip
     figure.update_xaxes(title_text="mass of the bodies over that of the structure, %")
-    figure.update_yaxes(title_text=f"gap over the undamped amplitude X = {1e6 * record.amplitude:.3g} µm")
+    figure.update_yaxes(title_text=f"gap over the amplitude without bodies X = {1e6 * record.amplitude:.3g} µm")
     figure.update_layout(
         title=f"Reduction with {_bodies(count)}", template="plotly_white",
         legend={"orientation": "h", "yanchor": "top", "y": -0.2, "x": 0.0},

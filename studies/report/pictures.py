@@ -1,20 +1,22 @@
-"""Pictures of mode shapes, rendered off-screen, and mode shapes for ParaView."""
+"""Pictures of mode shapes, and mode shapes for ParaView."""
 
 from __future__ import annotations
 
 import io
-import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
 
-from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import load, replacing
-from vanedamp.studies.report.mode_chart import viewpoint
+from vanedamp.studies.figures import GREY, draw_grid, save, subplots
+from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
 from vanedamp.studies.report.response_curves import RELATIVE
-from vanedamp.studies.workers import run_module
 
 if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes
@@ -22,28 +24,64 @@ if TYPE_CHECKING:
 
 #: largest displacement in a picture, as a share of the structure's size
 _EXAGGERATION = 0.06
+#: names of VTK's cells: linear ones, and those of any order, as dolfinx has them
+_CELLS = {10: "tetra", 12: "hexahedron", 71: "VTK_LAGRANGE_TETRAHEDRON", 72: "VTK_LAGRANGE_HEXAHEDRON"}
+#: part of the light that comes from all sides
+_AMBIENT = 0.55
 
 
 def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     """Return the PNG of a mode in a file of `vanedamp modal`: deformed, coloured by displacement.
 
-    None where no picture can be rendered. VTK has a process of its own: it aborts without a graphics library, and its
-    C++ library does not get on with those of the finite elements.
+    None for cells whose faces are not known (studies.report.mode_chart).
     """
-    with tempfile.TemporaryDirectory() as folder:
-        picture = Path(folder) / "mode.png"
-        # what VTK complains of need not be text
-        finished = run_module(
-            "vanedamp.studies.report.pictures", str(modes_file), str(mode), str(picture), errors="replace"
-        )
-        return picture.read_bytes() if finished.returncode == 0 else None
+    values, _ = load(modes_file, "modes")
+    try:
+        corners = surface(values["cell"])
+    except KeyError:
+        return None
+    points, shape = values["coordinates"], values["shape"][mode].reshape(-1, 3)
+    magnitude = np.linalg.norm(shape, axis=1)
+    size, away = float(np.linalg.norm(np.ptp(points, axis=0))), viewpoint(points, shape)
+    across = np.array([-away[1], away[0], 0.0]) / np.hypot(away[0], away[1])
+    screen = np.column_stack([across, np.cross(away, across)])
+    moved = points + shape * (_EXAGGERATION * size / magnitude.max())
+    triangles = moved[corners]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    facing = normals @ away / np.linalg.norm(normals, axis=1)
+    # painted from the far to the near; what looks away is hidden by what does not
+    order = np.argsort(triangles.mean(axis=1) @ away, kind="stable")
+    seen = order[facing[order] > 0.0]
+    colours = colormaps["viridis"]((magnitude / magnitude.max())[corners[seen]].mean(axis=1))
+    colours[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing[seen])[:, None]
+    figure, axes = subplots(size=(12.5, 7.5))
+    edges = points[sharp_edges(points, corners)] @ screen
+    axes.add_collection(LineCollection(list(edges), colors="#9aa0a6", linewidths=0.8))
+    painted = PolyCollection(triangles[seen] @ screen, facecolors=colours, edgecolors=colours, linewidths=0.3)
+    axes.add_collection(painted)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.axis("off")
+    _draw_directions(axes, screen)
+    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), "viridis"), ax=axes, orientation="horizontal", shrink=0.5)
+    bar.set_label("displacement / largest displacement")
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=120, format="png")
+    return picture.getvalue()
+
+
+def _draw_directions(axes: Axes, screen: np.ndarray) -> None:
+    """Draw the directions of x, y and z in the lower left corner. screen: (3, 2) directions of the picture's axes."""
+    for name, arrow in zip("xyz", 28.0 * screen, strict=True):
+        axes.annotate(
+            name, (0.05, 0.08), arrow, xycoords="axes fraction", textcoords="offset points", ha="center", va="center",
+            arrowprops={"arrowstyle": "<-", "shrinkA": 0, "shrinkB": 0}, fontsize=11,
+        )  # fmt: skip
 
 
 def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path) -> None:
     """Write a PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
     from matplotlib.image import imread
-
-    from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 
     figure, (left, right) = subplots(1, 2, size=(12, 4.6), width_ratios=[1, 1.25])
     left.axis("off")
@@ -51,7 +89,7 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
         left.imshow(imread(io.BytesIO(mode_png)))
         left.set_title("first bending mode of the cluster", fontsize=11)
     curves: list[tuple[np.ndarray, str, dict[str, Any]]] = [
-        (response.undamped, "undamped", {"color": GREY, "linestyle": ":"}),
+        (response.undamped, "without bodies", {"color": GREY, "linestyle": ":"}),
         (response.fixed, "bodies fixed", {"color": GREY, "linestyle": "--"}),
         (response.damped_max, "loose bodies, maximum", {"color": "#9fc1ea", "marker": ".", "linewidth": 0.8}),
         (response.damped_mean, "loose bodies, mean of peaks", {"color": "#1f5fa8", "linewidth": 2.0}),
@@ -68,71 +106,15 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
 
 
 def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:
-    """Write all mode shapes as point data on their mesh (.vtu or .vtk, for ParaView)."""
-    with uninterrupted():  # an interrupt within VTK may crash the process as it ends
-        grid = _grid(coordinates, cells, cell_type)
-        for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
-            grid.point_data[f"mode {number}: {frequency:.6g} Hz"] = shape.reshape(-1, 3)
-        content = _vtk_bytes(grid, xml=Path(path).suffix == ".vtu")
+    """Write all mode shapes as point data on their mesh (.vtu or .vtk, for ParaView). cell_type: VTK's number."""
+    from meshio import Mesh
+
+    legacy = Path(path).suffix == ".vtk"
+    fields = {}
+    for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
+        name = f"mode {number}: {frequency:.6g} Hz"
+        # names end at a space in old files, and readers know this sign for it
+        fields[name.replace(" ", "%20") if legacy else name] = shape.reshape(-1, 3)
+    mesh = Mesh(coordinates, [(_CELLS[cell_type], cells)], point_data=fields)
     with replacing(path) as temporary:
-        temporary.write_bytes(content)
-
-
-def _vtk_bytes(grid: Any, xml: bool) -> bytes:
-    """Return the content of a .vtu (xml) or .vtk file; VTK's writers end the process on a full disk, or are silent."""
-    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
-    writer: Any = vtkXMLUnstructuredGridWriter() if xml else vtkUnstructuredGridWriter()
-    writer.SetInputDataObject(grid)
-    writer.SetWriteToOutputString(True)
-    if xml:
-        writer.SetDataModeToBinary()
-    else:
-        writer.SetFileTypeToBinary()
-    writer.Write()
-    content = writer.GetOutputString() if xml else writer.GetOutputStdString()
-    # VTK gives text where the bytes are some
-    return content if isinstance(content, bytes) else content.encode()
-
-
-def _grid(coordinates: np.ndarray, cells: np.ndarray, cell_type: int) -> Any:
-    import pyvista
-
-    lines = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
-    return pyvista.UnstructuredGrid(lines.ravel(), np.full(len(cells), cell_type, np.uint8), coordinates)
-
-
-def _render(modes_file: str, mode: int, picture: str) -> None:
-    import pyvista
-
-    values, attributes = load(modes_file, "modes")
-    grid = _grid(values["coordinates"], values["cell"], attributes["vtk_cell_type"])
-    shape = values["shape"][mode].reshape(-1, 3)
-    magnitude = np.linalg.norm(shape, axis=1)
-    grid.point_data["shape"] = shape / magnitude.max()
-    title = "displacement / largest displacement"
-    grid.point_data[title] = magnitude / magnitude.max()
-    surface = grid.extract_surface(nonlinear_subdivision=1)
-    moved = surface.warp_by_vector("shape", factor=_EXAGGERATION * grid.length)
-    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[1500, 900])
-    plotter.set_background("white")
-    plotter.add_mesh(surface.extract_feature_edges(30), color="#9aa0a6", line_width=1.5)
-    bar = {
-        "title": " ", "color": "black", "label_font_size": 24, "n_labels": 5, "fmt": "%.2f",
-        "vertical": False, "width": 0.5, "height": 0.07, "position_x": 0.25, "position_y": 0.01,
-    }  # fmt: skip
-    look = {"cmap": "viridis", "clim": [0, 1], "ambient": 0.3, "smooth_shading": True, "split_sharp_edges": True}
-    plotter.add_mesh(moved, scalars=title, scalar_bar_args=bar, **look)
-    plotter.add_text(title, position=(0.33, 0.09), viewport=True, font_size=14, color="black")
-    plotter.add_axes(color="black", line_width=4)
-    plotter.view_vector(viewpoint(values["coordinates"], shape), viewup=(0.0, 0.0, 1.0))
-    plotter.camera.zoom(1.2)
-    # the colour bar takes the lower edge
-    plotter.camera.SetWindowCenter(0.0, -0.08)
-    plotter.screenshot(picture)
-    plotter.close()
-
-
-if __name__ == "__main__":
-    _render(sys.argv[1], int(sys.argv[2]), sys.argv[3])
+        mesh.write(temporary, file_format="vtk" if legacy else "vtu")

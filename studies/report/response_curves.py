@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 #: title of an axis of amplitudes over the reference of a response
-RELATIVE = "amplitude / undamped maximum"
+RELATIVE = "amplitude / maximum without bodies"
 
 
 class Look(NamedTuple):
@@ -20,7 +20,7 @@ class Look(NamedTuple):
 
 #: by the names of the curves in LinearCurves and ForcedResponse, in the order in which they are drawn
 LOOKS = {
-    "undamped": Look("undamped", "dot", 1.8),
+    "undamped": Look("without bodies", "dot", 1.8),
     "fixed": Look("bodies fixed", "dash", 1.8),
     "damped_max": Look("damped, maximum", "solid", 0.8),
     "damped_mean": Look("damped, mean of peaks", "solid", 2.8),

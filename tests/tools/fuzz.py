@@ -201,8 +201,6 @@ def run_all(first: int, count: int, folder: Path) -> int:
     from vanedamp.studies.cli import main
     from vanedamp.studies.commands import optimise, ramp, ringdown, run
 
-    for command in (run, sweep_steps, optimise, ramp, ringdown):
-        command.progress = fuzz_runs.patient  # type: ignore[attr-defined]
     explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
     for scene in (SCENE, PRESCRIBED, explicit):  # compiled functions are loaded once
         simulate(validate(Scene, scene, "warm-up"))
@@ -237,6 +235,8 @@ def run_all(first: int, count: int, folder: Path) -> int:
         _, wrong = fuzz_runs.run_cases(range(1), prepare)
     if wrong:
         raise RuntimeError(f"the samples cannot be written: {wrong}")
+    for command in (run, sweep_steps, optimise, ramp, ringdown):  # samples are written to their end
+        command.progress = fuzz_runs.patient  # type: ignore[attr-defined]
     numbers = range(first, first + count)
     faults = 0
     for title, case in (("damaged files", file_case), ("inputs", input_case)):

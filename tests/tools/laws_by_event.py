@@ -8,10 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tests.tools.segment_stepper import SLIDES, Moment, Segment, Step, Stepper
-from vanedamp.coupling.exact.event_functions import ADHESION, CHATTER, RESOLUTION
-from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
-from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.exact.tolerances import ADHESION
 from vanedamp.coupling.numerics.codes import CLOSED, DONE, LEAVING, OPEN, STICK, TOUCHING
+from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE, RESOLUTION, SIMULTANEOUS, SPEED_ROUND_OFF
 from vanedamp.coupling.scene.scene import Scene
 
 #: points at which the motion between two events is looked at
@@ -150,9 +149,9 @@ def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: fl
     after, system = step.after, step.before.system
     contacts = _contacts(system)
     scale = np.where(contacts, system.free_travel, max(np.abs(end.gap).max(), 1e-300))
-    # speeds that differ by ROUND_OFF of the fastest are equal: slip and gap at a wall apart from the floor may have
-    # drifted apart at that speed for a period when they are joined again
-    scale = scale + ROUND_OFF * fastest * system.period / SIMULTANEOUS
+    # speeds that differ by SPEED_ROUND_OFF of the fastest are equal: slip and gap at a wall apart from the floor may
+    # have drifted apart at that speed for a period when they are joined again
+    scale = scale + SPEED_ROUND_OFF * fastest * system.period / SIMULTANEOUS
     jumps = np.isfinite(system.spring) & ~contacts  # a spring's elongation is set to its bound
     worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), 2 * SIMULTANEOUS, step)
     touching = contacts & np.isinf(system.spring) & (after.displacement == 0.0)

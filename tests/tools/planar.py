@@ -8,8 +8,9 @@ from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.event_log import WIDTH
 from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.assembly import Motion, assemble
 from vanedamp.files.toml_input import validate
 
 
@@ -40,6 +41,11 @@ def planar_scene(data, *bodies, periods=1, gap=1.0, play=1.0):
     return validate(Scene, data | {"cavity": cavity, "damper": dampers, "time": time}, "scene")
 
 
+def initial_motion(scene, system) -> Motion:
+    """Coordinates and velocities with which a scene begins."""
+    return motion_of(system, start_of(scene, system))
+
+
 def open_run(scene, periods, events, samples=0):
     """A run of a scene that has not begun."""
     system = assemble(scene)
@@ -56,8 +62,8 @@ def run_planar(scene, periods, events=10**7, samples=0):
 def witness(scene, periods, steps, samples=0, **options):
     """The run of a scene by time stepping, with its status."""
     system = assemble(scene)
-    taken = moreau.Options(steps_per_period=steps, **options)
-    run = moreau._begin_planar(scene, system, taken, new_records(system, periods, samples), True)
+    stepped = scene.replace({"solver": {"method": "moreau", "steps_per_period": steps} | options})
+    run = moreau.begin(stepped, system, new_records(system, periods, samples), True, start_of(scene, system))
     return run, run.advance_to(periods)
 
 

@@ -56,7 +56,7 @@ def record(data: dict, change=None) -> Record:
     code = run.advance(stepper.periods, stepper.budget) if code == DONE else code
     hits: dict = defaultdict(list)
     before, together = (-np.inf, (-1, "")), np.inf
-    for event in events_of(rows_of_line(run.whole), run.log.chunks):
+    for event in events_of(rows_of_line(run.whole), run.chunks):
         if event.kind == "impact":
             time, contact = event.time / run.system.period, (event.damper, event.side)
             hits[contact].append((time, event.relative_velocity_before))

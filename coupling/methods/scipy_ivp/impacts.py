@@ -1,93 +1,129 @@
-"""Newton's law at all touching contacts at once, and the end of a chatter, for an integrator.
-
-Pfeiffer and Glocker (1996), chapter 8. Chatter: Nordmark and Piiroinen (2009); a row of bodies can meet infinitely
-often in finite time without being pressed together (McNamara and Young 1992).
-"""
+"""Impacts by Newton's law in Moreau's form with Coulomb's at all closed contacts at once, by trying their states."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
-from vanedamp.coupling.numerics.codes import AT_LOW, DEPENDENT
-from vanedamp.coupling.numerics.complementarity import Problem, solve_box
-from vanedamp.coupling.system.line_system import LineSystem
-from vanedamp.coupling.system.restitution import restitutions_at
+from vanedamp.coupling.methods.scipy_ivp.contact_states import search
+from vanedamp.coupling.methods.scipy_ivp.motion import (
+    LEFT,
+    OPEN,
+    RIGHT,
+    ROUND_OFF,
+    STICK,
+    Holding,
+    States,
+    Unforced,
+    Wrong,
+)
 
-#: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
-CHATTER = 3e-7
-#: impacts of a contact that follow each other within this share of a period are the end of a collapse
-COLLAPSE = 1e-24
-#: gaps that close within this share of a period close now, unless they have been closed for this share of it
-TOUCH, FRESH = 1e-14, 1e-9
-#: speeds below this share of the fastest are zero
-STILL = 1e-12
+#: sweeps that guess the states of an impact, the change that ends them, and how near to its bound a force slips
+_SWEEPS, _CONVERGED, _NEARLY = 200, 1e-9, 1e-6
+#: bisections of the restitution of an impact that would increase the energy
+_HALVINGS = 50
 
 
 class Impact(NamedTuple):
-    """Impacts of the contacts `row`: speeds before and after, impulses, and the lost energy, J."""
+    """Impulses (2u,), velocities (N,) after them, and the states (u,) of the contacts meanwhile."""
 
-    row: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
     impulse: np.ndarray
-    loss: float
+    v: np.ndarray
+    state: np.ndarray
 
 
-def simultaneous_impacts(
-    u: Unforced, z: np.ndarray, pressing: np.ndarray, resting: np.ndarray, collapsed: np.ndarray, problem: Problem
-) -> Impact | None:
-    """Let the touching contacts of state z (size,) collide, in place. None without a solution.
+def impact(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
+    """Return the impact of the closed contacts; None without a solution.
 
-    pressing: (r,) acceleration with which each contact closes, or would if it were open; a rebound that it ends within
-    CHATTER does not take place (0: all rebounds do). resting: (r,) contacts closed so far, which do not leave for less.
-    collapsed: (r,) contacts that have collided at this very instant.
+    restitution: (u,). Where the impact would increase the energy, or has no solution, all coefficients are smaller by
+    one factor.
     """
-    system = u.system
-    touching = np.flatnonzero(u.rigid_contact & (z[u.d] == 0))
-    before = z[u.s][touching]
-    restitution = restitutions_at(system, touching, -before)
-    share = np.maximum(1 - restitution, 0.1)
-    slow = share * 0.5 * CHATTER * system.period * np.maximum(pressing[touching], 0.0)
-    restitution = np.where(collapsed[touching] | (-restitution * before < slow), 0.0, restitution)
-    target = -restitution * np.minimum(before, 0.0)
-    tied = np.zeros(len(touching), bool)
-    while True:
-        if not _solve(system, touching, before - target, tied, problem):
+    found = _impulses(free, v, closed, restitution)
+    if found is not None and _gain(free, v, found) <= 0.0:
+        return found
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        found = _impulses(free, v, closed, middle * restitution)
+        low, high = (middle, high) if found is not None and _gain(free, v, found) <= 0.0 else (low, middle)
+    return _impulses(free, v, closed, low * restitution)
+
+
+def _gain(free: Unforced, v: np.ndarray, found: Impact) -> float:
+    """Return the energy that an impact brings beyond round-off, J."""
+    mass = free.system.mass
+    return float(mass @ (found.v**2 - v**2) - 1e-12 * mass @ v**2)
+
+
+def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
+    J, u = free.system.J, free.u
+    speed, rebound = J @ v, restitution * np.minimum(free.normal @ v, 0.0)
+    slow = ROUND_OFF * float((np.abs(J) @ np.abs(v)).max(initial=0.0))
+    options = [[OPEN] for _ in range(u)]
+    for r in closed:
+        options[r] = [STICK, RIGHT, LEFT, OPEN] if free.rubs[r] else [RIGHT, OPEN]
+
+    def judge(states: States) -> tuple[Impact, list[Wrong]] | None:
+        # friction elements are free of impulses
+        holding = Holding(free, np.array(states, int))
+        if not holding.possible:
             return None
-        k = len(touching)
-        impulse, state = problem.force[:k].copy(), problem.state[:k].copy()
-        leaving = problem.acceleration[:k] + target
-        hold = resting[touching] & ~tied & (state == AT_LOW) & (leaving < slow)
-        if not hold.any():
+        left = speed[holding.kept]
+        left[: len(holding.closed)] += rebound[holding.closed]
+        impulse = holding.spread(-holding.inverse @ left, u)
+        after = v + free.respond @ impulse
+        left = J[holding.kept] @ after
+        left[: len(holding.closed)] += rebound[holding.closed]
+        if np.abs(left).max(initial=0.0) > slow:  # rows that depend on each other, but are to part
+            return None
+        return Impact(impulse, after, np.array(states)), _violation(free, states, impulse, after, rebound, slow, closed)
+
+    return search(options, _sweep(free, v, closed, rebound), judge)
+
+
+def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.ndarray) -> list[int]:
+    """Return the states (u,) that projected Gauss-Seidel sweeps arrive at, to begin with (Jean 1999)."""
+    system, u, impulse = free.system, free.u, np.zeros(2 * free.u)
+    mobility, speed = system.delassus, system.J @ v
+    speed[:u] += rebound
+    for _ in range(_SWEEPS):
+        before = impulse.copy()
+        for r in closed:
+            bound = np.inf
+            for row in (r, u + r) if free.rubs[r] else (r,):
+                low = 0.0 if row < u else -bound
+                change = min(max(impulse[row] - speed[row] / mobility[row, row], low), bound) - impulse[row]
+                impulse[row] += change
+                speed += mobility[:, row] * change
+                bound = system.friction[r] * impulse[r]
+        if np.abs(impulse - before).max() <= _CONVERGED * np.abs(impulse).max():
             break
-        tied |= hold
-        target = np.where(hold, 0.0, target)
-    z[u.s] += system.delassus[:, touching] @ impulse
-    z[u.p_rate] += system.of_structure.J[touching].T @ impulse
-    struck = (impulse != 0) | (state == DEPENDENT)
-    after = np.where(struck, target, z[u.s][touching])
-    z[u.s.start + touching] = after
-    return Impact(touching, before, after, impulse, -0.5 * float(impulse @ (before + after)))
+    state = [OPEN] * u
+    for r in closed:
+        if impulse[r] > 0.0:
+            slips = not free.rubs[r] or abs(impulse[u + r]) >= (1 - _NEARLY) * system.friction[r] * impulse[r]
+            state[r] = STICK if not slips else LEFT if impulse[u + r] > 0.0 else RIGHT
+    return state
 
 
-def _solve(system: LineSystem, touching: np.ndarray, excess: np.ndarray, tied: np.ndarray, problem: Problem) -> bool:
-    k = len(touching)
-    problem.matrix[:k, :k] = system.delassus[np.ix_(touching, touching)]
-    problem.b[:k], problem.high[:k], problem.forced[:k] = excess, np.inf, 0
-    problem.low[:k] = np.where(tied, -np.inf, 0.0)
-    return bool(solve_box(problem, k, 0.0))
-
-
-def zero_round_off(u: Unforced, z: np.ndarray, fastest: float, touch: np.ndarray) -> None:
-    """Set to zero, in place, values that are zero to round-off: gaps about to close, speeds of closed ones, slips.
-
-    touch: (r,) time (s) within which a gap closes that is closed now.
-    """
-    still = STILL * fastest
-    touching = u.rigid_contact & (z[u.d] <= touch * np.maximum(-z[u.s], still))
-    z[u.d] = np.where(touching, 0.0, z[u.d])
-    stopped = (touching | u.friction) & (np.abs(z[u.s]) <= still)
-    z[u.s] = np.where(stopped, 0.0, z[u.s])
+def _violation(
+    free: Unforced, states: States, impulse: np.ndarray, after: np.ndarray, rebound: np.ndarray, slow: float,
+    closed: Sequence[int],
+) -> list[Wrong]:  # fmt: skip
+    """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
+    u, least, wrong = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0)), []
+    way = {LEFT: -1.0, RIGHT: 1.0}
+    for r in closed:
+        push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]
+        if states[r] == OPEN:
+            if free.normal[r] @ after + rebound[r] < -slow:
+                wrong.append(Wrong(r, STICK))
+        elif push < -least:
+            wrong.append(Wrong(r, OPEN))
+        elif states[r] == STICK and abs(drag) > bound + least:
+            wrong.append(Wrong(r, LEFT if drag > 0.0 else RIGHT))
+        elif states[r] in way and free.rubs[r] and way[states[r]] * (free.slip[r] @ after) < -slow:
+            wrong.append(Wrong(r, STICK))
+    return wrong

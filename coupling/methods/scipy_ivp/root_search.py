@@ -21,6 +21,7 @@ NODES = (1 - np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)) / 2
 _SHORTEST = 1e-14
 #: coefficients below this share of the function's size in the step are round-off
 _ROUND_OFF = 1e-14
+_TINY = float(np.finfo(float).tiny)
 
 
 def _from_samples(nodes: np.ndarray) -> np.ndarray:
@@ -30,7 +31,12 @@ def _from_samples(nodes: np.ndarray) -> np.ndarray:
     return np.linalg.inv(np.array(basis))
 
 
-_WHOLE, _DEFLATED = _from_samples(NODES), _from_samples(NODES[1:])
+#: of a function, and of what is left of it without a zero at x = 0, of one degree less, raised to the same degree
+_RAISE = np.eye(_DEGREE + 1, _DEGREE) * (1 - np.arange(_DEGREE + 1) / _DEGREE)[:, None]
+_RAISE[1:] += np.diag(np.arange(1, _DEGREE + 1) / _DEGREE)
+_WHOLE = _from_samples(NODES).T
+_DEFLATED = np.r_[np.zeros((1, _DEGREE + 1)), (_RAISE @ _from_samples(NODES[1:])).T]
+_PLACES = np.r_[1.0, NODES[1:]]
 
 
 def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | None:
@@ -40,17 +46,17 @@ def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | No
     taken out of the function, so that round-off cannot find it again.
     """
     found = None
-    for k, values in enumerate(samples):
-        zero = order[k] > 0
-        coefficients = _DEFLATED @ (values[1:] / NODES[1:] ** order[k]) if zero else _WHOLE @ values
-        if coefficients.min() > 0:
-            continue
-        if zero:
-            coefficients[0] = max(coefficients[0], np.finfo(float).tiny)
+    zero = order > 0
+    coefficients = np.where(zero[:, None], samples / _PLACES ** order[:, None] @ _DEFLATED, samples @ _WHOLE)
+    # one that is not positive there begins with round-off
+    near = np.flatnonzero(~(coefficients.min(axis=1) > 0))
+    coefficients[zero, 0] = np.maximum(coefficients[zero, 0], _TINY)
+    for k in near:
+        own = coefficients[k]
         limit = 1.0 if found is None else found[0]
-        root = _first(coefficients, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(coefficients).max()))
+        root = _first(own, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(own).max()))
         if root is not None and (found is None or root < found[0]):
-            found = root, k
+            found = root, int(k)
     return found
 
 

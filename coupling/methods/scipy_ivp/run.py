@@ -1,186 +1,300 @@
 """A general solver of differential equations with events: scipy's DOP853, stopped at every change of contact.
 
-An independent witness of the exact engine: it shares the rows of a scene with it, and the solution of complementarity
-problems, but neither motion nor search nor decisions. Impacts are jumps between two integrations, closed contacts and
-sticking bodies constraints on accelerations (methods.scipy_ivp.motion, methods.scipy_ivp.contact_states,
-methods.scipy_ivp.impacts); events are searched on the solver's interpolant, where none can be missed
-(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.integrals).
+An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units), but neither
+motion nor search nor decisions nor impacts. Closed contacts and what sticks are constraints on accelerations
+(methods.scipy_ivp.motion, methods.scipy_ivp.contact_states), impacts jumps between two integrations
+(methods.scipy_ivp.impacts); events are searched on the solver's interpolant, where none can be missed
+(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.recorder).
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
-from vanedamp.coupling.methods.scipy_ivp.event_loop import STANDING, EventLoop
-from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, simultaneous_impacts, zero_round_off
-from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
+from vanedamp.coupling.methods.scipy_ivp.impacts import Impact, impact
 from vanedamp.coupling.methods.scipy_ivp.motion import (
-    GAP,
-    HIGH,
-    LOW,
-    OPENS,
-    REST,
-    SLIP,
-    UNFORCED,
-    Contacts,
+    LOOSE,
+    NEVER,
+    OPEN,
+    ROUND_OFF,
+    STICK,
     Motion,
+    States,
     Unforced,
 )
-from vanedamp.coupling.numerics.complementarity import new_problem
-from vanedamp.coupling.response.event_log import rows_of_line
+from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
+from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
+from vanedamp.coupling.response.recorder import plane_of
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.assembly import Motion as InitialMotion
+from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
-#: the shortest first step, as a share of a period
+#: events without time between them before the run is given up
+_STANDING = 100
+#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
+_OPEN_LEDGER, _LEAST = 1e3, 1e-9
+#: the shortest first step, as a fraction of a period
 _SHORTEST = 1e-26
-#: gaps below this share of the free travel are closed at the start
-_TOUCHING = 1e-12
+#: fraction of a period without events in which events happen at once: impacts are the end of a collapse; fraction of a
+#: period for which gaps of sliders are known beyond the round-off of places, after a collision
+_AT_ONCE, _FRESH = 1e-13, 1e-9
+#: gaps above this fraction of the play are taken from the coordinates again
+_FAR = 1e-6
+#: speeds below this fraction of the run's largest are none
+_STILL = 1e-11
+#: flights shorter than this fraction of a period, and all that follow them, are the end of a chatter; of elastic
+#: contacts, the part of it that a flight must last
+_CHATTER, _ELASTIC = 3e-7, 0.1
+#: motions that are kept, by the states of the units
+_KEPT = 256
 
 
-class IvpRun(EventLoop):
-    """A run by solve_ivp: state y = (z, integrals) and the states of the rows. Times count from the period's start."""
-
-    AT_ONCE = COLLAPSE
+class IvpRun:
+    """A run by solve_ivp: state y = (q, v, integrals), states of the units. Times count from the period's start."""
 
     def __init__(
-        self, whole: System, system: LineSystem, initial: InitialMotion, options: Options, records: Records,
-        events: bool,
-    ) -> None:  # fmt: skip
-        self.system = system
-        self.unforced = u = Unforced(system)
-        record = Recorder(u, records, options.steps_per_period, events)
-        super().__init__(whole, rows_of_line(whole), options, record, np.zeros(u.size + record.count))
-        self.y[u.p], self.y[u.d] = initial.p, initial.displacement
-        self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
-        self.problem = new_problem(u.r)
-        self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
-        nothing = np.zeros(u.r, int)
-        self._follow(Contacts(nothing + UNFORCED, nothing.astype(float), nothing, nothing))
-        self.absolute = options.rtol * self.record.sizes(_reach(u))
+        self, system: System, options: Options, initial: InitialMotion, records: Records, events: bool
+    ) -> None:
+        self.system, self.options, self.steps = system, options, options.steps_per_period
+        self.free = free = Unforced(system)
+        self.record = record = Recorder(free, records, self.steps, events)
+        zeros = np.zeros(2 * free.u + record.count)
+        self.y = np.concatenate([initial.q, initial.v, free.gaps(initial.q), zeros])
+        self.sizes = record.sizes()
+        self.absolute = options.rtol * self.sizes
+        self.time, self.step = 0.0, system.period / self.steps
+        self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, system.speed
+        self.begun = False
+        self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
+        self.motion: Motion
+        self.guard, self.order, self.watched = np.zeros((0, free.extent)), np.zeros(0, int), np.zeros(0, int)
+        self.motions = lru_cache(_KEPT)(lambda states: Motion(free, states))
+        self.linear = lru_cache(_KEPT)(self._linear)
 
-    def _begin(self) -> bool:
-        place = self.y[self.unforced.d]
-        contacts = slice(self.system.friction_rows, None)
-        gap = place[contacts]
-        gap[np.abs(gap) <= _TOUCHING * self.system.free_travel[contacts]] = 0.0
-        decided = self._decide(-1, -1)
-        self.record.start(self.y)
-        return decided
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of `periods`, unless the run ends before."""
+        if not self.begun:
+            self.begun = True
+            if not self._decide():
+                return Status.UNDECIDED
+            self.record.section(self.y)
+            self.record.start(self.y)
+        with np.errstate(all="ignore"):
+            while self.record.period < periods:
+                if self.events >= self.options.max_events:
+                    return Status.EVENT_BUDGET
+                status = self._segment()
+                if status is not Status.OK:
+                    return status
+        return Status.OK
+
+    def outcome(self) -> Outcome:
+        """Return the results of the run."""
+        record, system = self.record, self.system
+        return Outcome(
+            system, record.records, record.period, self.events, _OPEN_LEDGER * max(self.options.rtol, _LEAST),
+            {"impacts": record.impacts, "evaluations": self.evaluations},
+            [np.array(record.log)] if record.log else [], (rows_of_units if record.plane else rows_of_line)(system),
+            max(record.deep, 0.0), plane_of(system, record, self.options.linearisation) if record.plane else None,
+        )  # fmt: skip
+
+    def final(self) -> None:
+        """Return None: the states of contacts are no part of a motion that another run could begin with."""
+        return None
 
     # -- motion between events
 
-    def _pass(self, duration: float) -> None:
-        self.since += duration
+    def _segment(self) -> Status:
+        """Integrate to the next event or to the end of the period."""
+        grid = np.arange(1, self.steps + 1) * self.step
+        grid = grid[grid > self.time]
+        if not len(grid):  # an event has fallen on the period's end
+            return self._end_period()
+        arc = self._integrate(grid)
+        self.evaluations += arc.evaluations
+        if arc.failed or not np.isfinite(arc.last).all():
+            return Status.DIVERGED
+        self.record.points(arc.t, arc.y)
+        if self.record.deep > self.options.penetration:
+            return Status.PENETRATION
+        self.time, self.y = self.time + arc.duration, arc.last
+        self.record.flight(arc.duration)
+        if arc.event is None:
+            self.order = np.zeros_like(self.order)
+            return self._end_period()
+        self.events += 1
+        self.standing = self.standing + 1 if arc.duration < _AT_ONCE * self.system.period else 0
+        unit, instead = self.motion.wrong[self.watched[arc.event]]
+        if self.state[unit] == OPEN or (self.state[unit] == LOOSE and instead == OPEN):
+            self.y[self.free.d][unit] = 0.0
+        return Status.OK if self.standing <= _STANDING and self._decide() else Status.UNDECIDED
 
-    def _go_on(self) -> None:
-        self.guards.order[:] = 0
-
-    def _happen(self, event: int) -> bool:
-        return self._decide(int(self.guards.row[event]), int(self.guards.kind[event]))
+    def _end_period(self) -> Status:
+        self.time = 0.0
+        self.struck -= self.system.period
+        self.record.end_period(self.y)
+        return Status.OK
 
     def _integrate(self, grid: np.ndarray) -> Arc:
         """Return the motion from now to the first event, or to the end of the grid."""
-        u, guards = self.unforced, self.guards
+        free, guard = self.free, self.guard
         return integrate(
-            self.rate, self.y, self.time, grid, lambda t, y: guards.functional @ u.extended(t, y[: u.size]),
-            guards.order, self.options.rtol, self.absolute, self._first_step(), self.step,
+            self.rate, self.y, self.time, grid, lambda t, y: guard @ free.extended(t, y[: free.size]), self.order,
+            self.options.rtol, self.absolute, self._first_step(), self.step,
         )  # fmt: skip
 
     def _first_step(self) -> float:
-        u, guards = self.unforced, self.guards
-        now = u.extended(self.time, self.y[: u.size])
-        rate = u.rates(self.motion, now)
-        value = np.where(guards.order > 0, 0.0, guards.functional @ now)
-        slope, curvature = guards.functional @ rate, guards.functional @ u.rates(self.motion, rate)
+        now = self.free.extended(self.time, self.y[: self.free.size])
+        # accelerations of what leaves by its third derivative are round-off
+        early = self.order < 3
+        guard, order, rate = self.guard[early], self.order[early], self.motion.rate @ now
+        value = np.where(order > 0, 0.0, guard @ now)
+        slope, curvature = guard @ rate, guard @ (self.motion.rate @ rate)
         return first_step(value, slope, curvature, _SHORTEST * self.system.period, self.step)
+
+    def _linear(self, states: States) -> np.ndarray:
+        motion = self.motions(states)
+        return np.concatenate([motion.rate[: self.free.size], self.record.functionals(motion)])
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the rates of the state and of the integrals."""
-        u, phase = self.unforced, self.system.frequency * t
-        self._extended[: u.size] = y[: u.size]
-        self._extended[u.cosine], self._extended[u.sine] = np.cos(phase), np.sin(phase)
-        found = self._linear @ self._extended
-        return np.concatenate([found[: u.size], self.record.rates(self._extended, found[u.size :])])
+        size, extent, found, phase = self.free.size, self.free.extent, self.found, self.system.frequency * t
+        found[:size], found[size] = y[:size], 1.0
+        np.cos(phase, out=found[self.free.cosine])
+        np.sin(phase, out=found[self.free.sine])
+        values = self.matrix @ found[:extent]
+        found[extent:] = values[size:]
+        return np.concatenate([values[:size], self.record.rates(found)])
 
     # -- events
 
-    def _decide(self, row: int, kind: int) -> bool:
-        """Apply impacts, then decide the contact states. Returns False if a complementarity problem has no solution."""
-        u, z = self.unforced, self.y[: self.unforced.size]
-        self._arrive(row, kind, z)
+    def _decide(self) -> bool:
+        """Apply impacts, then decide the states. Returns False if nothing is possible."""
+        free, system = self.free, self.system
+        q, v = self.y[free.q], self.y[free.v]
         self.record.turning(self.time, self.y)
-        self._zero_round_off(z)
-        for _ in range(STANDING):
-            # an impact may close gaps that are about to
-            if not np.any(u.rigid_contact & (z[u.d] == 0) & (z[u.s] < 0)):
+        self.sizes[: free.size] = np.maximum(self.sizes[: free.size], np.abs(self.y[: free.size]))
+        self.fastest = max(self.fastest, float((np.abs(system.J) @ np.abs(v)).max(initial=0.0)))
+        slow, gaps = _STILL * self.fastest, free.gaps(q)
+        fresh = self.time - self.struck < _FRESH * system.period
+        touch = np.where(fresh & ~free.extends, 0.0, free.touch(self.sizes[free.q]))
+        d = self.y[free.d] = np.where(gaps > _FAR * system.play, gaps, self.y[free.d])
+        closed = np.flatnonzero(free.rigid & ((self.state != OPEN) | (d <= touch)))
+        self._bring(q, free.normal[closed], gaps[closed])
+        d[closed] = 0.0
+        self.y[free.d] = np.where(np.abs(d) <= touch, 0.0, d)
+        for _ in range(_STANDING):
+            if not np.any(free.normal[closed] @ v < -slow):
                 break
-            if not self._impact(z):
+            found = impact(free, v, closed.tolist(), self._restitution(v, closed))
+            if found is None:
                 return False
-            self._zero_round_off(z)
+            self._jump(v, found)
+            if self.options.complete_chatter:
+                self._catch(v, closed, slow)
         else:
             return False
+        chosen = self._motion(closed, touch, slow)
+        if chosen is None:
+            # no forces can hold what slips: impulses stop it (Painleve's paradox)
+            step = self._short_step(v, closed)
+            if step is None:
+                return False
+            self._jump(v, Impact(step.impulse, v + free.respond @ step.impulse, step.state))
+            self._stop(v, step)
+            chosen = self._motion(closed, touch, slow)
+        if chosen is None:
+            return False
+        self.motion, order = chosen
+        self.state, self.watched = self.motion.state, np.flatnonzero(order != NEVER)
+        self.guard, self.order = self.motion.guard[self.watched], order[self.watched]
+        self.matrix = self.linear(tuple(self.state.tolist()))
+        self.found = np.empty(free.extent + len(self.matrix) - free.size)
         self.record.turning(self.time, self.y)
-        contacts = decide(u, self.time, z)
-        if contacts is None:
-            return False
-        self.record.springs(self.time, self.y, self.motion.contacts.state, contacts.state)
-        self._follow(contacts)
+        self.record.follow(self.time, self.y, self.motion)
         return True
 
-    def _follow(self, contacts: Contacts) -> None:
-        u = self.unforced
-        self.motion = Motion(u, contacts)
-        self.guards = self.motion.guards()
-        self._linear = np.vstack([self.motion.rate, self.motion.force, self.record.functionals])
-        self._extended = np.ones(u.extent)
-        self.record.states = contacts.state
+    def _motion(self, closed: np.ndarray, touch: np.ndarray, slow: float) -> tuple[Motion, np.ndarray] | None:
+        """Return the motion that begins now, and the orders of its zeros. Speeds that are round-off are set to zero.
 
-    def _arrive(self, row: int, kind: int, z: np.ndarray) -> None:
-        """Set the value that the event has brought to zero, or to its bound, exactly."""
-        u, system = self.unforced, self.system
-        if kind in (GAP, OPENS) or (kind == LOW and u.soft_contact[row] and system.dashpot[row] == 0):
-            z[u.d.start + row] = 0.0
-        elif kind == SLIP:
-            z[u.s.start + row] = 0.0
-        elif kind in (LOW, HIGH) and u.slider[row]:
-            z[u.d.start + row] = (1 if kind == LOW else -1) * u.limit[row] / system.spring[row]
+        touch: (u,) gaps that are none, m; slow: speed that is none, m/s.
+        """
+        free, J, v = self.free, self.system.J, self.y[self.free.v]
+        slips = np.union1d(closed, np.flatnonzero(~free.contact))
+        rows = np.r_[closed, free.u + slips]
+        still = rows[np.abs(J[rows] @ v) <= slow]
+        self._bring(v, J[still], J[still] @ v)
+        speed = J @ v
+        speed[still] = 0.0
+        self.y[free.s] = np.where(np.abs(speed) <= slow, 0.0, speed)
+        sizes = np.ones(free.extent)
+        sizes[: free.size] = self.sizes[: free.size]
+        # what is below these bounds is zero already
+        sizes[free.d], sizes[free.s] = 0.5 * touch / ROUND_OFF, 0.5 * slow / ROUND_OFF
+        now = free.extended(self.time, self.y[: free.size])
+        return decide(free, self.motions, now, sizes, self.state, slow)
 
-    def _zero_round_off(self, z: np.ndarray) -> None:
-        """Zero to the round-off of the run's largest speed is zero: two slips may come to rest together."""
-        self.fastest = max(self.fastest, float(np.abs(z[self.unforced.s]).max(initial=0.0)))
-        # gaps of contacts that have just collided are known beyond the round-off of places
-        touch = np.where(self.since > FRESH * self.system.period, TOUCH * self.system.period, 0.0)
-        zero_round_off(self.unforced, z, self.fastest, touch)
+    def _restitution(self, v: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """Return the coefficients (u,): impacts that follow each other at once end without rebound."""
+        coefficients = np.zeros(self.free.u)
+        coefficients[closed] = restitutions_at(self.system, closed, -self.free.normal[closed] @ v)
+        collapses = self.time - self.struck < _AT_ONCE * self.system.period
+        return np.where(collapses, 0.0, coefficients)
 
-    def _impact(self, z: np.ndarray) -> bool:
-        u, system, complete = self.unforced, self.system, self.options.complete_chatter
-        pressing, resting, collapsed = np.zeros(u.r), np.zeros(u.r, bool), np.zeros(u.r, bool)
-        if complete:
-            extended = u.extended(self.time, z)
-            resting = self.motion.contacts.state == REST
-            push = np.diag(system.delassus) * (self.motion.force @ extended)
-            pressing = np.where(resting, push, -(self.motion.rate[u.s] @ extended))
-            collapsed = self.since < COLLAPSE * system.period
-        impact = simultaneous_impacts(u, z, pressing, resting, collapsed, self.problem)
-        if impact is None:
-            return False
-        self.since[impact.row[impact.before < 0]] = 0.0
-        self.record.impact(self.time, impact)
-        return True
+    def _jump(self, v: np.ndarray, found: Impact) -> None:
+        """Change the velocities, in place, by an impact."""
+        self.record.impact(self.time, v, found)
+        self.struck[(found.impulse[: self.free.u] > 0.0) & (self.free.normal @ v < 0.0)] = self.time
+        v[:] = found.v
 
+    def _bring(self, values: np.ndarray, rows: np.ndarray, off: np.ndarray) -> None:
+        """Take from coordinates or velocities (N,), in place, what rows (k, N) are off zero."""
+        if np.any(off != 0.0):
+            root = np.sqrt(self.system.mass)
+            values -= np.linalg.pinv(rows / root, rcond=1e-9) @ off / root
 
-def _reach(u: Unforced) -> float:
-    """Return a typical displacement, m: narrowest gap, least elongation at which a spring slides, or the static one."""
-    system = u.system
-    contacts = slice(system.friction_rows, None)
-    stops = (system.left_body[contacts] < 0) & (system.right_body[contacts] < 0)
-    gaps = np.where(stops, system.rest[contacts], system.free_travel[contacts])
-    lengths = [*gaps, *(u.limit[u.slider] / system.spring[u.slider])]
-    lengths = [length for length in lengths if length > 0]
-    modes = system.of_structure
-    static = np.abs(modes.J) @ (np.abs(modes.load).sum(axis=0) / modes.stiffness)
-    return float(min(lengths, default=static.max(initial=1e-12)))
+    def _catch(self, v: np.ndarray, closed: np.ndarray, slow: float) -> None:
+        """Stop contacts that part for a flight shorter than _CHATTER: all that push in a step of that length."""
+        step = self._short_step(v, closed)
+        if step is not None and np.any((step.impulse[: self.free.u] > 0.0) & (self.free.normal @ v > slow)):
+            self._stop(v, step)
+
+    def _short_step(self, v: np.ndarray, closed: np.ndarray) -> Impact | None:
+        """Return the impulses of a step of Moreau's scheme, without restitution, of half a flight.
+
+        That takes _CHATTER with those that follow: a chatter takes 1/(1 - k) times its next flight.
+        """
+        free, system = self.free, self.system
+        z = self.y[: free.size].copy()
+        z[free.v], z[free.s] = v, system.J @ v
+        now = free.extended(self.time, z)
+        accelerations = free.accelerations @ now
+        forces = np.zeros(2 * free.u)
+        pressed = free.soft & (self.state != OPEN)
+        forces[: free.u][pressed] = np.maximum(free.push[pressed] @ now, 0.0)
+        bounds = np.where(free.contact, system.friction * forces[: free.u], np.where(free.sprung, 0.0, system.limit))
+        forces[free.u :] = -bounds * np.sign(free.slip @ v)
+        leaving = closed[free.normal[closed] @ v > 0.0]
+        rebounds = restitutions_at(system, leaving, free.normal[leaving] @ v)
+        last = np.maximum(1.0 - rebounds, _ELASTIC).min(initial=1.0)
+        ahead = v + 0.5 * last * _CHATTER * system.period * (accelerations + free.respond @ forces)
+        if np.all(free.normal[closed] @ ahead >= 0.0):
+            return Impact(np.zeros(2 * free.u), ahead, np.zeros(free.u, int))
+        return impact(free, ahead, closed.tolist(), np.zeros(free.u))
+
+    def _stop(self, v: np.ndarray, step: Impact) -> None:
+        """Stop, in place, the contacts that push in a step, and the slips of those that stick."""
+        free = self.free
+        pushed = np.flatnonzero(step.impulse[: free.u] > 0.0)
+        stuck = [r for r in pushed if step.state[r] == STICK and free.rubs[r]]
+        rows, before = np.vstack([free.normal[pushed], free.slip[stuck]]), v.copy()
+        self._bring(v, rows, rows @ v)
+        self.record.stopped(before, v)

@@ -1,7 +1,8 @@
-"""Jumps of the speeds in impacts of bodies in the plane, and their derivatives.
+"""Jumps of the speeds in impacts, and their derivatives.
 
 Which contacts push, stick and slip is known from the engine's impulses; for these the complementarity problem of an
-impact is a set of linear equations (planar.impacts): the jump is a linear map as long as they stay the same.
+impact is a set of linear equations: the jump is a linear map as long as they stay the same. Speeds of approach are the
+engine's: as differences of the coordinates' rates they would lose their digits.
 """
 
 from __future__ import annotations
@@ -10,23 +11,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.orbits.dynamics import DEPENDENT
+from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
-#: singular values that count as none
-_DEPENDENT = 1e-9
-#: share of a speed after an impact within which a law has been found to hold
-_ALIKE = 1e-8
-#: energy that an impact may bring, as a share of what is there; of the restitutions, below which a wedged block has
-#: none, both as in planar.impacts
-_GAIN, _WEDGED = 1e-12, 1e-6
-#: share of its bound by which friction is short of it where a contact sticks, as in planar.impacts; of a slip that is
-#: round-off
+#: a speed after an impact below this share of the fastest of its contacts is none: the end of a chatter
+_PLASTIC = 1e-9
+#: energy that an impact may bring, as a share of what is there
+_GAIN = 1e-12
+#: share of its bound by which friction is short of it where a contact sticks; of a slip that is round-off
 _EDGE, _ROUND_OFF = 1e-9, 1e-13
 #: share of the largest impulse, and of the fastest speed, that is round-off; slips that count as none
 _NOTHING, _SLOW = 1e-12, 1e-11
-#: step of differences of a restitution by the speed, as a share of it
-_STEP = 1e-3
+#: steps of the differences that find the slope of a restitution, as shares of the speed, and how well they agree
+_STEPS, _SMOOTH = (1e-2, 5e-3), 1e-8
+
+
+class Untrusted(ArithmeticError):
+    """The derivative's own motion has left that of the engine, or the motion has none."""
 
 
 class Jump(NamedTuple):
@@ -52,20 +55,20 @@ class _Blow(NamedTuple):
     slope: np.ndarray
 
 
-def impact(
-    system: System, v: np.ndarray, impulse: np.ndarray, compression: np.ndarray, plastic: np.ndarray, speed: float
-) -> Jump:
-    """Return the jump of speeds v (N,) by an impact in which contacts take part as impulses (2u,) of the engine say.
+def impact(system: System, v: np.ndarray, event: Event, speed: float) -> Jump:
+    """Return the jump of speeds v (N,) by an impact in which contacts take part as the impulses of the engine say.
 
-    compression: (2u,) impulses of the first phase, of laws that have two; plastic: (u,) contacts without restitution;
-    speed: the fastest of the scene, m/s.
+    speed: the fastest of the scene, m/s. Raises Untrusted near a kink of the restitution.
     """
-    begun = Jump(v, np.eye(len(v)))
+    begun, impulse, compression = Jump(v, np.eye(len(v))), event.impulse, event.compression
     approach, slope = -system.J[: len(system.rest)] @ v, -system.J[: len(system.rest)]
-    restitution, change = _restitution(system, approach)
-    restitution, change = np.where(plastic, 0.0, restitution), np.where(plastic, 0.0, change)
+    approach[event.struck] = -event.before
+    restitution, change = np.zeros((2, len(slope)))
+    fastest = np.abs(np.r_[event.before, event.after]).max(initial=0.0)
+    bounces = np.unique(event.struck[np.abs(event.after) > _PLASTIC * fastest])
+    restitution[bounces], change[bounces] = _restitution(system, bounces, approach[bounces])
     if not system.two_phases:
-        return _newton(system, begun, impulse, restitution, change, speed)
+        return _newton(system, begun, event, approach, restitution, change, speed)
     roles = _roles(system, v, compression, speed)
     pressed = _blow(system, begun, roles, np.zeros(len(roles.hit)), np.zeros((len(roles.hit), len(v))))
     given, steep = np.zeros(len(slope)), np.zeros(slope.shape)
@@ -102,43 +105,37 @@ def _expand(
 
 
 def _newton(
-    system: System, begun: Jump, impulse: np.ndarray, restitution: np.ndarray, change: np.ndarray, speed: float
-) -> Jump:
-    """Return the jump by Newton's law with restitutions (u,), and their derivatives by the speeds of approach.
+    system: System, begun: Jump, event: Event, approach: np.ndarray, restitution: np.ndarray, change: np.ndarray,
+    speed: float,
+) -> Jump:  # fmt: skip
+    """Return the jump by Newton's law with restitutions (u,), and their derivatives by the speeds of approach (u,).
 
     Where they would bring energy, with the share of all of them that brings none: it depends on the speeds.
     """
-    roles = _roles(system, begun.v, impulse, speed)
+    roles = _roles(system, begun.v, event.impulse, speed)
     hit, rows = roles.hit, system.J[roles.hit]
-    approach = -rows @ begun.v
+    approach = approach[hit]
     kept = np.where(approach > _ROUND_OFF * speed, restitution[hit], 0.0)
     steep = kept + np.where(kept > 0.0, change[hit] * approach, 0.0)
-    whole = _blow(system, begun, roles, kept * approach, -steep[:, None] * rows).jump
-    left = begun.v + system.J.T @ impulse / system.mass
-    asked = float(np.abs(kept * approach).max(initial=0.0))
-    if asked == 0.0 or np.abs(system.J @ (whole.v - left)).max() <= _ALIKE * max(asked, _ALIKE * speed):
-        return whole
+    if not event.reduced or not kept.any():
+        return _blow(system, begun, roles, kept * approach, -steep[:, None] * rows).jump
+    left = begun.v + system.J.T @ event.impulse / system.mass
     first = int(np.argmax(kept * approach))
     share = float(rows[first] @ left) / (kept[first] * approach[first])
-    part = _blow(system, begun, roles, share * kept * approach, -share * steep[:, None] * rows)
+    part = _blow(system, begun, roles, share * kept * approach, -share * steep[:, None] * rows).jump
     none = _blow(system, begun, roles, np.zeros(len(hit)), np.zeros(rows.shape)).jump
-    by_share = (whole.v - none.v) if share != 1.0 else np.zeros(len(left))
+    by_share = (part.v - none.v) / share
     # the impulses bring what is allowed, m (v+^2 - v^2) = GAIN m v^2:  m v+ dv+ = (1 + GAIN) m v dv
-    mass, after = system.mass, part.jump.v
-    per_share = float(mass * after @ by_share)
-    along = (
-        ((1.0 + _GAIN) * mass * begun.v - mass * after @ part.jump.derivative) / per_share
-        if share > _WEDGED
-        else 0.0 * begun.v
-    )
-    return Jump(after, part.jump.derivative + np.multiply.outer(by_share, along))
+    mass, after = system.mass, part.v
+    along = ((1.0 + _GAIN) * mass * begun.v - mass * after @ part.derivative) / float(mass * after @ by_share)
+    return Jump(after, part.derivative + np.multiply.outer(by_share, along))
 
 
 def _roles(system: System, v: np.ndarray, impulse: np.ndarray, speed: float) -> _Roles:
     """Return who takes part in a blow of impulses (2u,) on speeds v (N,)."""
     u = len(system.rest)
     normal, tangential = impulse[:u], impulse[u:]
-    hit = np.flatnonzero(normal > 0.0)
+    hit = np.flatnonzero(normal)
     slip, after = system.J[u:] @ v, system.J[u:] @ (v + system.J.T @ impulse / system.mass)
     # where contacts depend on each other, friction may be at its bound without slip; its round-off is that of the slip
     room = system.friction * normal - np.abs(tangential)
@@ -158,22 +155,28 @@ def _blow(system: System, begun: Jump, roles: _Roles, target: np.ndarray, steep:
     lever = np.vstack([system.J[hit] - roles.drag[hit, None] * system.J[u + hit], system.J[u + sticks]]).T
     lever = lever / system.mass[:, None]
     size = 1.0 / np.sqrt((rows**2 / system.mass).sum(axis=1))
-    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=_DEPENDENT) * size * size[:, None]
+    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=DEPENDENT) * size * size[:, None]
     wanted = np.r_[target, np.zeros(len(sticks))] - rows @ begun.v
     slope = np.vstack([steep, np.zeros((len(sticks), len(begun.v)))]) - rows @ begun.derivative
     jump = Jump(begun.v + lever @ solve @ wanted, begun.derivative + lever @ solve @ slope)
     return _Blow(jump, (solve @ wanted)[: len(hit)], (solve @ slope)[: len(hit)])
 
 
-def _restitution(system: System, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the restitutions (u,) at speeds of approach (u,), and their derivatives by these."""
-    units = np.arange(len(approach))
-    now = restitutions_at(system, units, approach)
+def _restitution(system: System, units: np.ndarray, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the restitutions (m,) of units at speeds of approach (m,), and their derivatives by these.
+
+    By differences of sixth order. Raises Untrusted where the law has a kink near by.
+    """
+    now, slopes = restitutions_at(system, units, approach), np.zeros((2, len(units)))
     if system.restitution_at == 0:
-        return now, np.zeros(len(now))
-    step = _STEP * np.maximum(approach, 1e-300)
-    ends = [restitutions_at(system, units, approach + share * step) for share in (-2, -1, 1, 2)]
-    return now, (ends[0] - ends[3] + 8.0 * (ends[2] - ends[1])) / (12.0 * step)
+        return now, slopes[0]
+    for slope, step in zip(slopes, _STEPS, strict=True):
+        for j, weight in enumerate((3 / 4, -3 / 20, 1 / 60), start=1):
+            ahead, back = (restitutions_at(system, units, approach * (1 + way * j * step)) for way in (1, -1))
+            slope += weight * (ahead - back) / step
+    if np.any(np.abs(slopes[0] - slopes[1]) > _SMOOTH):
+        raise Untrusted
+    return now, slopes[1] / np.where(approach == 0.0, 1.0, approach)
 
 
 def stopped(system: System, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
@@ -184,5 +187,5 @@ def stopped(system: System, after: np.ndarray, shut: np.ndarray, speed: float) -
     u, root = len(system.rest), np.sqrt(system.mass)
     rests = np.abs(system.J @ after) <= _NOTHING * speed
     rows = system.J[np.r_[shut & rests[:u], shut & rests[u:] & (system.friction > 0.0)]] / root
-    held = np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows
+    held = np.linalg.pinv(rows, rcond=DEPENDENT) @ rows
     return np.eye(len(after)) - held * root / root[:, None]

@@ -1,0 +1,333 @@
+"""The motion of a system as linear flows by the states of its units, from its equations and apart from the engines.
+
+The state is u = (y, w): coordinates q times root mass and a typical frequency, rates q' times root mass. Energies are
+squares of u, and every matrix has entries of the order of the frequencies. Between events it flows by
+
+    z' = X z,    z = (u, size, size cos(omega_h t), size sin(omega_h t)),
+
+where loads and constants are columns of X. Gaps, slips and forces are functionals of z, so that their rates and second
+derivatives are those of z: whatever an event asks of its function is in one row.
+
+M q'' = -K q - C q' + loads + W lambda, with W the directions of the forces of units: a contact that slips has its
+friction in the direction of its normal force, W_N - sigma mu W_T. What closed contacts and units that stick hold, is
+held by forces for which J q'' = 0: accelerations are projected, obliquely where friction slips, onto the motions N that
+the constraints leave, along the wrenches, to which Y is normal: N (Y^T N)^-1 Y^T.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import expm, null_space
+from scipy.sparse.csgraph import connected_components
+
+from vanedamp.coupling.numerics.codes import (
+    AT_HIGH,
+    AT_LOW,
+    CLOSED,
+    CLOSES,
+    LEAVING,
+    OPEN,
+    OPENS,
+    PARTS,
+    RECLOSES,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    STICK,
+    STOPS,
+    TOUCHING,
+)
+from vanedamp.coupling.system.system import System
+
+#: singular values below this are zero: rows that depend on each other
+DEPENDENT = 1e-9
+#: points of a period, and of one turn of the fastest motion, between which least margins are sought; most in a segment
+_LOOKS, _TURN, _POINTS = 32, 12, 240
+#: flows that are kept
+_KEPT = 1000
+
+
+def presses(state: np.ndarray) -> np.ndarray:
+    """Return whether contacts in states (u,) are closed with a force of their own."""
+    return (state < OPEN) | (state == CLOSED)
+
+
+class Dynamics:
+    """Flows of a system with N coordinates by the states of its u units; K = 2N + 1 + 2e entries of z.
+
+    unit: (2N,) of u in terms of (q, q'); rows: (2u, N) J in coordinates root mass q; gap: (u, K), speed: (2u, K)
+    functionals of gaps and of the rows' speeds; typical: (K,) sizes of z in a typical motion of these sizes of (q, q').
+    """
+
+    def __init__(self, system: System, sizes: np.ndarray) -> None:
+        self.system = system
+        size, u, e = len(system.mass), len(system.rest), len(system.frequency)
+        self.root = np.sqrt(system.mass)
+        yields = np.isfinite(system.spring)
+        stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
+        stiff = stiff + (system.spring[yields, None] * system.J[:u][yields] ** 2).sum(axis=0)
+        self.rate = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
+        self.unit = np.r_[self.root * self.rate, self.root]
+        self.rows = system.J / self.root
+        self.places, self.rates, self.one = slice(0, size), slice(size, 2 * size), 2 * size
+        cosine = slice(self.one + 1, self.one + 1 + e)
+        sine = slice(cosine.stop, cosine.stop + e)
+        loads = np.vstack([system.weight, np.abs(system.load)]) / self.root
+        self.size = float(np.abs(loads).max(initial=0.0) / self.rate.max(initial=0.0)) or 1.0
+        self.turn = np.zeros((sine.stop, sine.stop))
+        self.turn[self.places, self.rates] = np.diag(self.rate)
+        self.turn[cosine, sine], self.turn[sine, cosine] = -np.diag(system.frequency), np.diag(system.frequency)
+        self.gap, self.speed = np.zeros((u, sine.stop)), np.zeros((2 * u, sine.stop))
+        self.gap[:, self.places], self.gap[:, self.one] = self.rows[:u] / self.rate, system.rest / self.size
+        self.speed[:, self.rates] = self.rows
+        self.load = np.zeros((size, sine.stop))
+        self.load[:, self.places] = -system.stiffness / self.root / self.root[:, None] / self.rate
+        self.load[:, self.rates] = -system.damping / self.root / self.root[:, None]
+        self.load[:, self.one] = system.weight / self.root / self.size
+        self.load[:, cosine] = system.load.real.T / self.root[:, None] / self.size
+        self.load[:, sine] = -system.load.imag.T / self.root[:, None] / self.size
+        self.typical = np.r_[self.unit * sizes, np.full(1 + 2 * e, self.size)]
+        #: coordinates (j,) of the sliders of Jenkins elements, and motions (j, N) of what draws them
+        self.sliders = np.arange(size - len(system.tangential), size)
+        self.drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
+        self._flows: dict[bytes, Flow] = {}
+
+    @property
+    def jenkins(self) -> slice:
+        """The units that are Jenkins elements; their sliders are as many coordinates, the last ones."""
+        return slice(len(self.system.rest) - len(self.system.tangential), None)
+
+    @cached_property
+    def part(self) -> np.ndarray:
+        """Numbers (N,) of the parts of the system that do not feel each other."""
+        system = self.system
+        bound = np.vstack([system.J, system.elongation]) != 0.0
+        joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T.astype(int) @ bound > 0)
+        labels: np.ndarray = connected_components(joined, directed=False)[1]
+        return labels
+
+    def extended(self, u: np.ndarray, time: float) -> np.ndarray:
+        """Return z (K,) of a state u (2N,) at a time in the period, s."""
+        angle = self.system.frequency * time
+        return np.concatenate([u, [self.size], self.size * np.cos(angle), self.size * np.sin(angle)])
+
+    def flow(self, state: np.ndarray, open_force: np.ndarray) -> Flow:
+        """Return the flow with units in states (u,). open_force: (2u,) as in a Segment, N."""
+        key = state.tobytes() + open_force.tobytes()
+        if key not in self._flows:
+            if len(self._flows) >= _KEPT:
+                self._flows.clear()
+            self._flows[key] = Flow(self, state, open_force)
+        return self._flows[key]
+
+    def held(self, closed: np.ndarray, stuck: np.ndarray) -> np.ndarray:
+        """Return the projector (2N, 2N) of u, in the metric of mass, that keeps contacts (u,) closed and slips zero.
+
+        Both sides move by forces between them only, which keep their momentum and their centre of mass.
+        """
+        u, size = len(closed), len(self.root)
+        normal, matrix = self.rows[:u][closed], np.eye(2 * size)
+        matrix[self.places, self.places] = self.rate[:, None] * _projector(normal) / self.rate
+        matrix[self.rates, self.rates] = _projector(np.vstack([normal, self.rows[u:][stuck]]))
+        return matrix
+
+    def begun(self, state: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """Return the projector (2N, 2N) of u that contacts `closed` (u,) and units that stick in states (u,) leave."""
+        rubs = (self.system.friction > 0.0) | (np.arange(len(state)) >= self.system.contacts)
+        return self.followed(state) @ self.held(closed & np.isinf(self.system.spring), (state == STICK) & rubs)
+
+    def followed(self, state: np.ndarray) -> np.ndarray:
+        """Return the map (2N, 2N) of u to that with sliders as they are in states (u,).
+
+        Those of Jenkins elements that slip follow what draws them, others rest.
+        """
+        size, matrix = len(self.root), np.eye(2 * len(self.root))
+        for a, drawn, slips in zip(self.sliders, self.drawn, state[self.jenkins] != STICK, strict=True):
+            matrix[size + a] = 0.0
+            if slips:
+                matrix[a] = 0.0
+                matrix[a, :size] = self.unit[a] * drawn / self.unit[:size]
+                matrix[size + a, size:] = self.root[a] * drawn / self.root
+        return matrix
+
+    def kick(self, impulse: np.ndarray) -> np.ndarray:
+        """Return the jump (N,) of w by the impulses (2u,) of all rows, N s."""
+        jump: np.ndarray = impulse @ self.rows
+        return jump
+
+
+class Flow:
+    """The flow X (K, K) with units in states (u,), and the forces (2u, K) of the units.
+
+    rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0; stuck: (u,) whether they
+    stick; slips_held: (u,) whether constraints hold the slip of a unit that counts as slipping.
+    """
+
+    def __init__(self, dynamics: Dynamics, state: np.ndarray, open_force: np.ndarray) -> None:
+        self.dynamics, self.state = dynamics, state
+        system, rows, one = dynamics.system, dynamics.rows, dynamics.one
+        u, size = len(state), len(dynamics.root)
+        contact, rigid = np.arange(u) < system.contacts, np.isinf(system.spring)
+        self.rubs = ~contact | (system.friction > 0.0)
+        self.way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
+        closed = np.flatnonzero(contact & presses(state) & rigid)
+        springs = np.flatnonzero(contact & presses(state) & ~rigid)
+        self.stuck = (state == STICK) & self.rubs
+        stick, slides = np.flatnonzero(self.stuck), np.flatnonzero(~contact & (self.way != 0.0))
+        drag = (self.way * system.friction)[:, None]
+        # forces that are known, and what they act on: the force of a slider that moves is that on what draws it
+        self.forces, acts = np.zeros((2 * u, len(dynamics.turn))), rows.copy()
+        self.forces[:, one] = open_force / dynamics.size
+        pushed = system.spring[springs, None] * dynamics.gap[springs]
+        self.forces[springs] = -pushed - system.dashpot[springs, None] * dynamics.speed[springs]
+        self.forces[u + springs] = -drag[springs] * self.forces[springs]
+        self.forces[u + slides, one] = -(self.way * system.limit)[slides] / dynamics.size
+        drawn, holds = system.elongation / dynamics.root, state[dynamics.jenkins] == STICK
+        acts[u:][dynamics.jenkins][~holds] += drawn[~holds]
+        free = dynamics.load + acts.T @ self.forces
+        stretch = drawn[holds]
+        free[:, dynamics.places] -= stretch.T @ (system.tangential[holds, None] * stretch) / dynamics.rate
+        # and those that hold
+        kept = np.r_[closed, u + stick]
+        wrench = np.vstack([rows[closed] - drag[closed] * rows[u + closed], rows[u + stick]]).T
+        oblique = _oblique(rows[kept], wrench)
+        length = np.linalg.norm(rows[kept], axis=1)  # of forces that depend on each other, the least by these
+        carried = (np.linalg.pinv(wrench / length, rcond=DEPENDENT) @ (oblique @ free - free)) / length[:, None]
+        self.forces[kept] += carried
+        self.forces[u + closed] -= drag[closed] * carried[: len(closed)]
+        self.X = dynamics.turn.copy()
+        self.X[dynamics.rates] = oblique @ free
+        moves = dynamics.followed(state)[dynamics.rates, dynamics.rates]
+        self.X[dynamics.rates] = moves @ self.X[dynamics.rates]
+        left = acts[u:] @ (np.eye(size) - np.linalg.pinv(rows[kept], rcond=DEPENDENT) @ rows[kept])
+        self.slips_held = np.linalg.norm(left, axis=1) <= DEPENDENT * np.linalg.norm(acts[u:], axis=1)
+
+    @cached_property
+    def named(self) -> np.ndarray:
+        """The states (u,) without slips that constraints hold."""
+        return np.where(self.slips_held & (self.way != 0.0) & self.rubs, STICK, self.state)
+
+    def after(self, z: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return z (K,) after a duration, s, and the derivative (2N, 2N) of u then by u before."""
+        power, k = expm(self.X * duration), self.dynamics.one
+        return power @ z, power[:k, :k]
+
+    def function(self, r: int, what: int) -> tuple[np.ndarray, float]:
+        """Return the event function `what` (numerics.codes) of unit r, a functional (K,) of z, and its scale.
+
+        It falls through zero at its event. The scale is inf for forces and slips that have none of their own.
+        """
+        dynamics, system, u = self.dynamics, self.dynamics.system, len(self.state)
+        if what in (CLOSES, OPENS):
+            return dynamics.gap[r] * (1.0 if what == CLOSES else -1.0), float(system.play[r])
+        if what == RECLOSES:
+            pushes = system.spring[r] * dynamics.gap[r] + system.dashpot[r] * dynamics.speed[r]
+            return pushes, float(system.spring[r] * system.play[r])
+        if what == STOPS:
+            return self.way[r] * dynamics.speed[u + r], np.inf
+        if what == PARTS:
+            return self.forces[r], np.inf
+        room = system.friction[r] * self.forces[r] + (self.forces[u + r] if what == AT_LOW else -self.forces[u + r])
+        room[dynamics.one] += system.limit[r] / dynamics.size
+        return room, float(system.limit[r]) or np.inf
+
+    @cached_property
+    def possible(self) -> list[tuple[int, int]]:
+        """The events that can happen, each by its unit and its code."""
+        found: list[tuple[int, int]] = []
+        for r, state in enumerate(self.state.tolist()):
+            if r < self.dynamics.system.contacts:
+                if state == OPEN:
+                    found.append((r, int(CLOSES)))
+                elif state not in (TOUCHING, LEAVING):
+                    found.append((r, int(PARTS)))
+            if state == STICK and self.rubs[r]:
+                found += [(r, int(AT_LOW)), (r, int(AT_HIGH))]
+            elif self.way[r] != 0.0 and self.rubs[r] and not self.slips_held[r]:
+                found.append((r, int(STOPS)))
+        return found
+
+    @cached_property
+    def _margins(self) -> np.ndarray:
+        """The functionals (m, K) of the possible events, each relative to its scale."""
+        margins = np.zeros((len(self.possible), len(self.X)))
+        for margin, (r, what) in zip(margins, self.possible, strict=True):
+            functional, scale = self.function(r, what)
+            typical = float(np.abs(functional) @ self.dynamics.typical)
+            margin[:] = functional / (scale if np.isfinite(scale) else typical or 1.0)
+        return margins
+
+    @cached_property
+    def _fastest(self) -> float:
+        """Largest rate of change of the motion, 1/s."""
+        return float(np.abs(np.linalg.eigvals(self.X)).max(initial=0.0))
+
+    def least(self, z: np.ndarray, duration: float, event: tuple[int, int]) -> tuple[float, int, int]:
+        """Return the least margin within a duration of the events that were possible but one, its unit and its code.
+
+        Relative to its scale, where the margin turns inside the segment by more than round-off; inf without any.
+        """
+        watched = [k for k, each in enumerate(self.possible) if each != event]
+        functionals, X = self._margins[watched], self.X
+        step = min(self.dynamics.system.period / _LOOKS, 2 * np.pi / _TURN / (self._fastest or 1.0))
+        steps = min(max(int(np.ceil(duration / step)), 2), _POINTS)
+        if duration <= 0.0 or not watched:
+            return np.inf, -1, 0
+        step = duration / steps
+        power, motion = expm(X * step), np.empty((steps + 1, len(X)))
+        motion[0] = z
+        for i in range(steps):
+            motion[i + 1] = power @ motion[i]
+        slopes = functionals @ X
+        value, slope = functionals @ motion.T, slopes @ motion.T
+        noise = 1e-9 * np.abs(slopes) @ np.abs(motion).max(axis=0)
+        side = np.where(np.abs(slope) > noise[:, None], np.sign(slope), 0.0)
+        for i in range(1, steps):
+            side[:, i] = np.where(side[:, i] == 0.0, side[:, i - 1], side[:, i])
+        which, cell = np.nonzero((side[:, :-1] < 0.0) & (side[:, 1:] > 0.0))
+        if not len(which):
+            return np.inf, -1, 0
+        # where the slope's chord vanishes, for a choice; then Newton's method on the motion itself
+        one, other = np.minimum(slope[which, cell], 0.0), slope[which, cell + 1]
+        ahead = one / (one - other)
+        best = int(np.argmin(value[which, cell] + 0.5 * one * ahead * step))
+        row, at, low, high = int(which[best]), float(ahead[best] * step), 0.0, step
+        for _ in range(8):
+            now = expm(X * at) @ motion[cell[best]]
+            tilt, bend = float(slopes[row] @ now), float(slopes[row] @ X @ now)
+            low, high = (at, high) if tilt < 0.0 else (low, at)
+            move = at - tilt / bend if bend > 0.0 else low
+            if abs(move - at) <= 1e-12 * step:
+                break
+            at = move if low < move < high else 0.5 * (low + high)
+        return max(float(functionals[row] @ now), 0.0), *self.possible[watched[row]]
+
+
+def _projector(rows: np.ndarray) -> np.ndarray:
+    """Return the orthogonal projector onto what vanishes in rows (m, N), dependent or not."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    _, sizes, right = np.linalg.svd(rows / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    basis = right[sizes > DEPENDENT]
+    return np.eye(rows.shape[1]) - basis.T @ basis
+
+
+def _oblique(rows: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """Return the projector (N, N) of accelerations onto what rows (m, N) leave, along wrenches (N, m).
+
+    By bases of both sides, whose condition is not the square of that of rows that nearly depend on each other. Where
+    these differ in number, as wrenches depend on each other and rows do not, by the least squares of the rows.
+    """
+    if np.array_equal(rows, wrench.T):
+        return _projector(rows)
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows, wrench = rows / length, wrench / length.T
+    free, normal = null_space(rows, rcond=DEPENDENT), null_space(wrench.T, rcond=DEPENDENT)
+    if free.shape == normal.shape:
+        meeting = normal.T @ free
+        if np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) > DEPENDENT:
+            return np.asarray(free @ np.linalg.solve(meeting, normal.T))
+    inverse = np.linalg.pinv(rows @ wrench, rcond=DEPENDENT)
+    return np.asarray(np.eye(rows.shape[1]) - wrench @ inverse @ rows)

@@ -1,0 +1,95 @@
+"""Names of events, the same in every passage: by cavities, surfaces, bodies and corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.numerics.codes import (
+    AT_HIGH,
+    AT_LOW,
+    CLOSED,
+    CLOSES,
+    HELD,
+    LEAVING,
+    OPEN,
+    OPENS,
+    PARTS,
+    RECLOSES,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STICK,
+    STOPS,
+    TOUCHING,
+)
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, System
+
+#: which of two units carries a redundant force is no event
+_ALIKE = {int(HELD): int(STICK), int(TOUCHING): int(CLOSED)}
+#: what could happen at a unit, for event functions that stay above zero
+_COULD = {
+    int(CLOSES): "impact", int(PARTS): "leaves", int(STOPS): "sticks", int(AT_LOW): "slips", int(AT_HIGH): "slips",
+    int(OPENS): "leaves", int(RECLOSES): "presses",
+}  # fmt: skip
+_WAYS = {int(SLIP_LEFT): " left", int(SLIP_RIGHT): " right"}
+
+
+class EventNames:
+    """Names of the units of a scene, and of what happens at them."""
+
+    def __init__(self, scene: Scene, system: System) -> None:
+        self._contact = np.arange(len(system.rest)) < system.contacts
+        self._rubs = (system.friction > 0.0) | ~self._contact
+        #: whether the unit belongs to a body that only slides, or to none
+        self._slides = np.r_[system.tilt, -1][np.where(system.surface >= STOP, system.bodies, system.body)] < 0
+        # of bodies that only slide, floors and friction dampers come first
+        first = np.lexsort((np.where(self._contact, 0, system.body), system.surface == CASING, self._contact))
+        self._order = first if self._slides.all() else np.arange(len(system.rest))
+        self.names = []
+        for r in range(len(system.rest)):
+            body, surface, corner = int(system.body[r]), int(system.surface[r]), int(system.corner[r])
+            if surface in (STOP, CASING):
+                self.names.append(f"{SURFACES[surface]}.{body}")
+            elif surface == FLOOR and not self._contact[r]:
+                self.names.append(str(body))
+            else:
+                place = f"{scene.damper[body].cavity}.{SURFACES[surface]}.{body}"
+                self.names.append(place if corner < 0 else f"{place}.{corner}")
+        for name in {name for name in self.names if self.names.count(name) > 1}:  # two points of faces that meet
+            for height, r in enumerate(np.flatnonzero(np.array(self.names) == name)):
+                self.names[r] = f"{name}.{height}"
+
+    def possible(self, r: int, what: int) -> str:
+        """Return the name of an event that did not happen at unit r, by the meaning of its function."""
+        turns = what == STOPS and not self._contact[r]
+        return f"{'turns' if turns else _COULD[int(what)]} {self.names[r]}"
+
+    def event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
+        """Return the name of an event from the states (u,) of the units before and after it and those hit (m,)."""
+        hits = {r for r in hit.tolist() if not (self._slides[r] and _alike(old[r]) == CLOSED)}
+        parts = [f"impact {self.names[r]}" for r in sorted(hits)]
+        for r in self._order[(old != new)[self._order]].tolist():
+            change = self._change(_alike(old[r]), _alike(new[r]), bool(self._rubs[r]), bool(self._contact[r]))
+            if change and f"{change} {self.names[r]}" not in parts:
+                way = _WAYS.get(int(new[r]), "") if change in ("slips", "turns") else ""
+                parts.append(f"{change} {self.names[r]}{way}")
+        return ", ".join(parts)
+
+    @staticmethod
+    def _change(old: int, new: int, rubs: bool, contact: bool) -> str:
+        if old == new:
+            return ""
+        if contact and new in (OPEN, LEAVING):
+            return "leaves" if new == OPEN else "lags"
+        if contact and old in (OPEN, LEAVING):
+            return "presses" if old == LEAVING else "impact" if new == SPRUNG else "rests"
+        if not rubs or new not in (STICK, SLIP_LEFT, SLIP_RIGHT):
+            return ""
+        if new == STICK:
+            return "sticks"
+        return "turns" if old in (SLIP_LEFT, SLIP_RIGHT) else "slips"
+
+
+def _alike(state: int) -> int:
+    return _ALIKE.get(int(state), int(state))

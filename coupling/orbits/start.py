@@ -1,0 +1,112 @@
+"""The start of a passage: where the engine begins from a state, and the derivative of that."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
+from vanedamp.coupling.orbits.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.orbits.frame import Frame
+from vanedamp.coupling.orbits.jump import impact
+from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.segment import Event, Segment
+from vanedamp.coupling.system.system import FLOOR
+
+#: gaps this close are closed, relative to the free travel; speeds this slow are none, relative to the fastest
+_SHUT, _STILL = 1e-12, 1e-12
+#: a force this close to its bound, relative to its terms, is at it
+_NEAR = 1e-9
+
+
+class Start:
+    """A state that a passage is to begin with, of a system of these dynamics."""
+
+    def __init__(self, frame: Frame, dynamics: Dynamics, start: RestartState) -> None:
+        self.frame, self.dynamics, self.system = frame, dynamics, frame.system
+        self._given = frame.state_of(start)
+
+    def closed(self, segment: Segment) -> np.ndarray:
+        """Return whether contacts (u,) are closed as a segment begins, with or without force."""
+        system, u = self.system, len(segment.state)
+        gap, rate = system.rest + system.J[:u] @ segment.q, system.J[:u] @ segment.v
+        # one at rest that parts from now on has been closed until now
+        rests = (gap <= _SHUT * system.play) & (np.abs(rate) <= _STILL * segment.speed)
+        return np.asarray((np.arange(u) < system.contacts) & ((segment.state != OPEN) | rests))
+
+    def derivative(self, event: Event, segment: Segment, flow: Flow, u: np.ndarray) -> tuple[np.ndarray, PassageStatus]:
+        """Return the derivative (2N, k) of u at the start of the first segment, and what is wrong with it, if anything.
+
+        event: at time zero. Raises Untrusted (orbits.jump).
+        """
+        dynamics, status = self.dynamics, PassageStatus.OK
+        from_state = dynamics.unit[:, None] * self.frame.from_state
+        given, M = from_state @ self._given, from_state @ self._clipped(segment)
+        n = self.system.modes
+        if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n]):
+            status = PassageStatus.GRAZING  # the structure would begin beyond a stop
+        hit = event.struck[event.impulse[event.struck] != 0.0]
+        rows = dynamics.speed[hit, : dynamics.one]
+        if np.any(np.abs(rows @ given) > _STILL * np.abs(rows) @ np.abs(given)):
+            status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
+            jump, root = impact(self.system, given[dynamics.rates] / dynamics.root, event, segment.speed), dynamics.root
+            M[dynamics.rates] = root[:, None] * jump.derivative / root @ M[dynamics.rates]
+        z = dynamics.extended(u, segment.time)
+        if self._begins_at_event(segment, flow, z) or self._loose(segment, flow, z):
+            status = PassageStatus.GRAZING
+        return dynamics.begun(segment.state, self.closed(segment)) @ M, status
+
+    def _clipped(self, segment: Segment) -> np.ndarray:
+        """Return the derivative (k, k) of the state that a run begins with: bodies in walls are moved out of them.
+
+        Springs of friction dampers are unloaded to their bounds.
+        """
+        system, k = self.system, len(self._given)
+        kept, first = np.eye(k), k - len(self.frame.drawn)
+        sliding = first + np.flatnonzero(np.abs(self._given[first:]) > self.frame.longest)
+        kept[sliding, sliding] = 0.0
+        slips = 2 * system.modes + np.arange(system.bodies)
+        slip = segment.q[system.along] - system.floor @ segment.q
+        travel = [self.frame.scene.cavity[index].gap for index in system.cavity]
+        pushed = np.flatnonzero(np.abs(slip - self._given[slips]) > _SHUT * np.array(travel))
+        if len(pushed):
+            # gaps of bodies that were pushed and are closed now stay closed
+            gap = system.J[: len(system.rest)] @ self.frame.from_state[: len(system.mass)]
+            shut = self.closed(segment) & np.any(gap[:, slips[pushed]] != 0.0, axis=1)
+            follow = -np.linalg.pinv(gap[np.ix_(shut, slips[pushed])]) @ gap[shut]
+            follow[:, slips[pushed]] = 0.0
+            kept[slips[pushed]] = follow
+        return kept
+
+    def _begins_at_event(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
+        """Return whether a contact parts with a speed, or begins to slip, as the passage begins."""
+        system, u = self.system, len(segment.state)
+        contact = np.arange(u) < system.contacts
+        gap = system.rest + system.J[:u] @ segment.q
+        parts = contact & (segment.state == OPEN) & (gap <= _SHUT * system.play) & ~self.closed(segment)
+        slides = (flow.way != 0.0) & ~flow.slips_held & flow.rubs
+        faster = flow.way * (self.dynamics.speed[u:] @ flow.X @ z) > 0.0  # one that stops at once has been at rest
+        slips = slides & faster & (np.abs(system.J[u:] @ segment.v) <= _STILL * segment.speed)
+        return bool(np.any(parts | slips))
+
+    def _loose(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
+        """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.
+
+        A body that friction and a wall hold at once is kept at the wall by what friction could not hold.
+        """
+        system, units, unit = self.system, len(segment.state), np.arange(len(segment.state))
+        force = flow.forces @ z
+        noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical
+        closed = (unit < system.contacts) & np.isinf(system.spring) & presses(segment.state)
+        floors = (unit >= system.contacts) & (system.surface == FLOOR)
+        along = np.where(floors, np.r_[system.along, 0][np.where(floors, system.body, -1)], 0)
+        touched = system.J[:units, along] * floors  # (u, u): of each contact by the body of each floor
+        holds = floors & np.isin(segment.state, (STICK, HELD))
+        for r in np.flatnonzero(closed & (system.friction == 0.0)):
+            beside = holds & (touched[r] != 0.0)
+            press = force[r] + force[units:][beside] @ touched[r, beside]
+            if press <= (1.0 + _NEAR) * system.limit[beside].sum() + noise[r]:
+                return True
+        stuck = flow.stuck & (unit >= system.contacts) & (unit < self.dynamics.jenkins.start)
+        at_bound = stuck & (np.abs(force[units:]) >= (1.0 - _NEAR) * system.limit)
+        return bool(np.any(at_bound & ~np.any(touched[closed] != 0.0, axis=0)))

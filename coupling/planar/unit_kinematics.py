@@ -1,0 +1,82 @@
+"""What a unit is, and its gap, elongation, speeds and spring force at given coordinates."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.numerics.codes import OPEN
+from vanedamp.coupling.numerics.compiler.jit import inlined
+from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
+
+
+@inlined
+def row_speed(system, row, v):
+    """Speed of a row, m/s."""
+    total = 0.0
+    for i in range(len(v)):
+        total += system.J[row, i] * v[i]
+    return total
+
+
+@inlined
+def gap(system, unit, q):
+    """Gap of a contact, m."""
+    return system.rest[unit] + row_speed(system, unit, q)
+
+
+@inlined
+def is_compliant(system, unit):
+    """Whether a unit is a contact with a spring."""
+    return system.spring[unit] < math.inf
+
+
+@inlined
+def is_rigid(system, unit):
+    """Whether a unit is a contact without a spring."""
+    return unit < system.contacts and system.spring[unit] == math.inf
+
+
+@inlined
+def spring_force(system, unit, q, v):
+    """Return the force of spring and dashpot of a closed contact, N; they never pull."""
+    force = system.spring[unit] * gap(system, unit, q) + system.dashpot[unit] * row_speed(system, unit, v)
+    return max(-force, 0.0)
+
+
+@inlined
+def least_force(system, unit):
+    """Return the force of a compliant contact by the resolution of its gap, N: below, it carries nothing."""
+    return SIMULTANEOUS * system.spring[unit] * system.play[unit]
+
+
+@inlined
+def has_friction(system, unit):
+    """Whether a unit has friction."""
+    return unit >= system.contacts or system.friction[unit] > 0.0
+
+
+@inlined
+def speed_scale(system, v):
+    """Largest sum of the parts of a row's speed, m/s."""
+    largest = 0.0
+    for row in range(len(system.J)):
+        total = 0.0
+        for i in range(len(v)):
+            total += abs(system.J[row, i] * v[i])
+        largest = max(largest, total)
+    return largest
+
+
+@inlined
+def is_closed(system, st, unit):
+    """Whether a contact's gap is zero."""
+    return st.state[unit] != OPEN or gap(system, unit, st.q) <= SIMULTANEOUS * system.play[unit]
+
+
+@inlined
+def elongation(system, j, q):
+    """Return the elongation of the spring of a Jenkins element, m; of velocities, its rate."""
+    total = 0.0
+    for i in range(len(q)):
+        total += system.elongation[j, i] * q[i]
+    return total

@@ -1,0 +1,77 @@
+"""The public names: written once, in the stub, with docstrings and a page; `help` tells of the keys of files."""
+
+import ast
+import pydoc
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import vanedamp as vd
+from docs._ext import python_api
+from tests.tools.processes import environment
+from vanedamp.coupling.scene.contact_laws.newton import Newton
+from vanedamp.files.extensions import ExtensionError
+from vanedamp.files.key_tables import tables
+from vanedamp.studies.file_kinds import KINDS
+
+STUB = Path(vd.__file__).with_suffix(".pyi")
+IMPORTS = {
+    name.asname: (node.module, name.name)
+    for node in ast.parse(STUB.read_text(encoding="utf-8")).body
+    if isinstance(node, ast.ImportFrom)
+    for name in node.names
+}
+
+
+def test_the_stub_has_every_name_and_they_are_exported():
+    assert sorted(IMPORTS) == dir(vd)
+    assert set(vd.__all__) < set(IMPORTS)
+    assert {"ContactLaw", "Method", "Scene", "Waveform", "register"} <= set(vd.__all__)
+
+
+@pytest.mark.parametrize("name", sorted(IMPORTS))
+def test_a_name_is_that_of_its_module_with_a_docstring(name):
+    module, own = IMPORTS[name]
+    assert own == name  # `import A as A`: an editor takes it for public
+    value = getattr(vd, name)
+    assert value is (
+        import_module(f"vanedamp.{name}") if module == "vanedamp" else getattr(import_module(module), name)
+    )
+    assert getattr(value, "__module__", module) == module, "name the module that defines it"
+    assert pydoc.getdoc(value)
+
+
+def test_every_name_is_on_the_page():
+    page = dict(python_api.pages())["vanedamp"]
+    assert [name for name in vd.__all__ if f":: vanedamp.{name}\n" not in page] == []
+
+
+def test_names_are_loaded_when_they_are_used():
+    code = "import sys, vanedamp; print(len([name for name in sys.modules if name.startswith('vanedamp.')]))"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
+
+
+def test_a_name_that_is_not_there():
+    with pytest.raises(AttributeError, match="no attribute 'Scenes'"):
+        _ = vd.Scenes
+
+
+@pytest.mark.parametrize(("record", "kind"), [(vd.Scene, "scene"), (vd.Case, "case")])
+def test_help_lists_keys_units_and_defaults(record, kind):
+    text = " ".join(pydoc.render_doc(record, renderer=pydoc.plaintext).replace("\n |", "").split())
+    for table in tables(KINDS[kind].schema):
+        assert table.heading in text
+        for key in table.keys:
+            unit = f" [{key.unit}]" if key.unit else ""
+            assert " ".join(f"{key.name}: {key.meaning}{unit}".split()) in text
+    assert "gap: total free travel of a body along the cavity [m]; number > 0; required" in text or kind != "scene"
+
+
+def test_register_takes_laws_and_waveforms_only():
+    assert vd.register(Newton) is Newton
+    with pytest.raises(ExtensionError, match="derive it from ContactLaw or Waveform"):
+        vd.register(dict)
