@@ -1,149 +1,88 @@
 """The bases of reduction by name: ours, and those that other packages add; other code asks them, never for a name.
 
-An installed package adds one, a class derived from ReductionBasis, in its pyproject.toml:
+An installed package adds one, a ReductionBasis or an object that answers like one, in its pyproject.toml:
 
     [project.entry-points."vanedamp.bases"]
-    guyan = "acme.guyan:Guyan"
+    guyan = "acme.guyan:GUYAN"
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass
 
 from vanedamp.files.extensions import Registry
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases import craig_bampton, free_interface
-from vanedamp.rom.bases.projection import Factorize, ReductionError, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import SpeedBases
 from vanedamp.rom.truncation import massless, truncated
 
 
-class Structure(NamedTuple):
-    """What is reduced; the fields are arguments of rom.reduction.reduce."""
-
-    matrices: SystemMatrices
-    interface: Interface
-    factorize: Factorize = superlu
-    keep_recovery: bool = False
-    characteristic: int = 6
-
-    def fixed_interface(self, modes: int, blocks: int) -> ReducedModel:
-        """Return constraint modes, blocks of quasi-static modes, and fixed-interface modes."""
-        return craig_bampton.reduce(
-            self.matrices, self.interface, modes, self.factorize, self.keep_recovery, blocks, self.characteristic
-        )  # fmt: skip
-
-    def free_interface(self, modes: int, blocks: int) -> ReducedModel:
-        """Return blocks of residual attachment modes, and natural modes."""
-        return free_interface.reduce_free(
-            self.matrices, self.interface, modes, self.factorize, self.keep_recovery, blocks
-        )  # fmt: skip
-
-
+@dataclass(frozen=True)
 class ReductionBasis:
-    """Base of the bases: it keeps natural modes, and answers how it describes the rest of the structure."""
+    """What a basis keeps: modes, and how the rest of the structure follows statically.
 
-    #: what joins its bases at several speeds of rotation; None: it is that of one speed
-    speeds: ClassVar[type[SpeedBases] | None] = None
-    #: fewest modes that it keeps of a structure whose supports hold it
-    least: ClassVar[int] = 1
+    held: whether the modes are those with the interface held; attached: blocks of attachment modes of natural modes;
+    without_mass: whether the rest is a boundary without mass; more: whether further blocks follow on the attached ones;
+    least: fewest modes of a structure that its supports hold; speeds: what joins the bases at several speeds of
+    rotation, None where the basis is that of one speed.
+    """
 
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return the model with that many modes; quasi_static: further blocks of quasi-static coordinates."""
-        raise NotImplementedError(f"{type(self).__qualname__} does not reduce")
+    held: bool = False
+    attached: int = 1
+    without_mass: bool = False
+    more: bool = False
+    least: int = 1
+    speeds: type[SpeedBases] | None = None
 
-    def rich(self, structure: Structure, modes: int, blocks: int) -> ReducedModel:
+    def reduce(
+        self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize,
+        keep_recovery: bool = False, quasi_static: int = 0, characteristic: int = 6,
+    ) -> ReducedModel:  # fmt: skip
+        """Return the model with that many modes. Arguments and errors: those of rom.reduction.reduce."""
+        given = matrices, interface
+        if self.held:
+            most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
+            kept = min(max(2 * modes, modes + 10), most) if self.without_mass else modes
+            model = craig_bampton.reduce(*given, kept, factorize, keep_recovery, quasi_static, characteristic)
+        else:
+            blocks = self.attached + (quasi_static if self.more else 0)
+            model = free_interface.reduce_free(*given, modes, factorize, keep_recovery, blocks)
+        return massless(model, modes) if self.without_mass else model
+
+    def rich(
+        self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize, blocks: int,
+        keep_recovery: bool = False,
+    ) -> ReducedModel:  # fmt: skip
         """Return the model that `cut` takes those up to `modes` of, with that many blocks of quasi-static modes."""
-        return structure.free_interface(modes, blocks)
+        reduce = craig_bampton.reduce if self.held else free_interface.reduce_free
+        return reduce(matrices, interface, modes, factorize, keep_recovery, blocks)
 
     def cut(self, rich: ReducedModel, modes: int) -> ReducedModel:
         """Return the model with that many modes, from a rich one."""
-        return truncated(rich, modes, 1)
+        return massless(rich, modes) if self.without_mass else truncated(rich, modes, self.attached)
 
     def least_modes(self, rich: ReducedModel) -> int:
-        """Return the fewest modes of a model from a rich one, the rigid motions that the supports leave included."""
-        return max(rich.rigid_modes, self.least)
+        """Return the fewest modes of a model from a rich one: an interface that is held leaves no rigid motions."""
+        return 0 if self.held and not self.without_mass else max(rich.rigid_modes, self.least)
 
 
-class CraigBampton(ReductionBasis):
-    """Constraint modes and fixed-interface modes: whatever the supports leave, the interface holds."""
-
-    speeds = SpeedBases
-
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return that model."""
-        return structure.fixed_interface(modes, quasi_static)
-
-    def rich(self, structure: Structure, modes: int, blocks: int) -> ReducedModel:
-        """Return one with more blocks; models that are cut from it have one."""
-        return structure.fixed_interface(modes, blocks)
-
-    def least_modes(self, rich: ReducedModel) -> int:
-        """Return zero."""
-        return 0
-
-
-class Rubin(ReductionBasis):
-    """Natural modes and residual attachment modes with their mass."""
-
-    least = 0
-
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return that model."""
-        return structure.free_interface(modes, 1 + quasi_static)
-
-
-class MacNeal(ReductionBasis):
-    """The same without that mass: a boundary without mass."""
-
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return that model."""
-        return massless(structure.free_interface(modes, 1), modes)
-
-    def cut(self, rich: ReducedModel, modes: int) -> ReducedModel:
-        """Return its own lowest natural modes, and the rest of its flexibility."""
-        return massless(rich, modes)
-
-
-class Massless(MacNeal):
-    """The same, made of a Craig-Bampton model's own modes, of which it takes about half."""
-
-    def rich(self, structure: Structure, modes: int, blocks: int) -> ReducedModel:
-        """Return a Craig-Bampton model with more modes and blocks."""
-        return structure.fixed_interface(modes, blocks)
-
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return that model."""
-        interface = structure.interface
-        most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
-        return massless(structure.fixed_interface(min(max(2 * modes, modes + 10), most), quasi_static), modes)
-
-
-class Truncated(ReductionBasis):
-    """Natural modes only."""
-
-    def reduce(self, structure: Structure, modes: int, quasi_static: int = 0) -> ReducedModel:
-        """Return that model."""
-        return structure.free_interface(modes, 0)
-
-    def cut(self, rich: ReducedModel, modes: int) -> ReducedModel:
-        """Return the first modes of a rich model."""
-        return truncated(rich, modes, 0)
-
-
-#: the values of `basis`
+#: the values of `basis` (rom.reduction.reduce says what they are)
 BASES = Registry(
     "basis",
     {
-        "craig-bampton": CraigBampton, "rubin": Rubin, "macneal": MacNeal, "truncated": Truncated,
-        "massless": Massless,
+        "craig-bampton": ReductionBasis(held=True, speeds=SpeedBases),
+        "rubin": ReductionBasis(more=True, least=0),
+        "macneal": ReductionBasis(without_mass=True),
+        "truncated": ReductionBasis(attached=0),
+        "massless": ReductionBasis(held=True, without_mass=True),
     },
     "vanedamp.bases",
-    ("reduce", "rich", "cut", "speeds"),
-)  # fmt: skip
-#: adds a basis, by its name and class
+    ("reduce", "rich", "cut", "least_modes", "speeds"),
+)
+#: adds a basis, by its name
 register = BASES.register
 
 
@@ -151,5 +90,5 @@ def basis_named(name: str) -> ReductionBasis:
     """Return a basis. Raises ReductionError for an unknown name."""
     if name not in BASES:
         raise ReductionError(f"basis: expected one of {', '.join(BASES.names())}, not {name!r}")
-    basis: ReductionBasis = BASES.part(name)()
+    basis: ReductionBasis = BASES.part(name)
     return basis

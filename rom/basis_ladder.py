@@ -7,13 +7,12 @@ modes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases.projection import Factorize, superlu
-from vanedamp.rom.basis import Structure, basis_named
+from vanedamp.rom.basis import basis_named
 from vanedamp.rom.error_estimate import Rung, frf_errors
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
@@ -28,14 +27,13 @@ def rich_model(
     basis: str,
     modes: int,
     factorize: Factorize = superlu,
-    **others: Any,
+    keep_recovery: bool = False,
 ) -> ReducedModel:
     """Reduce a structure so far that every model of a basis up to `modes`, and its estimate, can be cut from it.
 
-    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce
-    but `quasi_static`.
+    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce.
     """
-    return basis_named(basis).rich(Structure(matrices, interface, factorize, **others), modes, 1 + BLOCKS)
+    return basis_named(basis).rich(matrices, interface, modes, factorize, 1 + BLOCKS, keep_recovery)
 
 
 def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:

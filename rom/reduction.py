@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases.projection import Factorize, superlu
-from vanedamp.rom.basis import Structure, basis_named
+from vanedamp.rom.basis import basis_named
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 
@@ -41,4 +41,4 @@ def reduce(
     found = basis_named(basis)
     if not isinstance(interface, Interface):
         interface = Interface.on_patches(matrices, interface)
-    return found.reduce(Structure(matrices, interface, factorize, keep_recovery, characteristic), modes, quasi_static)
+    return found.reduce(matrices, interface, modes, factorize, keep_recovery, quasi_static, characteristic)

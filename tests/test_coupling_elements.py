@@ -170,7 +170,7 @@ def test_the_period_map_has_the_derivative_of_differences():
     run, mapped = simulate(scene), period_map(scene)
     state = mapped.state_of(run.final)
     passage = mapped(state)
-    assert passage.status is PassageStatus.OK and "impact" in " ".join(passage.sequence)
+    assert passage.status is PassageStatus.OK and "impact c.tether.0" in " ".join(passage.sequence)
     scale, step = mapped.scale, 1e-6
     for j in range(len(state)):
         move = step * scale[j] * (np.arange(len(state)) == j)
@@ -272,6 +272,9 @@ def test_shrouds_meet_by_their_relative_motion(method, engine, tmp_path):
 
 
 def test_shrouds_are_named_rightly(tmp_path):
+    mapped = period_map(shrouds(tmp_path))
+    passage = mapped(np.zeros(len(mapped.scale)))
+    assert passage.sequence[0] == "impact shroud.0"
     with pytest.raises(InputError, match=re.escape("shroud[0].to: no interface label 'three'; it has one, two")):
         simulate(shrouds(tmp_path, shroud=[{"at": "one", "to": "three", "gap": GAP}]))
     rigid = tethered().to_dict() | {"shroud": [{"at": "one", "to": "two", "gap": GAP}]}

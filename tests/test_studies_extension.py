@@ -306,9 +306,8 @@ def test_law_is_one_of_contact(vanedamp, tmp_path):
 
 def test_element_and_shape_are_tables_and_values_of_a_scene(vanedamp, tmp_path):
     scene = (tmp_path / "scene.toml").read_text().split("[[damper]]")[0] + "play = 1e-4\n"
-    scene += (
-        "[[damper]]\ncavity = 'c1'\nmass = 0.05\nshape = 'diamond'\nedge = 0.01\n[time]\nperiods = 3\ntransient = 0\n"
-    )
+    scene += "[[damper]]\ncavity = 'c1'\nmass = 0.05\nshape = 'diamond'\nedge = 0.01\n"
+    scene += "[time]\nperiods = 3\ntransient = 0\n"
     scene += "[[leash]]\nlength = 1e-5\nstiffness = 1e5\n"
     (tmp_path / "scene.toml").write_text(scene)
     data = json.loads(succeeds(vanedamp("run", "scene.toml", "--json", "-", "--events")))

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.contact_laws.registry import Contact
-from vanedamp.coupling.scene.elements.element import SceneElement, entries_of
+from vanedamp.coupling.scene.elements.element import SceneElement
 from vanedamp.coupling.scene.elements.registry import ELEMENTS
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
@@ -226,7 +226,8 @@ class Scene(OpenRecord, Displayed):
     @property
     def elements(self) -> Iterator[tuple[str, int, SceneElement]]:
         """Table, number in it, and record of every element: stops, and those that other code adds."""
-        return entries_of({"stop": self.stop} | (self.added or {}))
+        tables = {"stop": self.stop} | (self.added or {})
+        return ((table, number, entry) for table, entries in tables.items() for number, entry in enumerate(entries))
 
     @property
     def yields(self) -> bool:

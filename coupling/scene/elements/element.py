@@ -73,10 +73,3 @@ class SceneElement:
     def units(self, number: int, parts: Parts) -> Iterator[Unit]:
         """Yield its units; number: of the entry in its list."""
         raise NotImplementedError(f"{type(self).__qualname__} has no units")
-
-
-def entries_of(tables: Mapping[str, Any]) -> Iterator[tuple[str, int, SceneElement]]:
-    """Yield table, number and element of all entries of lists of tables."""
-    for table, entries in tables.items():
-        for number, entry in enumerate(entries):
-            yield table, number, entry

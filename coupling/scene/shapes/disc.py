@@ -16,8 +16,8 @@ class Disc(Shape):
 
     def half_extent(self, body: Measured) -> tuple[float, float]:
         """Return the radius, twice."""
-        assert body.radius is not None
-        return body.radius, body.radius
+        radius = body.measure("radius") or 0.0
+        return radius, radius
 
     def inertia(self, body: Measured) -> float:
         """Return that of a homogeneous disc."""

@@ -29,20 +29,8 @@ class Measured(Protocol):
     def mass(self) -> float:
         """Mass, kg."""
 
-    @property
-    def length(self) -> float | None:
-        """Extent along the cavity."""
-
-    @property
-    def height(self) -> float | None:
-        """Extent across the cavity."""
-
-    @property
-    def radius(self) -> float | None:
-        """Radius."""
-
     def measure(self, key: str) -> float | None:
-        """Return any measure by its key."""
+        """Return a measure by its key."""
 
 
 class Shape:
@@ -62,12 +50,12 @@ class Shape:
 
     def half_extent(self, body: Measured) -> tuple[float, float]:
         """Return half of its extent along and across, m."""
-        return (body.length or 0.0) / 2, (body.height or 0.0) / 2
+        return (body.measure("length") or 0.0) / 2, (body.measure("height") or 0.0) / 2
 
     def inertia(self, body: Measured) -> float:
         """Return the moment of inertia of the homogeneous body about its centre, kg m^2."""
         a, b = self.half_extent(body)
-        return body.mass * (a * a + b * b) / 3
+        return body.mass * ((a * a + b * b) / 3)
 
     def corners(self, body: Measured) -> np.ndarray:
         """Return the corners (k, 2) of its outline, counterclockwise from the lower left one; (0, 2): it is round."""
