@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
