@@ -114,6 +114,21 @@ def test_orders_of_the_smooth_motion(pressed, solver, order):
     assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
 
 
+@pytest.mark.parametrize("name", ["moreau", "explicit", "newmark", "gauss-seidel"])
+def test_orders_of_the_spring_of_a_friction_damper(name):
+    """The slider rests: a linear system of two springs."""
+    scene = made(
+        {"structure": STRUCTURE, "excitation": {"frequency": 1.1, "force": 0.2},
+         "friction_damper": [{"normal_force": 1.0, "friction": 0.5, "stiffness": 20.0}],
+         "time": {"periods": 2, "transient": 0}}
+    )  # fmt: skip
+    exact, steps = simulate(scene), np.array([200, 400, 800])
+    assert exact.energy["friction"] == 0.0
+    errors = [error(scene, exact, **METHODS[name], steps_per_period=int(count)) for count in steps]
+    assert errors[-1] < 1e-3
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2, abs=0.2)
+
+
 def test_moreau_is_of_first_order_over_impacts(periodic):
     exact = simulate(periodic)
     # averages over many steps, as an impact falls anywhere in its step

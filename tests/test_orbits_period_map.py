@@ -11,7 +11,7 @@ from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scen
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus
-from vanedamp.coupling.orbits.period_map import SceneMap, period_map
+from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.files.toml_input import InputError
 
 FREQUENCY = "excitation.frequency"
@@ -76,7 +76,7 @@ SCENES = {
 }  # fmt: skip
 
 
-def passed(tables, periods) -> tuple[SceneMap, np.ndarray]:
+def passed(tables, periods) -> tuple[PeriodMap, np.ndarray]:
     """The period map of a scene, and the state after some periods of it."""
     made = scene(**tables)
     mapped = period_map(made, FREQUENCY)

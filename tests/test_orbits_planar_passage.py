@@ -124,8 +124,8 @@ def directions(found, x):
     frame, dynamics = found._frame, found._dynamics
     start = found.restart_of(x)
     segment = next(iter(Walk(engine_run(frame.system, start, new_records(frame.system, 1, 0), True, 100), 1)))
-    begun = dynamics.begun(segment.state, Start(frame, dynamics, start).closed(segment))
-    held = frame.to_state / dynamics.unit @ begun @ (dynamics.unit[:, None] * frame.from_state)
+    begun = dynamics.begun(segment.state, Start(frame, dynamics, x).closed(segment))
+    held = dynamics.to_state @ begun @ dynamics.from_state
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]
 

@@ -24,8 +24,7 @@ from benchmarks.rows import Rows
 from benchmarks.timing import seconds
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.newton import find_orbit
-from vanedamp.coupling.orbits.passage import PeriodMap
-from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import finite

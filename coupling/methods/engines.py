@@ -31,5 +31,5 @@ def engine_run(
 
 def reuse_subsystems(run: Any, earlier: Any) -> None:
     """Let a run take over the subsystems that an earlier one has met, where both are of one engine that can."""
-    if type(earlier) is type(run) and hasattr(run, "reuse"):
+    if earlier is not None and type(earlier) is type(run) and hasattr(run, "reuse"):
         run.reuse(earlier)

@@ -11,7 +11,7 @@ from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.continuation import Follower, Trace
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
-from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 

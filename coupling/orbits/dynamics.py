@@ -22,53 +22,41 @@ import numpy as np
 from scipy.linalg import expm, null_space
 from scipy.sparse.csgraph import connected_components
 
-from vanedamp.coupling.numerics.codes import (
-    AT_HIGH,
-    AT_LOW,
-    CLOSED,
-    CLOSES,
-    LEAVING,
-    OPEN,
-    OPENS,
-    PARTS,
-    RECLOSES,
-    SLIP_LEFT,
-    SLIP_RIGHT,
-    STICK,
-    STOPS,
-    TOUCHING,
-)
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.orbits.frame import Frame
+from vanedamp.coupling.orbits.minima import least_minimum
+from vanedamp.coupling.response.segment import Segment
 
 #: singular values below this are zero: rows that depend on each other
 DEPENDENT = 1e-9
-#: points of a period, and of one turn of the fastest motion, between which least margins are sought; most in a segment
-_LOOKS, _TURN, _POINTS = 32, 12, 240
+#: points of a period, and of one turn of the fastest motion, between which least margins are sought
+_LOOKS, _TURN = 32, 12
 #: flows that are kept
 _KEPT = 1000
 
 
 def presses(state: np.ndarray) -> np.ndarray:
     """Return whether contacts in states (u,) are closed with a force of their own."""
-    return (state < OPEN) | (state == CLOSED)
+    return (state < codes.OPEN) | (state == codes.CLOSED)
 
 
 class Dynamics:
     """Flows of a system with N coordinates by the states of its u units; K = 2N + 1 + 2e entries of z.
 
-    unit: (2N,) of u in terms of (q, q'); rows: (2u, N) J in coordinates root mass q; gap: (u, K), speed: (2u, K)
-    functionals of gaps and of the rows' speeds; typical: (K,) sizes of z in a typical motion of these sizes of (q, q').
+    scale: (k,) sizes of states; to_state, from_state: (k, 2N) and (2N, k) between u and states; rows: (2u, N) J in
+    coordinates root mass q; gap: (u, K), speed: (2u, K) functionals of gaps and of the rows' speeds; typical: (K,)
+    sizes of z in a typical motion.
     """
 
-    def __init__(self, system: System, sizes: np.ndarray) -> None:
-        self.system = system
+    def __init__(self, frame: Frame, scale: np.ndarray) -> None:
+        self.system = system = frame.system
         size, u, e = len(system.mass), len(system.rest), len(system.frequency)
         self.root = np.sqrt(system.mass)
         yields = np.isfinite(system.spring)
         stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
         stiff = stiff + (system.spring[yields, None] * system.J[:u][yields] ** 2).sum(axis=0)
         self.rate = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
-        self.unit = np.r_[self.root * self.rate, self.root]
+        self.unit = np.r_[self.root * self.rate, self.root]  # of u in terms of (q, q')
         self.rows = system.J / self.root
         self.places, self.rates, self.one = slice(0, size), slice(size, 2 * size), 2 * size
         cosine = slice(self.one + 1, self.one + 1 + e)
@@ -87,7 +75,9 @@ class Dynamics:
         self.load[:, self.one] = system.weight / self.root / self.size
         self.load[:, cosine] = system.load.real.T / self.root[:, None] / self.size
         self.load[:, sine] = -system.load.imag.T / self.root[:, None] / self.size
-        self.typical = np.r_[self.unit * sizes, np.full(1 + 2 * e, self.size)]
+        self.scale, self.to_state = scale, frame.to_state / self.unit
+        self.from_state = self.unit[:, None] * frame.from_state
+        self.typical = np.r_[np.abs(self.from_state) @ scale, np.full(1 + 2 * e, self.size)]
         #: coordinates (j,) of the sliders of Jenkins elements, and motions (j, N) of what draws them
         self.sliders = np.arange(size - len(system.tangential), size)
         self.drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
@@ -106,6 +96,11 @@ class Dynamics:
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T.astype(int) @ bound > 0)
         labels: np.ndarray = connected_components(joined, directed=False)[1]
         return labels
+
+    def state(self, segment: Segment) -> np.ndarray:
+        """Return u (2N,) at the start of a segment."""
+        state: np.ndarray = self.unit * np.concatenate([segment.q, segment.v])
+        return state
 
     def extended(self, u: np.ndarray, time: float) -> np.ndarray:
         """Return z (K,) of a state u (2N,) at a time in the period, s."""
@@ -135,7 +130,7 @@ class Dynamics:
     def begun(self, state: np.ndarray, closed: np.ndarray) -> np.ndarray:
         """Return the projector (2N, 2N) of u that contacts `closed` (u,) and units that stick in states (u,) leave."""
         rubs = (self.system.friction > 0.0) | (np.arange(len(state)) >= self.system.contacts)
-        return self.followed(state) @ self.held(closed & np.isinf(self.system.spring), (state == STICK) & rubs)
+        return self.followed(state) @ self.held(closed & np.isinf(self.system.spring), (state == codes.STICK) & rubs)
 
     def followed(self, state: np.ndarray) -> np.ndarray:
         """Return the map (2N, 2N) of u to that with sliders as they are in states (u,).
@@ -143,18 +138,13 @@ class Dynamics:
         Those of Jenkins elements that slip follow what draws them, others rest.
         """
         size, matrix = len(self.root), np.eye(2 * len(self.root))
-        for a, drawn, slips in zip(self.sliders, self.drawn, state[self.jenkins] != STICK, strict=True):
+        for a, drawn, slips in zip(self.sliders, self.drawn, state[self.jenkins] != codes.STICK, strict=True):
             matrix[size + a] = 0.0
             if slips:
                 matrix[a] = 0.0
                 matrix[a, :size] = self.unit[a] * drawn / self.unit[:size]
                 matrix[size + a, size:] = self.root[a] * drawn / self.root
         return matrix
-
-    def kick(self, impulse: np.ndarray) -> np.ndarray:
-        """Return the jump (N,) of w by the impulses (2u,) of all rows, N s."""
-        jump: np.ndarray = impulse @ self.rows
-        return jump
 
 
 class Flow:
@@ -170,10 +160,10 @@ class Flow:
         u, size = len(state), len(dynamics.root)
         contact, rigid = np.arange(u) < system.contacts, np.isinf(system.spring)
         self.rubs = ~contact | (system.friction > 0.0)
-        self.way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
+        self.way = (state == codes.SLIP_RIGHT).astype(float) - (state == codes.SLIP_LEFT)
         closed = np.flatnonzero(contact & presses(state) & rigid)
         springs = np.flatnonzero(contact & presses(state) & ~rigid)
-        self.stuck = (state == STICK) & self.rubs
+        self.stuck = (state == codes.STICK) & self.rubs
         stick, slides = np.flatnonzero(self.stuck), np.flatnonzero(~contact & (self.way != 0.0))
         drag = (self.way * system.friction)[:, None]
         # forces that are known, and what they act on: the force of a slider that moves is that on what draws it
@@ -183,7 +173,7 @@ class Flow:
         self.forces[springs] = -pushed - system.dashpot[springs, None] * dynamics.speed[springs]
         self.forces[u + springs] = -drag[springs] * self.forces[springs]
         self.forces[u + slides, one] = -(self.way * system.limit)[slides] / dynamics.size
-        drawn, holds = system.elongation / dynamics.root, state[dynamics.jenkins] == STICK
+        drawn, holds = system.elongation / dynamics.root, state[dynamics.jenkins] == codes.STICK
         acts[u:][dynamics.jenkins][~holds] += drawn[~holds]
         free = dynamics.load + acts.T @ self.forces
         stretch = drawn[holds]
@@ -206,7 +196,7 @@ class Flow:
     @cached_property
     def named(self) -> np.ndarray:
         """The states (u,) without slips that constraints hold."""
-        return np.where(self.slips_held & (self.way != 0.0) & self.rubs, STICK, self.state)
+        return np.where(self.slips_held & (self.way != 0.0) & self.rubs, codes.STICK, self.state)
 
     def after(self, z: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
         """Return z (K,) after a duration, s, and the derivative (2N, 2N) of u then by u before."""
@@ -219,16 +209,18 @@ class Flow:
         It falls through zero at its event. The scale is inf for forces and slips that have none of their own.
         """
         dynamics, system, u = self.dynamics, self.dynamics.system, len(self.state)
-        if what in (CLOSES, OPENS):
-            return dynamics.gap[r] * (1.0 if what == CLOSES else -1.0), float(system.play[r])
-        if what == RECLOSES:
+        if what in (codes.CLOSES, codes.OPENS):
+            return dynamics.gap[r] * (1.0 if what == codes.CLOSES else -1.0), float(system.play[r])
+        if what == codes.RECLOSES:
             pushes = system.spring[r] * dynamics.gap[r] + system.dashpot[r] * dynamics.speed[r]
             return pushes, float(system.spring[r] * system.play[r])
-        if what == STOPS:
+        if what == codes.STOPS:
             return self.way[r] * dynamics.speed[u + r], np.inf
-        if what == PARTS:
+        if what == codes.PARTS:
             return self.forces[r], np.inf
-        room = system.friction[r] * self.forces[r] + (self.forces[u + r] if what == AT_LOW else -self.forces[u + r])
+        room = system.friction[r] * self.forces[r] + (
+            self.forces[u + r] if what == codes.AT_LOW else -self.forces[u + r]
+        )
         room[dynamics.one] += system.limit[r] / dynamics.size
         return room, float(system.limit[r]) or np.inf
 
@@ -238,14 +230,14 @@ class Flow:
         found: list[tuple[int, int]] = []
         for r, state in enumerate(self.state.tolist()):
             if r < self.dynamics.system.contacts:
-                if state == OPEN:
-                    found.append((r, int(CLOSES)))
-                elif state not in (TOUCHING, LEAVING):
-                    found.append((r, int(PARTS)))
-            if state == STICK and self.rubs[r]:
-                found += [(r, int(AT_LOW)), (r, int(AT_HIGH))]
+                if state == codes.OPEN:
+                    found.append((r, int(codes.CLOSES)))
+                elif state not in (codes.TOUCHING, codes.LEAVING):
+                    found.append((r, int(codes.PARTS)))
+            if state == codes.STICK and self.rubs[r]:
+                found += [(r, int(codes.AT_LOW)), (r, int(codes.AT_HIGH))]
             elif self.way[r] != 0.0 and self.rubs[r] and not self.slips_held[r]:
-                found.append((r, int(STOPS)))
+                found.append((r, int(codes.STOPS)))
         return found
 
     @cached_property
@@ -269,39 +261,9 @@ class Flow:
         Relative to its scale, where the margin turns inside the segment by more than round-off; inf without any.
         """
         watched = [k for k, each in enumerate(self.possible) if each != event]
-        functionals, X = self._margins[watched], self.X
         step = min(self.dynamics.system.period / _LOOKS, 2 * np.pi / _TURN / (self._fastest or 1.0))
-        steps = min(max(int(np.ceil(duration / step)), 2), _POINTS)
-        if duration <= 0.0 or not watched:
-            return np.inf, -1, 0
-        step = duration / steps
-        power, motion = expm(X * step), np.empty((steps + 1, len(X)))
-        motion[0] = z
-        for i in range(steps):
-            motion[i + 1] = power @ motion[i]
-        slopes = functionals @ X
-        value, slope = functionals @ motion.T, slopes @ motion.T
-        noise = 1e-9 * np.abs(slopes) @ np.abs(motion).max(axis=0)
-        side = np.where(np.abs(slope) > noise[:, None], np.sign(slope), 0.0)
-        for i in range(1, steps):
-            side[:, i] = np.where(side[:, i] == 0.0, side[:, i - 1], side[:, i])
-        which, cell = np.nonzero((side[:, :-1] < 0.0) & (side[:, 1:] > 0.0))
-        if not len(which):
-            return np.inf, -1, 0
-        # where the slope's chord vanishes, for a choice; then Newton's method on the motion itself
-        one, other = np.minimum(slope[which, cell], 0.0), slope[which, cell + 1]
-        ahead = one / (one - other)
-        best = int(np.argmin(value[which, cell] + 0.5 * one * ahead * step))
-        row, at, low, high = int(which[best]), float(ahead[best] * step), 0.0, step
-        for _ in range(8):
-            now = expm(X * at) @ motion[cell[best]]
-            tilt, bend = float(slopes[row] @ now), float(slopes[row] @ X @ now)
-            low, high = (at, high) if tilt < 0.0 else (low, at)
-            move = at - tilt / bend if bend > 0.0 else low
-            if abs(move - at) <= 1e-12 * step:
-                break
-            at = move if low < move < high else 0.5 * (low + high)
-        return max(float(functionals[row] @ now), 0.0), *self.possible[watched[row]]
+        least, row = least_minimum(self.X, self._margins[watched], z, duration, step)
+        return (max(least, 0.0), *self.possible[watched[row]]) if row >= 0 else (np.inf, -1, 0)
 
 
 def _projector(rows: np.ndarray) -> np.ndarray:

@@ -4,35 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.numerics.codes import (
-    AT_HIGH,
-    AT_LOW,
-    CLOSED,
-    CLOSES,
-    HELD,
-    LEAVING,
-    OPEN,
-    OPENS,
-    PARTS,
-    RECLOSES,
-    SLIP_LEFT,
-    SLIP_RIGHT,
-    SPRUNG,
-    STICK,
-    STOPS,
-    TOUCHING,
-)
+from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import CASING, FLOOR, SURFACES, System
 
 #: which of two units carries a redundant force is no event
-_ALIKE = {int(HELD): int(STICK), int(TOUCHING): int(CLOSED)}
+_ALIKE = {int(codes.HELD): int(codes.STICK), int(codes.TOUCHING): int(codes.CLOSED)}
 #: what could happen at a unit, for event functions that stay above zero
 _COULD = {
-    int(CLOSES): "impact", int(PARTS): "leaves", int(STOPS): "sticks", int(AT_LOW): "slips", int(AT_HIGH): "slips",
-    int(OPENS): "leaves", int(RECLOSES): "presses",
+    int(codes.CLOSES): "impact", int(codes.PARTS): "leaves", int(codes.STOPS): "sticks", int(codes.AT_LOW): "slips",
+    int(codes.AT_HIGH): "slips", int(codes.OPENS): "leaves", int(codes.RECLOSES): "presses",
 }  # fmt: skip
-_WAYS = {int(SLIP_LEFT): " left", int(SLIP_RIGHT): " right"}
+_WAYS = {int(codes.SLIP_LEFT): " left", int(codes.SLIP_RIGHT): " right"}
 
 
 class EventNames:
@@ -62,12 +45,12 @@ class EventNames:
 
     def possible(self, r: int, what: int) -> str:
         """Return the name of an event that did not happen at unit r, by the meaning of its function."""
-        turns = what == STOPS and not self._contact[r]
+        turns = what == codes.STOPS and not self._contact[r]
         return f"{'turns' if turns else _COULD[int(what)]} {self.names[r]}"
 
     def event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
         """Return the name of an event from the states (u,) of the units before and after it and those hit (m,)."""
-        hits = {r for r in hit.tolist() if not (self._slides[r] and _alike(old[r]) == CLOSED)}
+        hits = {r for r in hit.tolist() if not (self._slides[r] and _alike(old[r]) == codes.CLOSED)}
         parts = [f"impact {self.names[r]}" for r in sorted(hits)]
         for r in self._order[(old != new)[self._order]].tolist():
             change = self._change(_alike(old[r]), _alike(new[r]), bool(self._rubs[r]), bool(self._contact[r]))
@@ -80,15 +63,15 @@ class EventNames:
     def _change(old: int, new: int, rubs: bool, contact: bool) -> str:
         if old == new:
             return ""
-        if contact and new in (OPEN, LEAVING):
-            return "leaves" if new == OPEN else "lags"
-        if contact and old in (OPEN, LEAVING):
-            return "presses" if old == LEAVING else "impact" if new == SPRUNG else "rests"
-        if not rubs or new not in (STICK, SLIP_LEFT, SLIP_RIGHT):
+        if contact and new in (codes.OPEN, codes.LEAVING):
+            return "leaves" if new == codes.OPEN else "lags"
+        if contact and old in (codes.OPEN, codes.LEAVING):
+            return "presses" if old == codes.LEAVING else "impact" if new == codes.SPRUNG else "rests"
+        if not rubs or new not in (codes.STICK, codes.SLIP_LEFT, codes.SLIP_RIGHT):
             return ""
-        if new == STICK:
+        if new == codes.STICK:
             return "sticks"
-        return "turns" if old in (SLIP_LEFT, SLIP_RIGHT) else "slips"
+        return "turns" if old in (codes.SLIP_LEFT, codes.SLIP_RIGHT) else "slips"
 
 
 def _alike(state: int) -> int:

@@ -6,10 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from vanedamp.coupling.response.restart import state_at
+from vanedamp.coupling.response.restart import at_speed_of, state_at
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -18,13 +20,18 @@ from vanedamp.files.toml_input import InputError
 class Frame:
     """A scene's system, and its states (k,).
 
+    speed: of rotation whose modes those of the states are, rad/s; None: the scene's own. A reduced model's modes turn
+    with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
     to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; rates of sliders of Jenkins elements are none
     of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
     state; longest: (j,) m, elongations at their bounds.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, speed: float | None = None) -> None:
         self.scene, self.system = scene, assemble(scene)
+        self._turn = np.eye(self.system.modes)  # from modes of the states to the scene's own
+        if speed is not None and isinstance(scene.structure, Rom):
+            self._turn = modal_transfer(scene.structure, speed, scene.speed)
         self.extended = np.flatnonzero(self.system.tilt >= 0)
         size, sliders = len(self.system.mass), len(self.system.tangential)
         self.drawn = self.system.body[len(self.system.body) - sliders :]
@@ -48,9 +55,10 @@ class Frame:
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) of a restart state."""
+        restart, back = at_speed_of(self.scene, restart), np.linalg.inv(self._turn)
         out_of_line = (restart.lift, restart.lift_velocity, restart.tilt, restart.tilt_rate)
         return np.concatenate([
-            restart.displacement, restart.velocity, restart.slip, restart.slip_velocity,
+            back @ restart.displacement, back @ restart.velocity, restart.slip, restart.slip_velocity,
             *(part[self.extended] for part in out_of_line), restart.elongation[self.drawn],
         ])  # fmt: skip
 
@@ -60,7 +68,8 @@ class Frame:
         parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more, more]))
         whole, elongation = np.zeros((4, b if self.system.in_plane else 0)), np.zeros(self.system.dampers)
         whole[:, self.extended], elongation[self.drawn] = parts[4:8], parts[8]
-        return RestartState(*map(frozen, (*parts[:4], elongation, self.system.travels, *whole)))
+        structure = (self._turn @ part for part in parts[:2])
+        return RestartState(*map(frozen, (*structure, *parts[2:4], elongation, self.system.travels, *whole)))
 
     def _glued(self) -> tuple[np.ndarray, np.ndarray]:
         """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors; its sag (n,).

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
 from vanedamp.coupling.scene.elements.registry import meets_body
 from vanedamp.coupling.scene.scene import Time

@@ -22,8 +22,8 @@ _PLASTIC = 1e-9
 _GAIN = 1e-12
 #: share of its bound by which friction is short of it where a contact sticks; of a slip that is round-off
 _EDGE, _ROUND_OFF = 1e-9, 1e-13
-#: share of the largest impulse, and of the fastest speed, that is round-off; slips that count as none
-_NOTHING, _SLOW = 1e-12, 1e-11
+#: slips that count as none, as a share of the fastest speed
+_SLOW = 1e-11
 #: steps of the differences that find the slope of a restitution, as shares of the speed, and how well they agree
 _STEPS, _SMOOTH = (1e-2, 5e-3), 1e-8
 
@@ -177,15 +177,3 @@ def _restitution(system: System, units: np.ndarray, approach: np.ndarray) -> tup
     if np.any(np.abs(slopes[0] - slopes[1]) > _SMOOTH):
         raise Untrusted
     return now, slopes[1] / np.where(approach == 0.0, 1.0, approach)
-
-
-def stopped(system: System, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
-    """Return the projector (N, N), in the mass metric, of speeds onto those that a completed chatter has left (N,).
-
-    shut: (u,) the closed contacts, whose rows at rest count; speed: the fastest, m/s.
-    """
-    u, root = len(system.rest), np.sqrt(system.mass)
-    rests = np.abs(system.J @ after) <= _NOTHING * speed
-    rows = system.J[np.r_[shut & rests[:u], shut & rests[u:] & (system.friction > 0.0)]] / root
-    held = np.linalg.pinv(rows, rcond=DEPENDENT) @ rows
-    return np.eye(len(after)) - held * root / root[:, None]

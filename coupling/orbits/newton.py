@@ -18,7 +18,8 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
-from vanedamp.coupling.orbits.passage import Passage, PassageStatus, PeriodMap
+from vanedamp.coupling.orbits.passage import Passage, PassageStatus
+from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
 #: scaled length of a Newton step after which the orbit is known to round-off, because its square is

@@ -18,8 +18,7 @@ from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.newton import Orbit
-from vanedamp.coupling.orbits.passage import PeriodMap
-from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table

@@ -1,4 +1,4 @@
-"""The contract of a period map: a state at the start of an excitation period goes to the state some periods later.
+"""What a period map returns: a state at the start of an excitation period goes to the state some periods later.
 
 States are physical: modal coordinates of the structure and their rates, then those of the bodies relative to their
 cavities, in the order of RestartState, without the coordinates that a body does not have.
@@ -7,12 +7,9 @@ cavities, in the order of RestartState, without the coordinates that a body does
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
-
-from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.scene import Scene
 
 
 class PassageStatus(StrEnum):
@@ -65,47 +62,3 @@ class Passage(NamedTuple):
     def sequence(self) -> tuple[str, ...]:
         """Names of the events in order."""
         return tuple(crossing.name for crossing in self.crossings)
-
-
-class PeriodMap(Protocol):
-    """A period map of a scene."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene with the map's parameter at its value."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names (k,) of the coordinates, such as "mode 0", "mode 0 rate", "body 0 slip"."""
-
-    @property
-    def scale(self) -> np.ndarray:
-        """Typical sizes (k,), by which coordinates are divided before they are compared."""
-
-    @property
-    def periods(self) -> int:
-        """Excitation periods that the map passes."""
-
-    def __call__(self, state: np.ndarray) -> Passage:
-        """Return the passage that begins with a state (k,)."""
-
-    def at(self, value: float) -> PeriodMap:
-        """Return the map of the same scene with its parameter (any dotted key of it) set to a value.
-
-        Raises InputError for a value that makes it no scene.
-        """
-
-    def over(self, periods: int) -> PeriodMap:
-        """Return the map of the same scene over another number of periods."""
-
-    def state_of(self, restart: RestartState) -> np.ndarray:
-        """Return the state (k,) that a run has left."""
-
-    def restart_of(self, state: np.ndarray) -> RestartState:
-        """Return the state with which a run of the scene begins as the passage does."""
-
-    def linear_orbit(self) -> np.ndarray:
-        """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors."""
-
-    def mirrored(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry."""

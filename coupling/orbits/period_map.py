@@ -1,4 +1,4 @@
-"""The period map of a scene (orbits.passage.PeriodMap)."""
+"""The period map of a scene: a state at the start of an excitation period goes to the state some periods later."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.dynamics import Dynamics
 from vanedamp.coupling.orbits.event_names import EventNames
 from vanedamp.coupling.orbits.frame import Frame
-from vanedamp.coupling.orbits.passage import Passage, PassageStatus, PeriodMap
-from vanedamp.coupling.orbits.speed_map import SpeedMap
+from vanedamp.coupling.orbits.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.walk import PassageWalk
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import EventRun
@@ -24,26 +23,29 @@ from vanedamp.files.toml_input import InputError
 
 
 @dataclass(frozen=True, eq=False)
-class SceneMap:
-    """The period map of a scene.
+class PeriodMap:
+    """The period map of a scene, over excitation periods.
 
-    parameter: dotted path in the scene; scale: (k,) sizes of the coordinates, the same along a branch.
+    scene: with the map's parameter (a dotted path in it) at its value; scale: (k,) typical sizes of the coordinates,
+    the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
+    of states are, rad/s; None: the scene's own.
     """
 
     scene: Scene
     parameter: str
     periods: int
     scale: np.ndarray
+    speed: float | None = None
     #: the last run, whose subsystems the next one shares
     _earlier: list[EventRun] = field(default_factory=list, init=False)
 
     @cached_property
     def _frame(self) -> Frame:
-        return Frame(self.scene)
+        return Frame(self.scene, self.speed)
 
     @cached_property
     def _dynamics(self) -> Dynamics:
-        return Dynamics(self._frame.system, np.abs(self._frame.from_state) @ self.scale)
+        return Dynamics(self._frame, self.scale)
 
     @cached_property
     def _event_names(self) -> EventNames:
@@ -51,7 +53,7 @@ class SceneMap:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names (k,) of the coordinates."""
+        """Names (k,) of the coordinates, such as "mode 0", "mode 0 rate", "body 0 slip"."""
         return self._frame.names
 
     def __call__(self, state: np.ndarray) -> Passage:
@@ -63,19 +65,16 @@ class SceneMap:
 
     def _walk(self, state: np.ndarray, periods: int) -> tuple[Passage, np.ndarray | None]:
         """Return a passage from a state (k,), and the state half a period after the start."""
-        walk = PassageWalk(
-            self._frame, self._dynamics, self._event_names, self.restart_of(state), self.scale, periods,
-            *self._earlier,
-        )  # fmt: skip
+        walk = PassageWalk(self._frame, self._dynamics, self._event_names, state, periods, *self._earlier)
         passage = walk.passage()
         self._earlier[:] = [walk.run]
         return passage, walk.half_way
 
-    def at(self, value: float) -> SceneMap:
+    def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
         return replace(self, scene=self.scene.replace({self.parameter: value}))
 
-    def over(self, periods: int) -> SceneMap:
+    def over(self, periods: int) -> PeriodMap:
         """Return the map of the same scene over another number of periods."""
         return replace(self, periods=periods)
 
@@ -117,6 +116,5 @@ def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: i
         )
     chosen = choose(scene).scene
     check_waveform(chosen, "exact")
-    made = SceneMap(chosen, parameter, periods, Frame(chosen).sizes())
     turns = parameter in SPEEDS and isinstance(chosen.structure, Rom)
-    return SpeedMap(made, chosen.speed) if turns else made
+    return PeriodMap(chosen, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None)

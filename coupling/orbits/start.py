@@ -9,7 +9,6 @@ from vanedamp.coupling.orbits.dynamics import Dynamics, Flow, presses
 from vanedamp.coupling.orbits.frame import Frame
 from vanedamp.coupling.orbits.jump import impact
 from vanedamp.coupling.orbits.passage import PassageStatus
-from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import Event, Segment
 from vanedamp.coupling.system.system import FLOOR
 
@@ -20,11 +19,10 @@ _NEAR = 1e-9
 
 
 class Start:
-    """A state that a passage is to begin with, of a system of these dynamics."""
+    """A state (k,) that a passage is to begin with, of a system of these dynamics."""
 
-    def __init__(self, frame: Frame, dynamics: Dynamics, start: RestartState) -> None:
-        self.frame, self.dynamics, self.system = frame, dynamics, frame.system
-        self._given = frame.state_of(start)
+    def __init__(self, frame: Frame, dynamics: Dynamics, state: np.ndarray) -> None:
+        self.frame, self.dynamics, self.system, self._given = frame, dynamics, frame.system, state
 
     def closed(self, segment: Segment) -> np.ndarray:
         """Return whether contacts (u,) are closed as a segment begins, with or without force."""
@@ -40,8 +38,7 @@ class Start:
         event: at time zero. Raises Untrusted (orbits.jump).
         """
         dynamics, status = self.dynamics, PassageStatus.OK
-        from_state = dynamics.unit[:, None] * self.frame.from_state
-        given, M = from_state @ self._given, from_state @ self._clipped(segment)
+        given, M = dynamics.from_state @ self._given, dynamics.from_state @ self._clipped(segment)
         n = self.system.modes
         if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n]):
             status = PassageStatus.GRAZING  # the structure would begin beyond a stop
@@ -72,7 +69,8 @@ class Start:
         if len(pushed):
             # gaps of bodies that were pushed and are closed now stay closed
             gap = system.J[: len(system.rest)] @ self.frame.from_state[: len(system.mass)]
-            shut = self.closed(segment) & np.any(gap[:, slips[pushed]] != 0.0, axis=1)
+            shut = np.abs(system.rest + system.J[: len(gap)] @ segment.q) <= _SHUT * system.play
+            shut &= np.any(gap[:, slips[pushed]] != 0.0, axis=1) & (np.arange(len(gap)) < system.contacts)
             follow = -np.linalg.pinv(gap[np.ix_(shut, slips[pushed])]) @ gap[shut]
             follow[:, slips[pushed]] = 0.0
             kept[slips[pushed]] = follow

@@ -164,8 +164,8 @@ class _Run(Iterator[int]):
                 self.rotation -= 0.5 * (_square(state.velocity) - _square(self.state.velocity))
         else:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
+        solver: Any = self.scene.solver
         scene, system = self.scene, self.system
-        solver: Any = scene.solver
         records, left = new_records(system, 1, 0, deflected=self.deflected), solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)

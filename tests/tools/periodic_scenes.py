@@ -21,8 +21,8 @@ import numpy as np
 from tests.tools.planar_laws import crowd, jenkins, tables
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_scene
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.orbits.passage import PassageStatus, PeriodMap
-from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate

@@ -85,26 +85,28 @@ def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution:
 
 def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.ndarray) -> list[int]:
     """Return the states (u,) that projected Gauss-Seidel sweeps arrive at, to begin with (Jean 1999)."""
-    system, u, impulse = free.system, free.u, np.zeros(2 * free.u)
-    mobility, speed = system.delassus, system.J @ v
-    speed[:u] += rebound
+    system, u = free.system, free.u
+    rows = [row for r in closed for row in ((r, u + r) if free.rubs[r] else (r,))]
+    mobility = system.delassus[np.ix_(rows, rows)].tolist()
+    speed = (system.J[rows] @ v + np.r_[rebound, np.zeros(u)][rows]).tolist()
+    impulse, bound = [0.0] * len(rows), 0.0
     for _ in range(_SWEEPS):
-        before = impulse.copy()
-        for r in closed:
-            bound = np.inf
-            for row in (r, u + r) if free.rubs[r] else (r,):
-                low = 0.0 if row < u else -bound
-                change = min(max(impulse[row] - speed[row] / mobility[row, row], low), bound) - impulse[row]
-                impulse[row] += change
-                speed += mobility[:, row] * change
-                bound = system.friction[r] * impulse[r]
-        if np.abs(impulse - before).max() <= _CONVERGED * np.abs(impulse).max():
+        largest = 0.0
+        for i, row in enumerate(rows):
+            low, high = (0.0, np.inf) if row < u else (-bound, bound)
+            change = min(max(impulse[i] - speed[i] / mobility[i][i], low), high) - impulse[i]
+            impulse[i] += change
+            speed = [value + response * change for value, response in zip(speed, mobility[i], strict=True)]
+            bound = system.friction[row % u] * impulse[i]
+            largest = max(largest, abs(change))
+        if largest <= _CONVERGED * max(map(abs, impulse), default=0.0):
             break
-    state = [OPEN] * u
+    state, found = [OPEN] * u, dict(zip(rows, impulse, strict=True))
     for r in closed:
-        if impulse[r] > 0.0:
-            slips = not free.rubs[r] or abs(impulse[u + r]) >= (1 - _NEARLY) * system.friction[r] * impulse[r]
-            state[r] = STICK if not slips else LEFT if impulse[u + r] > 0.0 else RIGHT
+        push, drag = found[r], found.get(u + r, 0.0)
+        if push > 0.0:
+            slips = not free.rubs[r] or abs(drag) >= (1 - _NEARLY) * system.friction[r] * push
+            state[r] = STICK if not slips else LEFT if drag > 0.0 else RIGHT
     return state
 
 

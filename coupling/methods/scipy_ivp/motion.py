@@ -2,7 +2,7 @@
 
 Between two events every unit keeps its state, and all is linear in the extended state (z, 1, cos, sin) of the
 excitation's harmonics. z = (q, v, d, s) holds coordinates and velocities, and again the gaps of the units and the
-speeds of all rows: what is zero at an event is zero to the last bit, and a gap grows from there with all its digits.
+speeds of all rows. What is zero at an event is then zero to the last bit, and a gap grows from there with all digits.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ ROUND_OFF = 1e-11
 _DEPENDENT = 1e-9
 #: fraction of a row's motion by which forces may fail to hold it
 _LOST = 1e-7
-#: gaps below these fractions of the play, and of the terms that they are sums of, are closed: of sliders and stops, and
-#: of bodies with extent, whose corners are to meet a surface together
+#: gaps below these fractions of the play, and of the terms that they are sums of, are closed; the second ones are those
+#: of rigid bodies with extent, whose corners are to meet a surface together
 _TOUCH, _TOUCH_EXTENDED = (0.0, 2e-14), (1e-11, 10 * ROUND_OFF)
 
 States = tuple[int, ...]
@@ -75,7 +75,7 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
-        self.extends = self.contact & ~system.without_body  # whether a unit is of a body with extent
+        self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a body with extent
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
         near, self._relative = np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T
         self._near = near * np.where(self.contact, system.play, 0.0)
@@ -198,9 +198,9 @@ class Motion:
         self._sizes = np.abs(self.guard)
 
     def judge(self, now: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, list[Wrong]]:
-        """Return orders (k,) of the event functions at an extended state (extent,), and which turn negative at once.
+        """Return the orders (k,) of the event functions at an extended state, and what turns negative at once.
 
-        sizes: (extent,) of the state's terms, whose round-off is no value.
+        now: (extent,) the state; sizes: (extent,) of its terms, whose round-off is no value.
         """
         order, open_, wrong = np.full(len(self.guard), NEVER), np.ones(len(self.guard), bool), []
         for level in range(_LEVELS):

@@ -64,40 +64,33 @@ class Recorder:
     # -- integrals
 
     def _set_products(self) -> None:
-        """Set up the integrals' rates as sums (count, products) of products of two functionals each.
+        """Set up the integrals' rates: sums (count, products) of products of two functionals each.
 
-        The functionals are the extended state, and `functionals` below it: some that stay, those of `of_motion` last.
+        These are the extended state, and below it `constant` and what else `functionals` returns.
         """
         free, system, n, u = self.free, self.system, self.free.n, self.free.u
         drag, momentum = np.zeros((n, free.extent)), np.zeros((1, free.extent))
         drag[:, free.v] = system.damping
         momentum[0, free.n + system.along] = system.mass[system.along]
-        self.constant = np.concatenate(
-            [free.load, drag, free.speed[u:], free.speed[self.soft], self.watched[:1], momentum]
-        )
-        k = len(self.soft)
-        load, drag_, slip, approach, x, p, friction, push, dashpot = np.split(
+        soft, k = self.soft, len(self.soft)
+        self.constant = np.concatenate([free.load, drag, free.speed[u:], free.speed[soft], self.watched[:1], momentum])
+        force, pull, slip, approach, x, p, friction, push, dashpot = np.split(
             free.extent + np.arange(2 * n + 2 * u + 3 * k + 2), np.cumsum([n, n, u, k, 1, 1, u, k])
         )
-        v, cos, sin = np.arange(n, 2 * n), free.cosine.start, free.sine.start
-        terms = [  # integral, sign, factors
-            (_EXCITATION, 1, load, v), (_VISCOUS, 1, drag_, v), (_FRICTION, -1, friction, slip),
-            (_CONTACT, 1, dashpot, approach), (_SQUARE, 1, x, x), (_COS, 1, x, [cos]), (_SIN, 1, x, [sin]),
-            (_MOMENTUM_COS, 1, p, [cos]), (_MOMENTUM_SIN, 1, p, [sin]),
+        v, cos, sin, one = np.arange(n, 2 * n), free.cosine.start, free.sine.start, free.one
+        yields = _COUNT + 3 * np.arange(k)
+        terms = [  # integrals, sign, factors
+            (_EXCITATION, 1, force, v), (_VISCOUS, 1, pull, v), (_FRICTION, -1, friction, slip),
+            (_CONTACT, 1, dashpot, approach), (_SQUARE, 1, x, x), (_COS, 1, x, cos), (_SIN, 1, x, sin),
+            (_MOMENTUM_COS, 1, p, cos), (_MOMENTUM_SIN, 1, p, sin), (yields, 1, push, one),
+            (yields + 1, 1, friction[soft], one), (yields + 2, 1, dashpot, approach),
+            (yields + 2, -1, friction[soft], slip[soft]),
         ]  # fmt: skip
-        for i, r in enumerate(self.soft):
-            at, one = _COUNT + 3 * i, [free.one]
-            terms += [
-                (at, 1, [push[i]], one),
-                (at + 1, 1, [friction[r]], one),
-                (at + 2, 1, [dashpot[i]], [approach[i]]),
-            ]
-            terms += [(at + 2, -1, [friction[r]], [slip[r]])]
+        columns = [np.broadcast_arrays(left, of, sign, right) for of, sign, left, right in terms]
+        self.left, of, sign, self.right = (np.concatenate(column) for column in zip(*columns, strict=True))
         self.count = _COUNT + 3 * k
-        self.left, self.right = (np.concatenate([term[i] for term in terms]).astype(int) for i in (2, 3))
-        rows = np.repeat([term[0] for term in terms], [len(term[2]) for term in terms])
-        self.sum = np.zeros((self.count, len(rows)))
-        self.sum[rows, np.arange(len(rows))] = np.repeat([term[1] for term in terms], [len(term[2]) for term in terms])
+        self.sum = np.zeros((self.count, len(of)))
+        self.sum[of, np.arange(len(of))] = sign
 
     def functionals(self, motion: Motion) -> np.ndarray:
         """Return the functionals (., extent) whose products the rates of the integrals are, in a motion."""

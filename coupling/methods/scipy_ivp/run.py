@@ -53,6 +53,8 @@ _STILL = 1e-11
 #: flights shorter than this fraction of a period, and all that follow them, are the end of a chatter; of elastic
 #: contacts, the part of it that a flight must last
 _CHATTER, _ELASTIC = 3e-7, 0.1
+#: a contact that parts by so many times the speed that the loads give the contacts in such a flight does not end one
+_FAST = 100.0
 #: motions that are kept, by the states of the units
 _KEPT = 256
 
@@ -205,7 +207,7 @@ class IvpRun:
         chosen = self._motion(closed, touch, slow)
         if chosen is None:
             # no forces can hold what slips: impulses stop it (Painleve's paradox)
-            step = self._short_step(v, closed)
+            step = impact(free, self._ahead(v, closed), closed.tolist(), np.zeros(free.u))
             if step is None:
                 return False
             self._jump(v, Impact(step.impulse, v + free.respond @ step.impulse, step.state))
@@ -263,14 +265,18 @@ class IvpRun:
 
     def _catch(self, v: np.ndarray, closed: np.ndarray, slow: float) -> None:
         """Stop contacts that part for a flight shorter than _CHATTER: all that push in a step of that length."""
-        step = self._short_step(v, closed)
-        if step is not None and np.any((step.impulse[: self.free.u] > 0.0) & (self.free.normal @ v > slow)):
-            self._stop(v, step)
+        normal, ahead = self.free.normal, self._ahead(v, closed)
+        leaving = normal[closed] @ v
+        leaving = leaving[leaving > slow]
+        if leaving.min(initial=np.inf) < _FAST * np.abs(normal @ (ahead - v)).max(initial=0.0):
+            step = impact(self.free, ahead, closed.tolist(), np.zeros(self.free.u))
+            if step is not None and np.any((step.impulse[: self.free.u] > 0.0) & (normal @ v > slow)):
+                self._stop(v, step)
 
-    def _short_step(self, v: np.ndarray, closed: np.ndarray) -> Impact | None:
-        """Return the impulses of a step of Moreau's scheme, without restitution, of half a flight.
+    def _ahead(self, v: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """Return the velocities (N,) after half of a flight by the loads, without impulses of closed contacts.
 
-        That takes _CHATTER with those that follow: a chatter takes 1/(1 - k) times its next flight.
+        With those that follow it the flight takes _CHATTER: a chatter takes 1/(1 - k) times its next flight.
         """
         free, system = self.free, self.system
         z = self.y[: free.size].copy()
@@ -285,10 +291,8 @@ class IvpRun:
         leaving = closed[free.normal[closed] @ v > 0.0]
         rebounds = restitutions_at(system, leaving, free.normal[leaving] @ v)
         last = np.maximum(1.0 - rebounds, _ELASTIC).min(initial=1.0)
-        ahead = v + 0.5 * last * _CHATTER * system.period * (accelerations + free.respond @ forces)
-        if np.all(free.normal[closed] @ ahead >= 0.0):
-            return Impact(np.zeros(2 * free.u), ahead, np.zeros(free.u, int))
-        return impact(free, ahead, closed.tolist(), np.zeros(free.u))
+        ahead: np.ndarray = v + 0.5 * last * _CHATTER * system.period * (accelerations + free.respond @ forces)
+        return ahead
 
     def _stop(self, v: np.ndarray, step: Impact) -> None:
         """Stop, in place, the contacts that push in a step, and the slips of those that stick."""
