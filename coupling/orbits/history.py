@@ -10,6 +10,7 @@ import numpy as np
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
+from vanedamp.coupling.scene.elements.registry import meets_body
 from vanedamp.coupling.scene.scene import Time
 from vanedamp.files.store import frozen
 
@@ -68,7 +69,7 @@ def _history(time: np.ndarray, displacement: np.ndarray, slip: np.ndarray, event
     return OrbitHistory(
         time=frozen(time), displacement=frozen(displacement), velocity=frozen(_rate(time, displacement, moments)),
         slip=frozen(slip), slip_velocity=frozen(_rate(time, slip, moments)), impact_time=frozen(moments),
-        impact_body=frozen([-1 if event.side == "stop" else event.damper for event in impacts], int),
+        impact_body=frozen([event.damper if meets_body(event.side) else -1 for event in impacts], int),
     )  # fmt: skip
 
 
