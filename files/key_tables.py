@@ -79,10 +79,10 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         told = _distinguishing(one, found)
         heading = brackets.format(path) + "".join(f' {key} = "{value}"' for key, value in told.items())
         others = one.get("additionalProperties")
-        own = isinstance(others, dict) and not _own_tables(schema, others)
-        if "properties" in one or own:
-            free = (_key(schema, NAME, {"description": text} | others, False),) if own else ()
-            said = "" if own else one.get("description", text)
+        own = others if isinstance(others, dict) and not _own_tables(schema, others) else None
+        if "properties" in one or own is not None:
+            free = () if own is None else (_key(schema, NAME, {"description": text} | own, False),)
+            said = one.get("description", text) if own is None else ""
             yield Table(path, heading, "".join(told.values()), said, _keys(schema, one, told) + free)
         yield from _inner(schema, one, path, text)
 
@@ -144,10 +144,10 @@ def _list(schema: Schema, node: Schema) -> str:
     if "prefixItems" in node:
         items = [" or ".join(_value(schema, one) for one in options(schema, item)) for item in node["prefixItems"]]
         return f"[{', '.join(items)}]"
-    items = dict.fromkeys(_value(schema, one) for one in options(schema, node.get("items", {})))
+    each = dict.fromkeys(_value(schema, one) for one in options(schema, node.get("items", {})))
     least, most = node.get("minItems", 0), node.get("maxItems")
     count = f" ({least}{'' if most == least else f' to {most}' if most else ' or more'})" if least > 1 or most else ""
-    return f"list{count} of {' or '.join(items)}"
+    return f"list{count} of {' or '.join(each)}"
 
 
 def _range(node: Schema) -> str:

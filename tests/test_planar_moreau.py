@@ -1,4 +1,4 @@
-"""Time stepping of bodies with extent: converges to the exact engine, shares sliders with methods.moreau."""
+"""Time stepping of planar bodies: converges to the exact engine, shares sliders with methods.moreau."""
 
 from typing import Literal
 
