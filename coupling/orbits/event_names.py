@@ -6,7 +6,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, System
+from vanedamp.coupling.system.system import CASING, FLOOR, SURFACES, System
 
 #: which of two units carries a redundant force is no event
 _ALIKE = {int(codes.HELD): int(codes.STICK), int(codes.TOUCHING): int(codes.CLOSED)}
@@ -25,14 +25,14 @@ class EventNames:
         self._contact = np.arange(len(system.rest)) < system.contacts
         self._rubs = (system.friction > 0.0) | ~self._contact
         #: whether the unit belongs to a body that only slides, or to none
-        self._slides = np.r_[system.tilt, -1][np.where(system.surface >= STOP, system.bodies, system.body)] < 0
+        self._slides = np.r_[system.tilt, -1][np.where(system.without_body, system.bodies, system.body)] < 0
         # of bodies that only slide, floors and friction dampers come first
         first = np.lexsort((np.where(self._contact, 0, system.body), system.surface == CASING, self._contact))
         self._order = first if self._slides.all() else np.arange(len(system.rest))
         self.names = []
         for r in range(len(system.rest)):
             body, surface, corner = int(system.body[r]), int(system.surface[r]), int(system.corner[r])
-            if surface in (STOP, CASING):
+            if system.without_body[r]:
                 self.names.append(f"{SURFACES[surface]}.{body}")
             elif surface == FLOOR and not self._contact[r]:
                 self.names.append(str(body))
