@@ -280,3 +280,10 @@ def test_shrouds_are_named_rightly(tmp_path):
     rigid = tethered().to_dict() | {"shroud": [{"at": "one", "to": "two", "gap": GAP}]}
     with pytest.raises(InputError, match=r"shroud\[0\].to: interface labels are a reduced model's"):
         validate(Scene, rigid, "scene")
+
+
+@pytest.mark.parametrize("engine", ["line", "plane"])
+def test_a_passage_names_its_impacts_by_the_element(engine, tmp_path):
+    mapped = period_map(shrouds(tmp_path, **(PLANE if engine == "plane" else {})))
+    passage = mapped(np.zeros(len(mapped.scale)))
+    assert passage.sequence[0] == "impact shroud.0"

@@ -295,6 +295,17 @@ def test_a_body_pressed_on_its_wall_falls_back_on_it():
         assert errors[1] < max(0.1 * errors[0], 1e-5), j
 
 
+def test_a_body_that_would_begin_in_its_wall_begins_beside_it():
+    """As far as it is in it does not matter, and the wall's own motion takes it along."""
+    mapped = period_map(scene(**BASE), FREQUENCY)
+    state = np.array([0.3, 0.1, 0.45 + 0.02, 0.2])
+    beside = mapped(np.r_[state[:2], 0.45, state[3]])
+    passage = mapped(state)
+    assert passage.sequence == beside.sequence and np.abs(passage.state - beside.state).max() < 1e-13
+    assert np.abs(passage.derivative[:, 2]).max() == 0.0
+    assert differences(mapped, state, passage) < 1e-6
+
+
 def two_cavities(**structure):
     return scene(
         structure=structure, excitation={"frequency": 0.2} | ({} if "mass" not in structure else {"force": 2.0}),

@@ -448,6 +448,16 @@ def test_clearance_of_an_impact_that_nearly_happens(share):
     assert distance == pytest.approx(share / (2 * (1 + share)), rel=1e-6)
 
 
+def test_a_disc_that_has_come_to_rest_on_its_floor_has_no_derivative_of_its_lift():
+    """Its last flight, slow beside the structure, ends in rest: what motions beside this one have of it is lost."""
+    body = DISC | {"friction": 0.0, "restitution": 0.003, "lift": 0.1}
+    found, _, z = frame_of(shaken(0.9, 0.3, 0.8, {"law": "newton"}, body))
+    passage = found(start_of(found, z))
+    assert passage.status is PassageStatus.OK and any("rests c1.floor.0" in name for name in passage.sequence)
+    rows = [found.names.index(f"body 0 lift{rate}") for rate in ("", " rate")]
+    assert np.abs(passage.derivative[rows]).max() < 1e-12 * np.abs(passage.derivative).max()
+
+
 def test_a_passage_that_begins_as_a_body_begins_to_slip_is_grazing():
     """A neighbour that slips the other way comes to rest first: both sides have derivatives of their own."""
     found, x = random_start(19, "newton")

@@ -22,6 +22,8 @@ from vanedamp.coupling.response.segment import Event, Segment
 #: largest difference of the engine's motion and that of the own flows, relative to a coordinate's size, and that size
 #: where it hardly moves, relative to its typical one
 _AGREEMENT, _LEAST = 1e-8, 1e-4
+#: difference of a speed after an impact and its law's, relative to the fastest there
+_LAW = 1e-9
 #: speed that an engine has taken from a row by no impulse, relative to the fastest, beyond round-off
 _CAUGHT = 1e-11
 #: largest motion of rows at rest by the derivative, relative to its terms
@@ -129,8 +131,7 @@ class Derivative:
             return np.full((len(final), len(final)), np.nan)
         if time - self._last[0] <= _SIMULTANEOUS * self.system.period:
             self.worsen(PassageStatus.COINCIDENT)  # an event at the very end
-        derivative: np.ndarray = dynamics.to_state @ before.M / self._scale
-        return derivative
+        return np.asarray(dynamics.to_state @ before.M / self._scale)
 
     def _agrees(self, predicted: np.ndarray, found: np.ndarray) -> bool:
         """Return whether two states u (2N,) are one."""
@@ -185,6 +186,10 @@ class Derivative:
         jump = Jump(u_before[rates] / root, np.eye(len(root)))
         if event.impulse.any():
             jump = impact(system, jump.v, event, before.segment.speed)
+            missed = np.abs(system.J[event.struck] @ jump.v - event.after)[np.isinf(system.spring[event.struck])]
+            fastest = np.abs(np.r_[event.before, event.after]).max()
+            if np.any(missed > _LAW * fastest + _ROUND_OFF * before.segment.speed):
+                raise Untrusted
         derivative = follow @ (root[:, None] * jump.derivative / root)
         known = len(np.unique(event.struck)) == len(event.struck)
         known = known and self._agrees(at(follow @ (root * jump.v)), at(left))
@@ -281,9 +286,8 @@ class Derivative:
         """Raise Untrusted if the derivative moves what is at rest now."""
         dynamics, u = self.dynamics, len(new.state)
         rigid = np.isinf(self.system.spring) & presses(new.state) & (np.arange(u) < self.system.contacts)
-        stuck = dynamics.flow(new.state, new.open_force).stuck
-        speed, k = dynamics.speed[:, : dynamics.one], dynamics.one
-        still = np.vstack([speed[:u][rigid], speed[u:][stuck], dynamics.gap[rigid, :k]])
+        stuck, k = dynamics.flow(new.state, new.open_force).stuck, dynamics.one
+        still = np.vstack([dynamics.speed[:u][rigid], dynamics.speed[u:][stuck], dynamics.gap[rigid]])[:, :k]
         self._reach = np.maximum(self._reach, np.abs(M).max(axis=1))
         if np.any(np.abs(still @ M).max(axis=1, initial=0.0) > _STILL * np.abs(still) @ self._reach):
             raise Untrusted

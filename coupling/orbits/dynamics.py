@@ -78,15 +78,11 @@ class Dynamics:
         self.scale, self.to_state = scale, frame.to_state / self.unit
         self.from_state = self.unit[:, None] * frame.from_state
         self.typical = np.r_[np.abs(self.from_state) @ scale, np.full(1 + 2 * e, self.size)]
-        #: coordinates (j,) of the sliders of Jenkins elements, and motions (j, N) of what draws them
+        #: units that are Jenkins elements, coordinates (j,) of their sliders, and motions (j, N) of what draws them
+        self.jenkins = slice(u - len(system.tangential), None)
         self.sliders = np.arange(size - len(system.tangential), size)
         self.drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
         self._flows: dict[bytes, Flow] = {}
-
-    @property
-    def jenkins(self) -> slice:
-        """The units that are Jenkins elements; their sliders are as many coordinates, the last ones."""
-        return slice(len(self.system.rest) - len(self.system.tangential), None)
 
     @cached_property
     def part(self) -> np.ndarray:
@@ -94,13 +90,11 @@ class Dynamics:
         system = self.system
         bound = np.vstack([system.J, system.elongation]) != 0.0
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T.astype(int) @ bound > 0)
-        labels: np.ndarray = connected_components(joined, directed=False)[1]
-        return labels
+        return np.asarray(connected_components(joined, directed=False)[1])
 
     def state(self, segment: Segment) -> np.ndarray:
         """Return u (2N,) at the start of a segment."""
-        state: np.ndarray = self.unit * np.concatenate([segment.q, segment.v])
-        return state
+        return np.asarray(self.unit * np.concatenate([segment.q, segment.v]))
 
     def extended(self, u: np.ndarray, time: float) -> np.ndarray:
         """Return z (K,) of a state u (2N,) at a time in the period, s."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -101,12 +102,13 @@ class Frame:
         system, (amplitude, sag) = self.system, self._glued()
         if not np.all(np.isfinite(amplitude)):
             raise InputError("excitation.frequency: at a resonance without damping no motion repeats; change it")
-        state = np.zeros(len(self.to_state))
-        lying = self.restart_of(state).to_list()
-        lying[0] = (system.scale * (amplitude.sum(axis=0).real + sag)).tolist()
-        lying[1] = (system.scale * ((1j * system.frequency) @ amplitude).real).tolist()
-        lying[2] = [damper.position for damper in self.scene.damper]
-        return self.state_of(RestartState.from_list(lying))
+        parts = {
+            "displacement": system.scale * (amplitude.sum(axis=0).real + sag),
+            "velocity": system.scale * ((1j * system.frequency) @ amplitude).real,
+            "slip": [damper.position for damper in self.scene.damper],
+        }
+        still = self.restart_of(np.zeros(len(self.to_state)))
+        return self.state_of(replace(still, **{name: frozen(part) for name, part in parts.items()}))
 
     def sizes(self) -> np.ndarray:
         """Return sizes (k,) of the coordinates: linear response, plays, tilts that take them, and these times omega."""

@@ -80,14 +80,9 @@ def impact(system: System, v: np.ndarray, event: Event, speed: float) -> Jump:
 
 
 def _expand(
-    system: System,
-    pressed: Jump,
-    roles: _Roles,
-    given: np.ndarray,
-    steep: np.ndarray,
-    impulse: np.ndarray,
+    system: System, pressed: Jump, roles: _Roles, given: np.ndarray, steep: np.ndarray, impulse: np.ndarray,
     speed: float,
-) -> Jump:
+) -> Jump:  # fmt: skip
     """Return the jump of an expansion with given normal impulses (u,), their derivatives (u, N), and what is more.
 
     impulse: (2u,) of the expansion, as the engine has it; speed: the fastest of the scene, m/s.
@@ -99,9 +94,8 @@ def _expand(
     mobility = np.diag(system.delassus)[roles.hit]
     found, asked = impulse[roles.hit] * mobility, given[roles.hit] * mobility
     more = roles.hit[found - asked > _EDGE * found + _ROUND_OFF * speed]
-    return _blow(
-        system, begun, roles._replace(hit=more), np.zeros(len(more)), np.zeros((len(more), len(pressed.v)))
-    ).jump
+    none = np.zeros(len(more)), np.zeros((len(more), len(pressed.v)))
+    return _blow(system, begun, roles._replace(hit=more), *none).jump
 
 
 def _newton(

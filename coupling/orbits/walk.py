@@ -38,8 +38,7 @@ class PassageWalk:
         if earlier is not None:
             self.run.reuse(earlier)
         self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
-        self._crossings: list[Crossing] = []
-        self._clearance = (np.inf, "")
+        self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: np.ndarray | None = None
 
     def passage(self) -> Passage:
