@@ -19,7 +19,6 @@ from pydantic import Field
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse, start, time_grid
 from vanedamp.coupling.methods.step_problem import (
-    GAUSS_SEIDEL,
     couple_row,
     list_row,
     new_step_problem,
@@ -131,7 +130,7 @@ def march_moreau(system, times, motion, records, log, problem, inverse, turned, 
     return DONE
 
 
-@inlined
+@kernel
 def _impulses(system, motion, problem, turned, h, theta):
     """Set the impulses of a step and the velocities that they leave. Returns False if undecided.
 
@@ -150,7 +149,7 @@ def _impulses(system, motion, problem, turned, h, theta):
                 ahead = motion.gap[0, r] + 0.5 * h * motion.before[r]
                 closed[r] = 1.0 if ahead <= _ROUND_OFF * system.play[r] else 0.0
                 shut = shut or closed[r] > 0.0
-    fastest = _speeds(system, motion) if shut or problem.solver == GAUSS_SEIDEL else 0.0
+    fastest = _speeds(system, motion) if shut or problem.exact is None else 0.0
     motion.slowest[0] = _AT_REST * fastest
     if system.two_phases and shut and not _two_phases(system, motion, problem, turned, _TOLERANCE * fastest):
         return False
@@ -182,7 +181,7 @@ def _speeds(system, motion):
     return fastest
 
 
-@inlined
+@kernel
 def _push(system, motion, problem, count, turned):
     """Let the impulses of a problem act."""
     free = motion.coordinates[_FREE]
@@ -229,7 +228,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
     return True
 
 
-@inlined
+@kernel
 def _expand(system, problem, count, approach):
     """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
     box = problem.box
@@ -244,7 +243,7 @@ def _expand(system, problem, count, approach):
             box.low[a], box.high[a] = -bound, bound
 
 
-@inlined
+@kernel
 def _list_slip(system, problem, count, r, now, bound, had):
     """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
 
@@ -313,7 +312,7 @@ def _on_spring(h, theta, spring, dashpot, stretched, before, impulse, now):
     return now + begun / stiff + soft * impulse, soft
 
 
-@inlined
+@kernel
 def _rebound(system, motion, problem, count, turn, tolerance):
     """Find the impulses of a turn, in the plane with the largest factor of the coefficients that brings no energy.
 
@@ -333,7 +332,7 @@ def _rebound(system, motion, problem, count, turn, tolerance):
     return solve_rows(problem, count, low, tolerance)
 
 
-@inlined
+@kernel
 def _brings_energy(system, motion, problem, count, turn, share):
     """Whether the impulses of rigid contacts bring energy, by the speeds before and after the step's loads.
 
