@@ -34,7 +34,7 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
-from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import elongation, is_rigid, row_speed, rubs
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
@@ -68,8 +68,8 @@ class Options(SteppingOptions, PlanarOptions):
     theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
     """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
     contacts: Literal["exact", "gauss_seidel"] | None = None
-    """impulses of a step by pivots, "exact", or by projected Gauss-Seidel iteration, "gauss_seidel", to round-off
-    (default: "exact" for sliders, "gauss_seidel" for bodies in the plane)"""
+    """solver of the impulses of a step: "exact", by pivots, or "gauss_seidel", by projected iteration (default: "exact"
+    for sliders, "gauss_seidel" for bodies in the plane)"""
 
 
 def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
@@ -201,7 +201,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
     """
     u, box, approach = len(system.rest), problem.box, motion.rows[_APPROACH]
     for turn in range(_TURNS):
-        count, approaching = 0, False
+        count, approaching = ZERO, False
         for r in range(system.contacts):
             if motion.rows[_CLOSED, r] == 0.0:
                 continue
@@ -259,7 +259,7 @@ def _list_slip(system, problem, count, r, now, bound, had):
 @kernel
 def _list_rows(system, motion, problem, h, theta, turn):
     """Set up the problem of the rows that take part in a turn. Return their number."""
-    u, count, free, slowest = len(system.rest), 0, motion.coordinates[_FREE], motion.slowest[0]
+    u, count, free, slowest = len(system.rest), ZERO, motion.coordinates[_FREE], motion.slowest[0]
     first = u - len(system.tangential)
     for place in range(u):
         r = problem.order[place]
