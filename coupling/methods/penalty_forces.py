@@ -81,7 +81,7 @@ def contact_spring(reduced: float, restitution: float, step: float, options: Pen
     return spring, 2 * damping_ratio(restitution) * np.sqrt(spring * reduced)
 
 
-@kernel
+@inlined
 def set_forces(system, laws, motion, gap, drawn, rate, h):
     """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows, and their impulses.
 
@@ -123,7 +123,7 @@ def _put(motion, row, force, h):
     motion.force[row] = force
 
 
-@kernel
+@inlined
 def set_rows(system, motion, q, v):
     """Set gaps and speeds (motion.before) of the rows that may have forces, at coordinates q and velocities v.
 
@@ -150,7 +150,7 @@ def first_forces(system, times, motion, laws):
         motion.half[i] /= system.mass[i]
 
 
-@kernel
+@inlined
 def net_load(system, times, motion, q, v, k, load):
     """Set the sum (N,) of the forces on the coordinates at step k of the period."""
     for i in range(len(q)):
