@@ -311,8 +311,8 @@ def test_a_slip_that_stops_within_the_resolution_of_time(tmp_path):
     assert simulate(scene).status is Status.OK
 
 
-def test_steps_refuse_springs():
-    scene = planar_scene(springs(), DISC).replace({"solver": {"method": "moreau", "steps_per_period": 100}})
+def test_solve_ivp_refuses_springs():
+    scene = planar_scene(springs(), DISC).replace({"solver": {"method": "solve_ivp"}})
     with pytest.raises(InputError, match="two phases, is for"):
         simulate(scene)
 

@@ -19,7 +19,6 @@ from pydantic import Field
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse, start, time_grid
 from vanedamp.coupling.methods.step_problem import (
-    GAUSS_SEIDEL,
     couple_row,
     list_row,
     new_step_problem,
@@ -35,7 +34,7 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
-from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, inlined, kernel
 from vanedamp.coupling.planar.unit_kinematics import elongation, has_friction, is_rigid, row_speed
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
@@ -70,8 +69,8 @@ class Options(SteppingOptions, PlanarOptions):
     theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
     """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
     contacts: Literal["exact", "gauss_seidel"] | None = None
-    """impulses of a step by pivots, "exact", or by projected Gauss-Seidel iteration, "gauss_seidel", to round-off
-    (default: "exact" for sliders, "gauss_seidel" for bodies in the plane)"""
+    """solver of the impulses of a step: "exact", by pivots, or "gauss_seidel", by projected iteration (default: "exact"
+    for sliders, "gauss_seidel" for bodies in the plane)"""
 
 
 def begin(scene: Scene, system: System, records: Records, events: bool, begun: RestartState) -> Run:
@@ -132,7 +131,7 @@ def march_moreau(system, times, motion, records, log, problem, inverse, turned, 
     return DONE
 
 
-@inlined
+@kernel
 def _impulses(system, motion, problem, turned, h, theta):
     """Set the impulses of a step and the velocities that they leave. Returns False if undecided.
 
@@ -151,7 +150,7 @@ def _impulses(system, motion, problem, turned, h, theta):
                 ahead = motion.gap[0, r] + 0.5 * h * motion.before[r]
                 closed[r] = 1.0 if ahead <= _ROUND_OFF * system.play[r] else 0.0
                 shut = shut or closed[r] > 0.0
-    fastest = _speeds(system, motion) if shut or problem.solver == GAUSS_SEIDEL else 0.0
+    fastest = _speeds(system, motion) if shut or problem.exact is None else 0.0
     motion.slowest[0] = _AT_REST * fastest
     if system.two_phases and shut and not _two_phases(system, motion, problem, turned, _TOLERANCE * fastest):
         return False
@@ -183,7 +182,7 @@ def _speeds(system, motion):
     return fastest
 
 
-@inlined
+@kernel
 def _push(system, motion, problem, count, turned):
     """Let the impulses of a problem act."""
     free = motion.coordinates[_FREE]
@@ -203,7 +202,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
     """
     u, box, approach = len(system.rest), problem.box, motion.rows[_APPROACH]
     for turn in range(_TURNS):
-        count, approaching = 0, False
+        count, approaching = ZERO, False
         for r in range(system.contacts):
             if motion.rows[_CLOSED, r] == 0.0:
                 continue
@@ -230,7 +229,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
     return True
 
 
-@inlined
+@kernel
 def _expand(system, problem, count, approach):
     """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
     box = problem.box
@@ -245,7 +244,7 @@ def _expand(system, problem, count, approach):
             box.low[a], box.high[a] = -bound, bound
 
 
-@inlined
+@kernel
 def _list_slip(system, problem, count, r, now, bound, had):
     """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
 
@@ -261,7 +260,7 @@ def _list_slip(system, problem, count, r, now, bound, had):
 @kernel
 def _list_rows(system, motion, problem, h, theta, turn):
     """Set up the problem of the rows that take part in a turn. Return their number."""
-    u, count, free, slowest = len(system.rest), 0, motion.coordinates[_FREE], motion.slowest[0]
+    u, count, free, slowest = len(system.rest), ZERO, motion.coordinates[_FREE], motion.slowest[0]
     first = u - len(system.tangential)
     for place in range(u):
         r = problem.order[place]
@@ -314,7 +313,7 @@ def _on_spring(h, theta, spring, dashpot, stretched, before, impulse, now):
     return now + begun / stiff + soft * impulse, soft
 
 
-@inlined
+@kernel
 def _rebound(system, motion, problem, count, turn, tolerance):
     """Find the impulses of a turn, in the plane with the largest factor of the coefficients that brings no energy.
 
@@ -334,7 +333,7 @@ def _rebound(system, motion, problem, count, turn, tolerance):
     return solve_rows(problem, count, low, tolerance)
 
 
-@inlined
+@kernel
 def _brings_energy(system, motion, problem, count, turn, share):
     """Whether the impulses of rigid contacts bring energy, by the speeds before and after the step's loads.
 

@@ -25,7 +25,7 @@ from vanedamp.coupling.methods.step_records import (
     set_gaps,
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
-from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, kernel
 from vanedamp.coupling.planar.unit_kinematics import elongation, gap, has_friction, row_speed
 from vanedamp.coupling.system.system import System
 
@@ -102,7 +102,7 @@ def march_newmark(
 @kernel
 def _list_rows(system, problem, laws, h, ahead, fast, beta, gamma):
     """Set up the problem of the rows that may carry force. Return their number."""
-    count, u, first = 0, len(system.rest), len(system.rest) - len(system.tangential)
+    count, u, first = ZERO, len(system.rest), len(system.rest) - len(system.tangential)
     for place in range(u):
         r = problem.order[place]
         low, high, normal = -system.limit[r], system.limit[r], -1

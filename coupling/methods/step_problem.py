@@ -2,9 +2,9 @@
 
 The speeds A f + b of the rows and their forces (or impulses) f obey the conditions of numerics.complementarity. The
 force of another row may widen the bounds: low - mu f_N <= f <= high + mu f_N, Coulomb's law where f_N is the force of
-the contact's normal. Without such rows, pivots solve the problem (BOX); with them, Lemke's method does (LEMKE, Glocker
-and Pfeiffer 1996). Projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998) solves both, one force after the
-other, and shares nothing with them.
+the contact's normal. Without such rows, pivots solve the problem; with them, Lemke's method does (Glocker and Pfeiffer
+1996). Projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998) solves both, one force after the other, and
+shares nothing with them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from vanedamp.coupling.numerics.complementarity import Problem, new_problem, sol
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke, solve_lemke
 from vanedamp.coupling.system.system import System
 
-BOX, LEMKE, GAUSS_SEIDEL = range(3)
 #: sweeps that an iteration may take
 _SWEEPS = 100_000
 
@@ -29,7 +28,7 @@ _SWEEPS = 100_000
 class StepProblem(NamedTuple):
     """A problem of up to k rows of the units (u,), with the space to solve it."""
 
-    solver: int  # BOX, LEMKE or GAUSS_SEIDEL
+    exact: bool | None  # None: by iteration; the compiler leaves the others out
     order: np.ndarray  # (u,) int: units in the order in which they enter
     mobility: np.ndarray  # (2u, 2u) of all rows
     row: np.ndarray  # (k,) int: the rows that take part
@@ -38,25 +37,25 @@ class StepProblem(NamedTuple):
     friction: np.ndarray  # (k,) mu
     normal: np.ndarray  # (k,) int: place of the row of f_N
     box: Problem
-    lemke: Lemke
+    lemke: Lemke | None  # None: no row widens the bounds of another, or by iteration
     place: np.ndarray  # (k,) int, scratch: first unknown of each row
     weight: np.ndarray  # (k,) scratch: size of its force, of size one in Lemke's method
 
 
 def new_step_problem(system: System, mobility: np.ndarray, exact: bool = True) -> StepProblem:
     """Return room for the problem of all units of a system. mobility: (2u, 2u) of the rows."""
-    u, k, coupled = len(system.rest), len(mobility), bool(system.friction[: system.contacts].any())
+    u, k, coupled = len(system.rest), len(mobility), exact and bool(system.friction[: system.contacts].any())
     elements, contacts = np.arange(system.contacts, u), np.arange(system.contacts)
     return StepProblem(
-        solver=(LEMKE if coupled else BOX) if exact else GAUSS_SEIDEL,
+        exact=exact or None,
         order=np.concatenate([elements, contacts] if exact else [contacts, elements]), mobility=mobility,
         row=np.zeros(k, np.int64), now=np.zeros(k), asked=np.zeros(k), friction=np.zeros(k),
-        normal=np.zeros(k, np.int64), box=new_problem(k), lemke=new_lemke(2 * k if exact and coupled else 0),
+        normal=np.zeros(k, np.int64), box=new_problem(k), lemke=new_lemke(2 * k) if coupled else None,
         place=np.zeros(k, np.int64), weight=np.zeros(k),
     )  # fmt: skip
 
 
-@inlined
+@kernel
 def list_row(problem, count, row, now, low, high, soft):
     """Enter a row as number `count`: its speed without forces, bounds of its force, compliance of its own."""
     box = problem.box
@@ -87,11 +86,17 @@ def solve_rows(problem, count, share, tolerance):
         box.force[0] = min(max(-box.b[0] / box.matrix[0, 0], box.low[0]), box.high[0])
         box.acceleration[0] = box.b[0] + box.matrix[0, 0] * box.force[0]
         return True
-    if problem.solver == BOX:
-        return solve_box(box, count, 0.0)
-    if problem.solver == LEMKE:
-        return _solve_lemke(problem, count)
-    return _iterate(problem, count, tolerance)
+    return _solve(problem, problem.exact, problem.lemke, count, tolerance)
+
+
+@kernel
+def _solve(problem, exact, lemke, count, tolerance):
+    """Solve the problem of several rows in the way that there is room for."""
+    if exact is None:
+        return _iterate(problem, count, tolerance)
+    if lemke is None:
+        return solve_box(problem.box, count, 0.0)
+    return _solve_lemke(problem, lemke, count)
 
 
 @kernel
@@ -120,13 +125,13 @@ def _iterate(problem, count, tolerance):
 
 
 @kernel
-def _solve_lemke(problem, count):
+def _solve_lemke(problem, lemke, count):
     """Solve the problem by Lemke's method, with one unknown for a normal and two for a row of two bounds.
 
     A normal has its force above the least. A row of two bounds has its force above the lower one, complementary to its
     speed to the right, and its speed to the left, complementary to the distance from the upper bound.
     """
-    box, lemke, size, scale = problem.box, problem.lemke, 0, 0.0
+    box, size, scale = problem.box, 0, 0.0
     for a in range(count):
         root = math.sqrt(box.matrix[a, a])
         problem.place[a], problem.weight[a] = size, 1.0 / root

@@ -114,7 +114,7 @@ def _response(system, times, k, q, v):
     return x, rate
 
 
-@inlined
+@kernel
 def _account(system, times, motion, records, k, deepest):
     """Account for step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
     h, p, q, v = times.step, motion.counters[PERIOD], motion.start[0], motion.start[1]
@@ -201,7 +201,7 @@ def _stands(system, motion, b):
     return False
 
 
-@inlined
+@kernel
 def _follow_contacts(system, times, motion, records, log, k):
     """Count contacts that begin to carry force, and log those that have ended, as planar.impacts.log_event does."""
     u, p = len(system.rest), motion.counters[PERIOD]
