@@ -46,7 +46,7 @@ _SHORTEST = 1e-26
 #: fraction of a period without events in which events happen at once: impacts are the end of a collapse; fraction of a
 #: period for which gaps of sliders are known beyond the round-off of places, after a collision
 _AT_ONCE, _FRESH = 1e-13, 1e-9
-#: gaps below this fraction of the play are closed at the start; those above this one are taken from the coordinates again
+#: gaps below this fraction of the play are closed at the start; above this one they are taken from the coordinates
 _TOUCHING, _FAR = 1e-12, 1e-6
 #: speeds below this fraction of the run's largest are none
 _STILL = 1e-11
