@@ -77,8 +77,6 @@ class Unforced:
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
         self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a body with extent
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
-        near, self._relative = np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T
-        self._near = near * np.where(self.contact, system.play, 0.0)
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the states z (size, ...) at times t (...) with 1, cos and sin below them."""
@@ -92,7 +90,9 @@ class Unforced:
 
     def touch(self, q: np.ndarray) -> np.ndarray:
         """Return the gaps (u,) below which contacts are closed, m. q: (N,) sizes of the coordinates."""
-        return np.maximum(self._near, self._relative * (self.system.rest + np.abs(self.normal) @ q))
+        terms = np.stack([np.where(self.contact, self.system.play, 0.0), self.system.rest + np.abs(self.normal) @ q])
+        touch: np.ndarray = (np.where(self.extends[:, None], _TOUCH_EXTENDED, _TOUCH).T * terms).max(axis=0)
+        return touch
 
     def ways_of_slider(self, r: int, now: np.ndarray, sizes: np.ndarray, speed: float, slow: float) -> list[int]:
         """Return the states that a Jenkins element (unit r) may have: its slider moves with its spring at its bound.

@@ -46,8 +46,8 @@ _SHORTEST = 1e-26
 #: fraction of a period without events in which events happen at once: impacts are the end of a collapse; fraction of a
 #: period for which gaps of sliders are known beyond the round-off of places, after a collision
 _AT_ONCE, _FRESH = 1e-13, 1e-9
-#: gaps above this fraction of the play are taken from the coordinates again
-_FAR = 1e-6
+#: gaps below this fraction of the play are closed at the start; above this one they are taken from the coordinates
+_TOUCHING, _FAR = 1e-12, 1e-6
 #: speeds below this fraction of the run's largest are none
 _STILL = 1e-11
 #: flights shorter than this fraction of a period, and all that follow them, are the end of a chatter; of elastic
@@ -68,8 +68,9 @@ class IvpRun:
         self.system, self.options, self.steps = system, options, options.steps_per_period
         self.free = free = Unforced(system)
         self.record = record = Recorder(free, records, self.steps, events)
-        zeros = np.zeros(2 * free.u + record.count)
-        self.y = np.concatenate([initial.q, initial.v, free.gaps(initial.q), zeros])
+        gaps, zeros = free.gaps(initial.q), np.zeros(2 * free.u + record.count)
+        gaps[np.abs(gaps) <= _TOUCHING * system.play] = 0.0
+        self.y = np.concatenate([initial.q, initial.v, gaps, zeros])
         self.sizes = record.sizes()
         self.absolute = options.rtol * self.sizes
         self.time, self.step = 0.0, system.period / self.steps
@@ -187,7 +188,9 @@ class IvpRun:
         self.fastest = max(self.fastest, float((np.abs(system.J) @ np.abs(v)).max(initial=0.0)))
         slow, gaps = _STILL * self.fastest, free.gaps(q)
         fresh = self.time - self.struck < _FRESH * system.period
-        touch = np.where(fresh & ~free.extends, 0.0, free.touch(self.sizes[free.q]))
+        # a contact of sliders that has been struck, or opens, is no part of another's impact
+        apart = free.rigid & ~free.extends & (fresh | (free.normal @ v > slow))
+        touch = np.where(apart, 0.0, free.touch(self.sizes[free.q]))
         d = self.y[free.d] = np.where(gaps > _FAR * system.play, gaps, self.y[free.d])
         closed = np.flatnonzero(free.rigid & ((self.state != OPEN) | (d <= touch)))
         self._bring(q, free.normal[closed], gaps[closed])
