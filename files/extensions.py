@@ -73,7 +73,7 @@ class Registry(NamedTuple):
     """Where parts of one kind come from that are loaded one by one, as they are wanted.
 
     kind        in words, for messages
-    parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and those registered
+    parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and others
     group       of entry points, whose names are those of the parts
     attributes  that a part must have
     """
