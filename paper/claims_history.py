@@ -46,7 +46,7 @@ def fig13(reduced: Response, rigid: Response, alike: Response) -> list[Claim]:
     return [
         claim(
             "At the damped peak impacts come unevenly, and the response does not repeat.",
-            f"{reduced.classification}; {reduced.impacts_per_period:.2f} impacts a period, their impulses vary by "
+            f"{reduced.classification}; {reduced.impacts_per_period:.2f} impacts per period, their impulses vary by "
             f"{mine['impulse']:.0%} and the times between them by {mine['interval']:.0%} (standard deviation over "
             f"mean), the peaks of the periods by {mine['peak']:.2%}",
             verdict(reduced.classification == "non-periodic"),

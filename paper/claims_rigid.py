@@ -162,7 +162,7 @@ def mistuning(curves: Curves, half_gaps: list[float], restitution: float) -> lis
     return [
         claim(
             "Impacts attach the bodies' mass to the structure and mistune it.",
-            f"{len(errors)} points with two impacts a period: the structure feels {spread} times the body's mass; "
+            f"{len(errors)} points with two impacts per period: the structure feels {spread} times the body's mass; "
             f"distance from the closed form {middle:.1%} in the median, {worst:.1%} at most",
             verdict(middle < 0.015 and worst < 0.05, worst < 0.1),
             "The closed form is that of a body without mass and friction; this one has 2 % of the structure's. It "

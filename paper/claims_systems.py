@@ -71,7 +71,7 @@ def _particles(curves: Curves, multi: float) -> Claim:
     return claim(
         "A cavity filled with small bodies damps, too.",
         f"32 bodies in a row: top of the smoothed mean {top:.3f}, highest mean {peak}, "
-        f"{curve.impacts[peak.index]:.1f} impacts a period there; four bodies {multi:.3f}",
+        f"{curve.impacts[peak.index]:.1f} impacts per period there; four bodies {multi:.3f}",
         verdict(peak.height < 0.6, peak.height < 0.9),
         "A row is not a bed of particles: it has neither a second direction nor friction between the bodies.",
         {"particles": top, "particles_highest": peak.height, "multi_body": multi},

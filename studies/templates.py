@@ -37,7 +37,7 @@ and scale = 1e-3 where it is in millimetres. The names below are those of its gr
 _INTERFACE_NOTE = "The response, and the force."
 _CAVITY_NOTE = """\
 The floor of the cavity, as the bodies feel it: `floor` of [[cavity]] in a scene. Its direction is that from the left
-wall to the right one. For bodies with extent: facets = ["c1_left", "c1_right", "c1_floor", "c1_roof"], kind = "cavity",
+wall to the right one. For planar bodies: facets = ["c1_left", "c1_right", "c1_floor", "c1_roof"], kind = "cavity",
 direction = "c1_left", normal = "c1_floor"."""
 
 

@@ -46,7 +46,7 @@ class _Lines:
             return
         self.said = now
         rate = (done - self.before) / (now - self.started)
-        left = f", {rate:.3g} a second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
+        left = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
         print(f"vanedamp: {self.title}: {done} of {total}{left}", file=sys.stderr, flush=True)
 
 

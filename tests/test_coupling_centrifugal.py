@@ -370,7 +370,7 @@ def test_what_is_left_out_is_warned_of_where_it_shows():
     assert f"{crossing:.2g} of it" in warnings(
         {"friction": 0.3}, cavity={"gap": 4e-4}, excitation={"engine_order": 20.0}
     )
-    outboard = {"gap": 4e-4, "play": 1e-4, "centrifugal_deg": 180.0}  # of a body with extent: the ceiling presses it
+    outboard = {"gap": 4e-4, "play": 1e-4, "centrifugal_deg": 180.0}  # of a planar body: the ceiling presses it
     assert f"{crossing:.2g} of it" in warnings(
         DISC | {"friction": 0.3}, cavity=outboard, excitation={"engine_order": 20.0}
     )

@@ -33,7 +33,7 @@ BISTABLE = {
 
 
 def one_to_one(ratio):
-    """Amplitude of the regime with two symmetric impacts a period (Theurich and Krack; code of tobiaswdm/CC)."""
+    """Amplitude of the regime with two symmetric impacts per period (Theurich and Krack; code of tobiaswdm/CC)."""
 
     def force(xi):
         theta = (1 + np.sqrt((1 + RHO**2) * xi**2 - RHO**2)) / (1 + RHO**2)

@@ -38,9 +38,8 @@ def by_ivp(scene, **solver):
     return simulate(scene.replace({"solver": {"method": "solve_ivp", "rtol": RTOL} | solver}), events=True)
 
 
-def impacts(response):
+def impacts(response, fastest):
     """The impacts but for the ends of chatters, and the time of the first collapse."""
-    fastest = max((abs(event.relative_velocity_before) for event in response.event_list), default=0.0)
     found, last = [], {}
     for event in response.event_list:
         if event.kind != "impact":
@@ -82,7 +81,9 @@ def check(scene, factor=1e3):
     assert ours.penetration < 1e-9
     period, growth = 1 / scene.excitation.frequency, 1.0
     runs = exact, near, ours, by_ivp(scene, rtol=10 * RTOL)
-    (expected, end), (parted, _), (found, our_end), (rough, _) = (impacts(run) for run in runs)
+    # of one run: chaos may bring another one a faster impact
+    fastest = max((abs(event.relative_velocity_before) for event in exact.event_list), default=0.0)
+    (expected, end), (parted, _), (found, our_end), (rough, _) = (impacts(run, fastest) for run in runs)
     for k in count():
         if k >= min(len(expected), len(parted), len(rough)) or who(expected[k]) != who(parted[k]):
             break

@@ -43,7 +43,7 @@ def test_runs_end_where_closed_forms_have_them(basin):
     for at, ratio in enumerate(RATIOS):
         states, label = found.states[at], found.label[:, at]
         floats = [state for state in states if state.impacts_per_period == 0]
-        (hits,) = (state for state in states if state.motion == "periodic-1, 2 impacts a period")
+        (hits,) = (state for state in states if state.motion == "periodic-1, 2 impacts per period")
         # the closed form has one harmonic of the structure
         assert hits.amplitude_mean == pytest.approx(one_to_one(ratio), rel=6e-3)
         for speed, row in zip(VELOCITIES, label, strict=True):
@@ -114,7 +114,7 @@ def test_report_shows_basins_and_how_many_states_there_are(basin, tmp_path):
     panels = [trace for trace in found["basins-0"] if trace["type"] == "heatmap"]
     legend = [trace["name"] for trace in found["basins-0"] if trace["type"] == "scatter"]
     assert len(panels) == len(RATIOS)
-    assert legend[0] == "periodic-1, 2 impacts a period"
+    assert legend[0] == "periodic-1, 2 impacts per period"
     for at, trace in enumerate(panels):
         drawn = np.reshape(trace["z"], (len(VELOCITIES), len(POSITIONS)))
         for name, number in zip(legend, range(1, 10), strict=False):

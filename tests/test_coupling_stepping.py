@@ -38,7 +38,7 @@ def by(scene, **solver):
 
 @pytest.fixture(scope="module")
 def periodic():
-    """Two impacts a period from the first period on."""
+    """Two impacts per period from the first period on."""
     scene = made(
         {"structure": STRUCTURE, "excitation": {"frequency": 1.0, "resonance_amplitude": 1.0},
          "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 1.0}],
@@ -275,7 +275,7 @@ def test_a_missed_impact_is_flagged():
 
 
 def test_without_completion_chatter_spends_the_budget(chatter):
-    """Some 20 impacts a period with completion, twice as many without: the budget lies between."""
+    """Some 20 impacts per period with completion, twice as many without: the budget lies between."""
     completed, followed = (
         simulate(by(chatter, method="solve_ivp", complete_chatter=complete, max_events=240, rtol=1e-7))
         for complete in (True, False)

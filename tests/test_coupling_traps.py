@@ -646,7 +646,7 @@ def test_chatters_of_a_set_end_together_by_pushes():
 
 
 def test_four_bodies_that_chatter_at_once_stay_within_their_budget(tmp_path):
-    """Each impact of one wakes those that rest: chatters within chatters, thousands of impacts a period."""
+    """Each impact of one wakes those that rest: chatters within chatters, thousands of impacts per period."""
     random_reduced(37).save(tmp_path / "rom.h5")
     data = random_scene(37, "rom", 4).replace(
         {"structure.file": str(tmp_path / "rom.h5"), "time.periods": 20, "time.transient": 0,

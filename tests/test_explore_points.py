@@ -315,7 +315,7 @@ def test_curve_is_that_of_the_chosen_values(grid):
     np.testing.assert_allclose(figure["damped, mean of peaks"].x, np.linspace(2380.0, 2430.0, 6))
     np.testing.assert_allclose(figure["damped, mean of peaks"].y, 1e6 * grid.amplitude_mean[1, :, 0])
     for name, kept, peak in (
-        ("undamped", grid.amplitude_undamped, grid.peaks["undamped_peak"]),
+        ("without bodies", grid.amplitude_undamped, grid.peaks["undamped_peak"]),
         ("bodies fixed", grid.amplitude_fixed, grid.peaks["fixed_peak"]),
     ):
         points = np.isin(figure[name].x, grid.axes["excitation.frequency"])

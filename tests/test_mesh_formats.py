@@ -365,7 +365,7 @@ def test_other_spellings_are_the_same_mesh(forks, tmp_path, ending, changes):
             "inp",
             "*Heading",
             "*Include, input=other.inp",
-            "line 1: *INCLUDE INPUT=other.inp: no such file beside the deck",
+            "line 1: *INCLUDE INPUT=other.inp: no such file in the deck's folder",
         ),
         ("inp", "*Heading", "*Include, input=tetra.inp", "line 1: *INCLUDE INPUT=tetra.inp: the file includes itself"),
         ("inp", "*Heading", "*Part, name=a", "*PART is not closed by *END PART: the file is cut short"),

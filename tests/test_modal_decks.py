@@ -200,7 +200,7 @@ def test_grid_points_of_nastran_are_in_global_coordinates(cards, expected, tmp_p
         ([*grids(CORNERS), "RBE2,9,1,123,2,3"], "line 6: RBE2 joins or stiffens grid points"),
         ([*grids(CORNERS), "CBAR,9,1,1,2,0.,0.,1.", "PBAR,1,1,2.,3."], "line 6: CBAR joins or stiffens grid points"),
         ([*grids(CORNERS), "CONM2,9,1,,5."], "line 6: CONM2 adds mass"),
-        ([*grids(CORNERS), "INCLUDE 'more.bdf'"], "line 6: INCLUDE more.bdf: no such file beside the deck"),
+        ([*grids(CORNERS), "INCLUDE 'more.bdf'"], "line 6: INCLUDE more.bdf: no such file in the deck's folder"),
     ],
 )
 def test_what_would_change_a_nastran_mesh_is_refused(cards, told, tmp_path):

@@ -85,7 +85,7 @@ def test_a_tenth_of_the_gap_doubles_its_period():
 
 @pytest.mark.slow
 def test_a_body_in_the_middle_of_the_reference_gap_is_touched_where_its_reach_ends():
-    """A body in the middle is out of reach up to half an undamped amplitude; two impacts a period are not stable."""
+    """A body in the middle is out of reach up to half an undamped amplitude; two impacts per period are not stable."""
     branch, found = places("grazing", 1.0, 0.995, 0.9975, position=0.0)
     assert branch.amplitude_mean[-1] / AMPLITUDE == pytest.approx(0.5, abs=1e-4)
     # |1 - r^2 + 2 i D r| is twice that of the resonance

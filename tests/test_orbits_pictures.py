@@ -20,7 +20,7 @@ from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
 from vanedamp.studies.report.sweep_beside import points_beside
 
-#: beside the resonance, where the motion with two impacts a period is symmetric
+#: beside the resonance, where the motion with two impacts per period is symmetric
 FREQUENCY = 1.01 / (2 * np.pi)
 HITTING = BISTABLE | {
     "excitation": {"frequency": FREQUENCY, "force": 1.0},
@@ -85,7 +85,7 @@ def test_runs_beside_branches_are_those_of_the_same_scene(hitting):
 
 @pytest.fixture(scope="module")
 def followed(hitting):
-    """The branch of two impacts a period from beside the resonance towards it, beyond its loss of symmetry."""
+    """The branch of two impacts per period from beside the resonance towards it, beyond its loss of symmetry."""
     scene, _ = hitting
     table = {"from": FREQUENCY, "to": 1.004 / (2 * np.pi), "step": 0.02, "max_step": 0.05}
     return orbits(scene.replace({"orbit": table}))

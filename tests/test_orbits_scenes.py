@@ -21,7 +21,7 @@ STOP = {
     "time": {"periods": 400, "transient": 300},
     "orbit": {"parameter": "excitation.force", "from": 0.09, "to": 0.11, "step": 0.05},
 }
-#: the demonstration's structure with its narrowest gap: two impacts a period off the resonance
+#: the demonstration's structure with its narrowest gap: two impacts per period off the resonance
 BODY = {
     "structure": {"model": "rigid", "mass": 0.012, "stiffness": 0.012 * (200 * math.pi) ** 2, "damping_ratio": 0.0016},
     "excitation": {"frequency": 102.0, "resonance_amplitude": 1e-3},

@@ -190,7 +190,7 @@ def test_a_reduced_model_leaves_modes_and_bodies_open(tmp_path):
     }, "scene")  # fmt: skip
     chosen = choose(made)
     assert chosen.estimate["modes"] == chosen.scene.structure.modes
-    assert chosen.estimate["sentence"].endswith("bodies with extent count as sliders")
+    assert chosen.estimate["sentence"].endswith("planar bodies count as sliders")
     assert chosen.advice["persisting"] > 0 and chosen.advice["shape"] == "block"
     assert len(chosen.start.displacement) == chosen.estimate["modes"]
     assert abs(chosen.start.displacement).max() > 0

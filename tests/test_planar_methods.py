@@ -1,4 +1,4 @@
-"""Bodies with extent by every method that takes them: closed forms, orders, and agreement with the exact engine."""
+"""Planar bodies by every method that takes them: closed forms, orders, and agreement with the exact engine."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Time stepping of bodies with extent: converges to the exact engine, with both solvers of its contacts."""
+"""Time stepping of planar bodies: converges to the exact engine, with both solvers of its contacts."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The structure's side of bodies with extent: the motion of a cavity's surfaces, in planes of any direction."""
+"""The structure's side of planar bodies: the motion of a cavity's surfaces, in planes of any direction."""
 
 from dataclasses import replace
 
@@ -91,7 +91,7 @@ def test_surfaces_of_a_rigid_cavity(tmp_path, rotation, offset):
 
 
 def test_a_slider_meets_the_means(tmp_path):
-    """A slider has no height: its walls are where their motion is known, as they are without bodies with extent."""
+    """A slider has no height: its walls are where their motion is known, as they are without planar bodies."""
     file = rigid_cavity(tmp_path / "rom.h5")
     slider = {"cavity": "c1", "mass": 0.05, "stiffness": 10.0}
     scene = cavity_scene(file, FOUR, damper=[slider])

@@ -68,7 +68,9 @@ def test_help_lists_keys_units_and_defaults(record, kind):
         for key in table.keys:
             unit = f" [{key.unit}]" if key.unit else ""
             assert " ".join(f"{key.name}: {key.meaning}{unit}".split()) in text
-    assert "gap: total free travel of a body along the cavity [m]; number > 0; required" in text or kind != "scene"
+    if kind == "scene":
+        assert "from the left wall to the right one [m]; number > 0; required left: interface label" in text
+        assert "mass: mass of the body [kg]; number > 0; required friction: Coulomb coefficient" in text
 
 
 def test_register_takes_laws_and_waveforms_only():

@@ -28,7 +28,7 @@ TINY = Engine(
 
 @pytest.fixture(scope="module")
 def scene():
-    """Two impacts a period from the first period on."""
+    """Two impacts per period from the first period on."""
     settled = bench_scenes.settled(bench_scenes.one_mode(), TINY.settle)
     return settled.replace({"time.periods": PERIODS, "time.transient": 0})
 
@@ -91,7 +91,7 @@ def test_ledger_of_the_complete_loop_closes(case, exact):
 
 def test_more_modes_keep_the_first(tmp_path):
     """The reduced model of one mode is the rigid model."""
-    rom, rigid = bench_scenes.reduced(tmp_path, 1, "two impacts a period"), bench_scenes.one_mode()
+    rom, rigid = bench_scenes.reduced(tmp_path, 1, "two impacts per period"), bench_scenes.one_mode()
     ours, theirs = (simulate(scene.replace({"time.periods": 30})) for scene in (rom, rigid))
     np.testing.assert_allclose(ours.section, theirs.section, rtol=0, atol=1e-9 * bench_scenes.AMPLITUDE)
 

@@ -255,7 +255,7 @@ def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path, pictures):
     assert [claim.verdict for claim in claims[7:8]] == ["not shown"]  # several bodies are one
     blocks_picture(mine, others, "Blocks", tmp_path / "blocks.png")
     panels = pictures["blocks"]
-    assert all("maximum, %" in panel.y for panel in panels if "frequency" in panel.x and panel.y)
+    assert all("maximum without bodies, %" in panel.y for panel in panels if "frequency" in panel.x and panel.y)
     assert any("slider" in panel.curves for panel in panels)
 
 
@@ -282,7 +282,7 @@ def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path, p
 def test_map_of_fit_and_friction(tmp_path, pictures):
     found = study("fit", Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=430, transient=390)))
     *panels, bar = pictures["fit"]
-    assert {panel.x for panel in panels} == {"coefficient of friction"} and "maximum, %" in bar.y
+    assert {panel.x for panel in panels} == {"coefficient of friction"} and "maximum without bodies, %" in bar.y
     assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 5)
     least, most = (found.claims[0].figures[name] for name in ("least", "most"))
     assert 0 < least < most < 1

@@ -17,7 +17,7 @@ PERIODS, SAMPLES = 3, 10
 
 @pytest.fixture(scope="module")
 def periodic():
-    """Two impacts a period, and the exact samples."""
+    """Two impacts per period, and the exact samples."""
     scene = method_scenes.periodic(1000).replace({"time.periods": PERIODS, "time.transient": 0})
     exact = simulate(scene, samples_per_period=SAMPLES)
     return scene, np.column_stack([exact.displacement, exact.body_displacement])

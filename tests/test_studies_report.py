@@ -106,7 +106,7 @@ def test_curves_are_in_the_page(page, results):
             np.testing.assert_allclose(trace["x"], FREQUENCIES)
             np.testing.assert_allclose(trace["y"], getattr(record, measure)[point] / 1e-3)
     # gaps do not change the linear curves: drawn once
-    for title, measure in {"undamped": "amplitude_undamped", "bodies fixed": "amplitude_fixed"}.items():
+    for title, measure in {"without bodies": "amplitude_undamped", "bodies fixed": "amplitude_fixed"}.items():
         (trace,) = (t for t in traces if t["name"] == title)
         assert set(trace["meta"]["curves"]) == set(expected)
         at = np.searchsorted(trace["x"], FREQUENCIES)

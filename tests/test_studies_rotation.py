@@ -186,7 +186,7 @@ def test_study_of_the_blade(tmp_path, pictures):
     assert [claim.verdict for claim in claims] == ["shown"] * 4
     campbell_picture(found, "Blade", tmp_path / "blade.png")
     left, middle, right = pictures["blade"]
-    assert set(found.names) < set(left.curves) and {"speed, rpm"} == {left.x, right.x}
+    assert set(found.names[:4]) < set(left.curves) and {"speed, rpm"} == {left.x, right.x}
     assert len(middle.curves) >= 3 and "Southwell" in middle.title
     for name in study_of_blade.save(found, tmp_path):
         assert Campbell.load(tmp_path / name).crossings

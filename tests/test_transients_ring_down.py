@@ -282,7 +282,7 @@ def closed_form(amplitude, share):
 
 
 def impacting(share, damping, **tables):
-    """Half the gap and the fixed frequency are 1; the body begins near the motion of two impacts a period."""
+    """Half the gap and the fixed frequency are 1; the body begins near the motion of two impacts per period."""
     return scene(
         structure={"model": "rigid", "mass": 1 - share, "stiffness": 1.0, "damping": 2 * damping},
         cavity=[{"name": "c", "gap": 2.0}], gravity={"acceleration": 0.0},
@@ -467,7 +467,7 @@ def test_the_command_and_its_report(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(tomli_w.dumps(hit().to_dict()))
     assert main(["ringdown", "scene.toml", "-o", "rung.h5", "--json", "rung.json"]) == 0
-    assert "mode 0: 15.9155 Hz, damping ratio 0.002; bodies glued: 15.5319 Hz" in capsys.readouterr().out
+    assert "mode 0: 15.9155 Hz, damping ratio 0.002; bodies fixed: 15.5319 Hz" in capsys.readouterr().out
     result = json.loads((tmp_path / "rung.json").read_text())
     assert result["status"] == "ok" and result["half_cycles"].keys() >= {"amplitude_m", "frequency_hz"}
     assert result["cycles"].keys() >= {"amplitude_m", "damping_ratio", "damping_ratio_energy", "energy_loss_j"}
@@ -478,7 +478,7 @@ def test_the_command_and_its_report(tmp_path, monkeypatch, capsys):
     assert "after a hammer blow of 0.3 N s" in page
     (traces,) = charts(page).values()
     names = [trace.get("name") for trace in traces]
-    assert {"by decrement", "by energy", "mode without bodies", "mode bodies glued"} <= set(names)
+    assert {"by decrement", "by energy", "mode without bodies", "mode bodies fixed"} <= set(names)
 
 
 def test_the_report_of_a_motion_with_few_turning_points_or_none(tmp_path):

@@ -110,7 +110,7 @@ def body_scene(ratio: float, shape: str, periods: int, transient: int, **body: A
 
 
 def _text(point: Mapping[str, Any]) -> str:
-    return f"amplitude {point['amplitude']:.3f}, {point['impacts_per_period']:.2f} impacts a period"
+    return f"amplitude {point['amplitude']:.3f}, {point['impacts_per_period']:.2f} impacts per period"
 
 
 def _point(ratio: float, shape: str, effort: Bodies) -> dict[str, Any]:

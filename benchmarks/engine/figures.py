@@ -41,7 +41,7 @@ def one_mode_figure(result: Mapping[str, Any], path: Path) -> None:
         )
     axes.set_xlabel("CPU time per excitation period, µs")
     axes.set_ylabel(f"largest error of the state over {one['checked_periods']} periods, relative")
-    axes.set_title("one mode, one body, two impacts a period")
+    axes.set_title("one mode, one body, two impacts per period")
     draw_grid(axes)
     axes.legend(loc="center")
     save(figure, path, dpi=150)
@@ -68,7 +68,7 @@ def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
     middle.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     middle.yaxis.set_major_formatter("{x:g}")
     middle.set_xlabel("bodies, each in a cavity of its own")
-    middle.set_title("one mode, n bodies, 2n impacts a period")
+    middle.set_title("one mode, n bodies, 2n impacts per period")
     middle.legend(fontsize=9)
     for axes in (left, middle):
         axes.set_ylabel("CPU time per excitation period, µs")

@@ -31,7 +31,7 @@ _TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)
 #: the tolerance at which the engine is compared with solve_ivp
 _RTOL = 1e-9
 _COUNTS = (1, 2, 4, 8)
-_HARD = "two impacts a period"
+_HARD = "two impacts per period"
 #: about what a row takes for each of its rounds, s
 _ROW = 1.5
 #: frequencies and gaps, relative to those of the one-mode scene, that have few and many impacts and evaluations
@@ -90,7 +90,7 @@ class Engine(Benchmark):
     def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
         """Yield the ratios."""
         one, modes, bodies, costs = (result[part] for part in ("one_mode", "modes", "bodies", "costs"))
-        yield f"one mode, one body, two impacts a period: {1e6 * one['time']['engine']['median']:.2f} us a period"
+        yield f"one mode, one body, two impacts per period: {1e6 * one['time']['engine']['median']:.2f} us a period"
         yield from (f"  {name:38} {format_spread(ratio)}" for name, ratio in one["ratio"].items())
         yield "  largest error: " + ", ".join(f"{name} {error:.1e}" for name, error in one["error"].items())
         yield f"{modes['counts'][-1]} modes / 1 mode"
@@ -119,7 +119,7 @@ def _told(row: Mapping[str, Any]) -> str:
 
 
 def _one_mode(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
-    """Measure the engine, the loops and solve_ivp on two impacts a period: times, ratios, errors of the state."""
+    """Measure the engine, the loops and solve_ivp on two impacts per period: times, ratios, errors of the state."""
     scene = scenes.settled(scenes.one_mode(), effort.settle)
     case = ImpactOscillator.of(scene)
     loops = {"plain loop": plain_loop, "lean loop": lean_loop, "complete loop": complete_loop}

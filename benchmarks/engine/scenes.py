@@ -17,7 +17,7 @@ MASS, STIFFNESS, DAMPING_RATIO = 0.148, 3.4e7, 0.002
 #: displacement of the undamped resonance, m
 AMPLITUDE = 35e-6
 _BODY, _RESTITUTION = 0.02 * MASS, 0.7
-#: in the middle of a range of frequencies and gaps with one steady state: two impacts a period, 1:1
+#: in the middle of a range of frequencies and gaps with one steady state: two impacts per period, 1:1
 _FREQUENCY = 0.996 * math.sqrt(STIFFNESS / MASS) / (2 * math.pi)
 _GAP = 0.4 * AMPLITUDE
 _FASTEST = 30.0
@@ -26,12 +26,12 @@ USES: dict[str, tuple[dict[str, float], dict[str, float]]] = {
     "free": ({"gap": 1000 * AMPLITUDE}, {}),
     "stuck": ({}, {"friction": 0.5, "normal_load": 200.0}),
     "rare impacts": ({"gap": 1000 * AMPLITUDE}, {"velocity": 0.3, "restitution": 0.95}),
-    "two impacts a period": ({}, {}),
+    "two impacts per period": ({}, {}),
 }
 
 
 def one_mode(frequency: float = 1.0, gap: float = 1.0) -> Scene:
-    """Return a scene of one mode and one body without friction; factors: of the values for two impacts a period."""
+    """Return a scene of one mode and one body without friction; factors: of the values for two impacts per period."""
     return _rigid([{"name": "c", "gap": gap * _GAP}], [_body()], frequency * _FREQUENCY)
 
 

@@ -68,9 +68,7 @@ def _check(scene: Scene) -> None:
     """Raise InputError for a scene that is not one block on a rigid or prescribed structure, with nothing beside."""
     plain = len(scene.damper) == 1 and not scene.friction_damper and not scene.stop
     if not plain or scene.damper[0].shape != "block" or not isinstance(scene.structure, Rigid | Prescribed):
-        raise InputError(
-            "Siconos: of bodies with extent this set-up knows one block in one cavity of a rigid structure"
-        )
+        raise InputError("Siconos: of planar bodies this set-up knows one block in one cavity of a rigid structure")
     body, cavity = scene.damper[0], scene.cavity[0]
     if body.stiffness or body.dashpot or cavity.normal_motion or cavity.rotation or scene.gravity.direction is not None:
         raise InputError(

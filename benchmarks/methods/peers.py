@@ -45,7 +45,7 @@ class PeerRun:
 class Peer(NamedTuple):
     """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
 
-    colour, marker: of its line in charts; planar: whether its set-up takes a body with extent.
+    colour, marker: of its line in charts; planar: whether its set-up takes a planar body.
     """
 
     module: str

@@ -63,7 +63,7 @@ def by(scene: Scene, **solver: Any) -> Scene:
 
 
 def periodic(settle: int) -> Scene:
-    """Return a scene of one mode and one body in its steady state of two impacts a period."""
+    """Return a scene of one mode and one body in its steady state of two impacts per period."""
     return bench_scenes.settled(bench_scenes.one_mode(), settle)
 
 

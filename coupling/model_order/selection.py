@@ -51,7 +51,7 @@ _SCENES = 4
 _SPEEDS = 3
 #: safety factor: collisions interact through residual vibration
 _SAFETY = 1.5
-_NEWTON = "; of the forced response only: Newton's impacts have no limit as modes grow, compliant contacts have"
+_NEWTON = "; of the forced response only: Newton's impacts do not converge as modes are added, compliant contacts do"
 
 
 #: the choice of a number of modes by file, `modes` and tolerance
@@ -138,7 +138,7 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
         estimate |= warning
         sentences.append(warning["sentence"])
     if any(damper.form.planar for damper in scene.damper):
-        sentences.append("bodies with extent count as sliders")
+        sentences.append("planar bodies count as sliders")
     return Selected(scene, estimate | {"sentence": "; ".join(sentences)})
 
 
@@ -175,7 +175,7 @@ def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
     if size == 1:
         return ()
     return (
-        f"contact: {scene.contact.title} has no limit as modes are added, and the answer is that of {size} "
+        f"contact: {scene.contact.title} does not converge as modes are added, and the answer is that of {size} "
         'coordinates; take law = "compliant" with a stiffness, residual = true or both, or one natural mode '
         "(structure.modes = 1, natural = true)",
     )

@@ -32,7 +32,7 @@ class SteadyState(NamedTuple):
         """The classification, and the impacts of a motion that repeats."""
         if not self.classification.startswith("periodic"):
             return self.classification
-        return f"{self.classification}, {self.impacts_per_period:.3g} impacts a period"
+        return f"{self.classification}, {self.impacts_per_period:.3g} impacts per period"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,9 @@ def steady_states(sweep: Sweep, tolerance: float = 0.01) -> SteadyStates:
     """Return in which steady state each run of a sweep ends.
 
     Runs from other starts end in the same state if they have the same classification and their mean amplitudes,
-    attached mass fractions and impacts a period agree: within `tolerance`, relative, or within the confidence interval
-    of a motion that does not repeat. Chains of such neighbours are one state. None of these depends on the period at
-    which a run ends. A motion and its mirror image have them in common and count as one.
+    attached mass fractions and impacts per period agree: within `tolerance`, relative, or within the confidence
+    interval of a motion that does not repeat. Chains of such neighbours are one state. None of these depends on the
+    period at which a run ends. A motion and its mirror image have them in common and count as one.
     """
     paths = list(sweep.axes)
     starts, parameters = ([path for path in paths if is_start(path) == start] for start in (True, False))

@@ -33,7 +33,7 @@ runs = {
     name: vd.simulate(scene.replace({"solver": solver}), samples_per_period=200) for name, solver in solvers.items()
 }
 truth = runs["exact"].amplitude_mean
-print(f"{'method':20}  status  amplitude (µm)  error     energy residual  impacts a period")
+print(f"{'method':20}  status  amplitude (µm)  error     energy residual  impacts per period")
 for name, run in runs.items():
     error = abs(run.amplitude_mean / truth - 1)
     print(

@@ -124,9 +124,7 @@ def _scene_notes(calibration: Calibration) -> dict[str, str]:
             f"{analysis.share:.0%} of the fatigue strength."
         )
     motions = [f"{label} moves by {motion.along:.4g} of {rigid.at}" for label, motion in analysis.cavities.items()]
-    plane = (
-        f"Along itself {', '.join(motions)}, in this scene by 1; normal_motion and rotation are for bodies with extent."
-    )
+    plane = f"Along itself {', '.join(motions)}, in this scene by 1; normal_motion and rotation are for planar bodies."
     return {
         "structure": f"{rigid.frequency_hz:.6g} Hz; damping ratio: {_damping_note(calibration)}.",
         "excitation": force,

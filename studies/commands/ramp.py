@@ -36,13 +36,14 @@ def run(arguments: Namespace, scene: Scene) -> None:
 def _print_table(result: Ramp) -> None:
     """Print the peak of every run, and how it compares with that of the steady state without bodies."""
     print(
-        f"{f'rate, {result.table.unit}/s':>18} direction {'peak, m':>12} {'at, Hz':>10} of the stationary peak  status"
+        f"{f'rate, {result.table.unit}/s':>18} direction {'peak, m':>12} {'at, Hz':>10} "
+        f"{'of the steady-state peak':>24}  status"
     )
     for run in result.runs:
         print(
             f"{abs(run.rate):18.6g} {run.direction:9} {run.peak:12.5g} {run.at_peak('frequency'):10.6g} "
-            f"{result.share(run):22.4f}  {run.status}"
+            f"{result.share(run):24.4f}  {run.status}"
         )
     tops = result.tops
     for name, what in (("undamped", "without bodies"), ("fixed", "bodies fixed")):
-        print(f"stationary, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz")
+        print(f"steady state, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz")

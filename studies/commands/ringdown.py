@@ -39,7 +39,7 @@ def _print_summary(result: RingDown) -> None:
     """Print the linear mode, and frequency and damping at some amplitudes."""
     linear, half, cycles = result.linear, result.half_cycles, result.cycles
     print(
-        f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; bodies glued: "
+        f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; bodies fixed: "
         f"{linear.fixed_frequency:.6g} Hz, {linear.fixed_damping_ratio:.6g}"
     )
     print(f"status {result.status.value}: {len(half.time)} half cycles, {result.impacts.sum()} impacts")

@@ -31,7 +31,7 @@ def response_figure(
     """
     reference = response.reference
     lines = [
-        trace("without bodies", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
+        trace("undamped", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
         trace("fixed", linear.x, linear.fixed / reference, _FIXED, hoverinfo="skip"),
     ]
     points = [

@@ -141,7 +141,7 @@ def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, in
     between = linear.x if text else factor * linear.x
     at_points = {"customdata": response.x.tolist(), "marker": {"size": 5}}
     for curve, at, values, colour, more in (
-        ("without bodies", between, linear.undamped, _LINEAR, {}),
+        ("undamped", between, linear.undamped, _LINEAR, {}),
         ("fixed", between, linear.fixed, _LINEAR, {}),
         ("damped_max", x, response.damped_max, _CHOSEN, at_points),
         ("damped_mean", x, response.damped_mean, _CHOSEN, at_points | {"mode": "lines+markers"}),

@@ -66,7 +66,7 @@ def left_out(model: ReducedModel, damping: bool = True, base_load: bool = False)
     if model.centrifugal_stiffness is not None:
         lacks.append("the centrifugal stiffness: the matrices are those at standstill")
     if model.arms is not None and np.any(model.arms > 0.0):
-        lacks.append("which interface coordinates are rotations, and where: bodies with extent need them")
+        lacks.append("which interface coordinates are rotations, and where: planar bodies need them")
     if model.outputs:
         lacks.append("the outputs")
     return tuple(f"left out: {what}" for what in lacks)

@@ -247,7 +247,7 @@ class Sweep(Stage):
         prepared = prepare(scene, checkpoint, self.table.peak)
         _warn(tools, self.name, prepared.points.warnings)
         if prepared.resumed:
-            tools.note(f"{self.name}: {prepared.resumed} of {prepared.points.size} points are done, the rest goes on")
+            tools.note(f"{self.name}: {prepared.resumed} of {prepared.points.size} points are done, the rest follows")
         result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
         if self.table.peak:
             peak = self.outputs[1]

@@ -57,7 +57,7 @@ def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, n
                 )  # fmt: skip
     _add_special_points(figure, branches, wide)
     figure.update_yaxes(title_text="mean of peaks, µm", row=1, col=1)
-    figure.update_yaxes(title_text="impacts a period", rangemode="tozero", row=2, col=1)
+    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
     figure.update_xaxes(title_text=axis_title(branches.parameter, units), row=2, col=1)
     return dressed(figure, height=720)
 

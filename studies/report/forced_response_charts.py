@@ -173,7 +173,7 @@ def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | N
 
 
 def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
-    """Return numbers, from 0, and names of the bodies with extent of a response."""
+    """Return numbers, from 0, and names of the planar bodies of a response."""
     if not response.in_plane:
         return []
     extended = np.flatnonzero(np.isfinite(response.in_plane["tilt_max"]).any(axis=0)).tolist()

@@ -16,7 +16,7 @@ HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_
 
 
 def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
-    """Draw impacts a period, mean normal and tangential impulse, and energy taken a period, a bar a contact."""
+    """Draw impacts per period, mean normal and tangential impulse, and energy taken a period, a bar a contact."""
     known = bool(np.isfinite([each.loss for each in impacts]).all())
     figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
     for body in dict.fromkeys(each.body for each in impacts):
@@ -25,11 +25,11 @@ def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure
         colour, name = COLOURS[body % len(COLOURS)], f"body {body + 1}"
         normal = 1e3 * np.array([each.normal_impulse for each in mine]) / count
         tangential = 1e3 * np.array([each.tangential_impulse for each in mine]) / count
-        bars = [(1, count / periods, "impacts a period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
+        bars = [(1, count / periods, "impacts per period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
         bars += [(2, tangential, "tangential impulse", " mN s", 0.4)]
         if known:
             loss = 1e6 * np.array([each.loss for each in mine]) / periods
-            bars += [(3, loss, "energy a period", " µJ", 1.0)]
+            bars += [(3, loss, "energy per period", " µJ", 1.0)]
         for row, values, title, unit, opacity in bars:
             figure.add_bar(
                 x=places, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
@@ -37,10 +37,10 @@ def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure
                 hovertemplate=f"{name}, {title}: %{{y:.4g}}{unit}<extra></extra>", row=row, col=1,
             )  # fmt: skip
     figure.update_xaxes(categoryorder="array", categoryarray=places_in_order(impacts))
-    figure.update_yaxes(title_text="impacts a period", row=1, col=1)
+    figure.update_yaxes(title_text="impacts per period", row=1, col=1)
     figure.update_yaxes(title_text="mean impulse, mN s", row=2, col=1)
     if known:
-        figure.update_yaxes(title_text="energy a period, µJ", row=3, col=1)
+        figure.update_yaxes(title_text="energy per period, µJ", row=3, col=1)
     dressed(figure, height=240 * (2 + known))
     return figure.update_layout(barmode="group", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
 

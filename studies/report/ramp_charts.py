@@ -28,14 +28,17 @@ def along(ramp: Ramp) -> str:
 
 def run_name(ramp: Ramp, run: RampRun) -> str:
     """Return rate and direction of a run."""
-    return f"{abs(run.rate):.4g} {ramp.table.unit} a second, {run.direction}"
+    return f"{abs(run.rate):.4g} {ramp.table.unit} per second, {run.direction}"
 
 
 def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> go.Figure:
     """Draw amplitudes over the frequency, those of the linear structure, and the points of sweeps by their names."""
     figure, x = go.Figure(), along(ramp)
     rates = list(dict.fromkeys(abs(run.rate) for run in ramp.runs))
-    for name, title, dash in (("undamped", "stationary, without bodies", "dot"), ("fixed", "bodies fixed", "dashdot")):
+    for name, title, dash in (
+        ("undamped", "steady state, without bodies", "dot"),
+        ("fixed", "bodies fixed", "dashdot"),
+    ):
         if name == "undamped" or ramp.scene.damper:
             figure.add_scatter(
                 x=ramp.curves[x], y=1e6 * ramp.curves[name], name=title, mode="lines",
@@ -106,8 +109,8 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
                 mode="markers", marker={"color": colour, "symbol": symbol, "size": 11},
                 hovertemplate="%{x:.4g}: %{y:.4f}",
             )  # fmt: skip
-    figure.update_xaxes(title_text=f"rate, {ramp.table.unit} a second", type="log")
-    figure.update_yaxes(title_text="peak / stationary peak", rangemode="tozero")
+    figure.update_xaxes(title_text=f"rate, {ramp.table.unit} per second", type="log")
+    figure.update_yaxes(title_text="peak / steady-state peak", rangemode="tozero")
     return dressed(figure, height=420)
 
 

@@ -67,7 +67,7 @@ def ring_down_figure(record: RingDown) -> go.Figure:
         for name, colour, col in (("frequency", _DARK, 1), *((name, colour, 2) for name, _, colour in estimates)):
             _add_bins(figure, record, name, colour, col)
     _add_line(figure, linear.frequency, "without bodies", "solid", 1)
-    _add_line(figure, linear.fixed_frequency, "bodies glued", "dash", 1)
+    _add_line(figure, linear.fixed_frequency, "bodies fixed", "dash", 1)
     if linear.damping_ratio > 0.0:
         _add_line(figure, linear.damping_ratio, "without bodies", "solid", 2)
     figure.update_xaxes(title_text="time, ms", row=1, col=1)

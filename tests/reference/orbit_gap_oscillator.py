@@ -1,4 +1,4 @@
-"""A body in the gap of a driven oscillator: its symmetric motion with two impacts a period, in closed form.
+"""A body in the gap of a driven oscillator: its symmetric motion with two impacts per period, in closed form.
 
 m x'' + c x' + k x = F sin(w t), and a body b at r from the middle of a gap 2 h in it, no friction, restitution e (Masri
 and Caughey 1966, J. Appl. Mech. 33; Bapat and Sankar 1985, J. Sound Vib. 99). An impact on the right wall r = h at the

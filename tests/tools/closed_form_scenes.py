@@ -61,7 +61,7 @@ def rubbing(frequency, force=0.0, friction=0.1, **tables):
 
 
 def one_to_one(xi, ratio, eps=0.005, damping=0.005, restitution=0.7) -> tuple[Scene, float, float]:
-    """(scene, half gap, attached mass fraction) of two symmetric impacts a period at amplitude xi half gaps.
+    """(scene, half gap, attached mass fraction) of two symmetric impacts per period at amplitude xi half gaps.
 
     Theurich and Krack; code of tobiaswdm/CC. Total mass one, eps of it the body's; `ratio` of the frequency with the
     body fixed. The regime is stable for 1/(1 + rho^2) < theta < 1/(1 - 4/pi^2).

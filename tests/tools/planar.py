@@ -1,4 +1,4 @@
-"""Runs of bodies with extent: a table that hardly moves, or any structure, and what tests ask of them."""
+"""Runs of planar bodies: a table that hardly moves, or any structure, and what tests ask of them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def open_run(scene, periods, events, samples=0):
 
 
 def run_planar(scene, periods, events=10**7, samples=0):
-    """The run of a scene by the exact engine of bodies with extent."""
+    """The run of a scene by the exact engine of planar bodies."""
     run = open_run(scene, periods, events, samples)
     run.status = run.advance_to(periods)
     return run

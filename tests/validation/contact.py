@@ -66,7 +66,7 @@ def impact_oscillator() -> list[Figure]:
 
 
 @case(
-    "two impacts a period",
+    "two impacts per period",
     "Theurich and Krack; code of tobiaswdm/CC",
     "test_coupling_engine.py::test_one_to_one_impact_regime",
 )

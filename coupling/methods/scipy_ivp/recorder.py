@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
@@ -79,7 +81,7 @@ class Recorder:
         )
         v, cos, sin, one = np.arange(n, 2 * n), free.cosine.start, free.sine.start, free.one
         yields = _COUNT + 3 * np.arange(k)
-        terms = [  # integrals, sign, factors
+        terms: list[tuple[Any, ...]] = [  # integrals, sign, factors
             (_EXCITATION, 1, force, v), (_VISCOUS, 1, pull, v), (_FRICTION, -1, friction, slip),
             (_CONTACT, 1, dashpot, approach), (_SQUARE, 1, x, x), (_COS, 1, x, cos), (_SIN, 1, x, sin),
             (_MOMENTUM_COS, 1, p, cos), (_MOMENTUM_SIN, 1, p, sin), (yields, 1, push, one),

@@ -384,7 +384,7 @@ def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[_Line]:
             continue
         file = path.parent / name
         if not file.is_file():
-            raise own.error(f"*{keyword} INPUT={name}: no such file beside the deck")
+            raise own.error(f"*{keyword} INPUT={name}: no such file in the deck's folder")
         if file.resolve() in within:
             raise own.error(f"*{keyword} INPUT={name}: the file includes itself")
         for inner in _lines(file, within):

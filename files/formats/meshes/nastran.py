@@ -288,7 +288,7 @@ def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[tuple[Path, in
             continue
         file = path.parent / found[2]
         if not file.is_file() or file.resolve() in within:
-            why = "the file includes itself" if file.is_file() else "no such file beside the deck"
+            why = "the file includes itself" if file.is_file() else "no such file in the deck's folder"
             raise MeshError(f"{path}: line {number}: INCLUDE {found[2]}: {why}")
         yield from _lines(file, within)
 

@@ -45,7 +45,7 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
 
 
 def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
-    """Return number, tilt, lift and neglected part of each body with extent."""
+    """Return number, tilt, lift and neglected part of each planar body."""
     figures = [measures.get(name, []) for name in ("tilt_max", "lift_share", "linearisation")]
     return [
         {"number": number, "tilt": tilt, "lift": lift, "neglected": neglected}

@@ -110,7 +110,7 @@ def _of_level(scene: Scene, warnings: list[str]) -> Iterator[Fact]:
         yield Fact("resonance_amplitude", float(at_top[0]), "m", "X, there")
         yield Fact("modal_mass", resonance.mass, "kg", "of that mode at the response")
     yield Fact("amplitude_undamped", float(undamped[0]), "m", "at the excitation's frequency, without bodies")
-    yield Fact("amplitude_fixed", float(fixed[0]), "m", "there, with all bodies glued in")
+    yield Fact("amplitude_fixed", float(fixed[0]), "m", "there, with all bodies fixed")
 
 
 def _resonance(scene: Scene) -> Resonance | None:
@@ -131,7 +131,7 @@ def _of_bodies(scene: Scene) -> Iterator[Fact]:
         system = assemble(scene)
         squares = eigh(np.diag(system.of_structure.stiffness), glued_mass(system), eigvals_only=True)
         yield Fact("mass_ratio", sum(masses) / resonance.mass, "", "of all bodies to the modal mass")
-        yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies glued in")
+        yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies fixed")
         if scene.excitation.signal is None:
             amplitude = float(linear_amplitudes(scene, np.array([resonance.frequency]))[0][0])
             ratios = [cavity.gap / amplitude for cavity in scene.cavity] if amplitude else []
