@@ -73,7 +73,7 @@ class Registry(NamedTuple):
     """Where parts of one kind come from that are loaded one by one, as they are wanted.
 
     kind        in words, for messages
-    parts       by name: ours, as "package.module" or "package.module:object", and those that are registered
+    parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and others
     group       of entry points, whose names are those of the parts
     attributes  that a part must have
     """
@@ -96,7 +96,9 @@ class Registry(NamedTuple):
         if name not in self.parts:
             return _load(_added(self.kind, self.group, self.parts)[name], self.kind, self.attributes)
         part = self.parts[name]
-        return pkgutil.resolve_name(part) if isinstance(part, str) else part
+        if isinstance(part, str):
+            part = self.parts[name] = pkgutil.resolve_name(part)
+        return part
 
     def all(self) -> dict[str, Any]:
         """Return all parts by name. Raises ExtensionError for one that cannot be used."""

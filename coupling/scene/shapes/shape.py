@@ -101,10 +101,10 @@ class Polygon(Shape):
 
     def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
         """Return the corners that are farthest out on that side."""
-        corners = self.corners(body)
-        out = corners @ OUTWARDS[surface]
-        far = np.flatnonzero(out >= out.max() - _SAME * np.abs(corners).max())
-        return tuple((int(corner), *corners[corner].tolist()) for corner in far)
+        corners, (x, y) = self.corners(body).tolist(), OUTWARDS[surface]
+        out = [x * a + y * b for a, b in corners]
+        far = (1.0 - _SAME) * max(out)
+        return tuple((number, a, b) for number, (a, b) in enumerate(corners) if out[number] >= far)
 
 
 def common_heights(*faces: tuple[float, float]) -> tuple[float, ...]:
