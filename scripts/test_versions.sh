@@ -86,7 +86,7 @@ for word in "$@"; do
     esac
 done
 [ ${#suites[@]} -gt 0 ] || suites=(trixie-wheel trixie-apt sid-apt)
-[ ${#tests[@]} -gt 0 ] || tests=(tests/test_modal_*.py tests/test_rom_*.py)
+[ ${#tests[@]} -gt 0 ] || tests=(tests/modal tests/rom)
 
 mirror=${MIRROR:-$(archive)}
 mkdir -p "$home"

@@ -29,7 +29,7 @@ from vanedamp.coupling.response.response import Status
 #: contact law and whether there are friction dampers
 KINDS = {"newton": ("newton", False), "elements": ("newton", True), "compliant": ("compliant", True)}
 LOSSES = ("viscous", "friction", "impact", "contact")
-# what fails is a scene of its own for test_coupling_traps.py: no time is spent on making it small again
+# what fails is a scene of its own for tests/coupling/exact/test_traps.py: no time is spent on making it small again
 SETTINGS = settings(
     deadline=None,
     database=None,

@@ -1,4 +1,4 @@
-"""A program that fails on the first rank while the other one waits for a task; run by test_studies_mpi."""
+"""A program that fails on the first rank while the other one waits for a task; run by tests/commands/test_mpi.py."""
 
 from vanedamp.modal.petsc import ranks
 

@@ -88,7 +88,7 @@ class Bar:
 @case(
     "elastic bar against a rigid wall",
     "closed form (Saint-Venant): contact 2 L/c, force rho c S v",
-    "test_validation_contact.py::test_bar_converges",
+    "tests/validation/test_published_contact.py::test_bar_converges",
 )
 def bar_on_a_wall() -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
@@ -109,7 +109,7 @@ def bar_on_a_wall() -> list[Figure]:
 @case(
     "the same with a spring of 50 E S/L between",
     "closed form: force 1 - exp(-50 c t/L) until 2 L/c, contact (2 + s/50) L/c, (1 + s) exp(-s) = 1/2",
-    "test_validation_contact.py::test_bar_converges",
+    "tests/validation/test_published_contact.py::test_bar_converges",
 )
 def bar_on_a_spring() -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
@@ -127,7 +127,7 @@ def bar_on_a_spring() -> list[Figure]:
 @case(
     "bar that falls on a wall",
     "Doyen, Ern and Piperno (2011): two bounces take 16/3",
-    "test_rom_ladder_study.py::test_massless_boundary_converges",
+    "tests/benchmarks/model_order/test_model_order.py::test_massless_boundary_converges",
 )
 def falling_bar() -> list[Figure]:
     """Free modes in closed form on the massless boundary."""

@@ -47,7 +47,7 @@ class ImpactOscillator(orbit_impact_oscillator.ImpactOscillator):
 @case(
     "impact oscillator",
     "COCO, demo `impact` of its toolbox `hspo` (Dankowicz and Schilder 2013, Example 15.2); closed form",
-    "test_validation_contact.py::test_impact_oscillator_tends_to_its_orbit",
+    "tests/validation/test_published_contact.py::test_impact_oscillator_tends_to_its_orbit",
 )
 def impact_oscillator() -> list[Figure]:
     """The parameters of the demo; it starts its continuation from rounded states, which belong to the orbit."""
@@ -68,7 +68,7 @@ def impact_oscillator() -> list[Figure]:
 @case(
     "two impacts per period",
     "Theurich and Krack; code of tobiaswdm/CC",
-    "test_coupling_engine.py::test_one_to_one_impact_regime",
+    "tests/coupling/exact/test_closed_forms.py::test_one_to_one_impact_regime",
 )
 def one_to_one_regime() -> list[Figure]:
     """The theory neglects terms of the order of the body's share of the mass, 0.005."""
@@ -86,7 +86,7 @@ def one_to_one_regime() -> list[Figure]:
 @case(
     "ball on a shaking table",
     "Holmes (1982), J. Sound Vib. 84",
-    "test_coupling_engine.py::test_bouncing_ball_period_one",
+    "tests/coupling/exact/test_closed_forms.py::test_bouncing_ball_period_one",
 )
 def bouncing_ball() -> list[Figure]:
     """The orbit with one impact a period doubles where a multiplier of the engine's period map is -1."""
@@ -124,7 +124,7 @@ def _doubling(restitution: float, ratio: float) -> float:
     return float(np.linalg.det(jacobian + np.eye(2)))
 
 
-@case("ball that comes to rest", "closed form", "test_coupling_engine.py::test_ball_comes_to_rest")
+@case("ball that comes to rest", "closed form", "tests/coupling/exact/test_closed_forms.py::test_ball_comes_to_rest")
 def ball_at_rest() -> list[Figure]:
     figures = []
     for restitution in (0.5, 0.9):
@@ -135,7 +135,11 @@ def ball_at_rest() -> list[Figure]:
     return figures
 
 
-@case("mass on an elastic stop", "Code_Aster SDND101", "test_coupling_compliant.py::test_stop_of_a_spring_and_mass")
+@case(
+    "mass on an elastic stop",
+    "Code_Aster SDND101",
+    "tests/coupling/exact/test_compliant_contacts.py::test_stop_of_a_spring_and_mass",
+)
 def elastic_stop() -> list[Figure]:
     response = simulate(stop(), events=True)
     begin, end = response.event_list
@@ -148,7 +152,7 @@ def elastic_stop() -> list[Figure]:
 @case(
     "free decay with Coulomb friction",
     "Code_Aster SDND100",
-    "test_coupling_engine.py::test_free_decay_with_coulomb_friction",
+    "tests/coupling/exact/test_closed_forms.py::test_free_decay_with_coulomb_friction",
 )
 def free_decay() -> list[Figure]:
     start = {"initial": {"displacement": 0.85e-3}, "time": {"periods": 4, "transient": 0}}
@@ -161,7 +165,7 @@ def free_decay() -> list[Figure]:
 @case(
     "mass on a shaking table",
     "Code_Aster SDND104",
-    "test_coupling_engine.py::test_shaking_table_dissipation",
+    "tests/coupling/exact/test_closed_forms.py::test_shaking_table_dissipation",
 )
 def shaking_table() -> list[Figure]:
     def rests(acceleration: float) -> bool:
@@ -179,7 +183,7 @@ def shaking_table() -> list[Figure]:
     ]
 
 
-@case("oscillator with dry friction", "Den Hartog (1931)", "test_coupling_engine.py::test_den_hartog")
+@case("oscillator with dry friction", "Den Hartog (1931)", "tests/coupling/exact/test_closed_forms.py::test_den_hartog")
 def den_hartog() -> list[Figure]:
     r, ratio = 0.6, 0.2
     v, u = 1 / (1 - r**2), math.sin(math.pi / r) / (r * (1 + math.cos(math.pi / r)))

@@ -57,7 +57,7 @@ def square_plate(folder: Path, cells: int) -> np.ndarray:
 @case(
     "square cantilever membrane, 16 x 16 elements",
     "NAFEMS FV31 (Selected Benchmarks for Natural Frequency Analysis, test 31, 1987)",
-    "test_validation_modes.py::test_square_membrane_converges",
+    "tests/validation/test_published_modes.py::test_square_membrane_converges",
 )
 def fv31() -> list[Figure]:
     """The fourth published figure stands 0.7 % below what meshes here and in other programs converge to."""
@@ -67,7 +67,7 @@ def fv31() -> list[Figure]:
 @case(
     "tapered cantilever membrane, 16 x 8 elements",
     "NAFEMS FV32",
-    "test_modal_benchmarks.py::test_tapered_cantilever_membrane",
+    "tests/modal/test_benchmarks.py::test_tapered_cantilever_membrane",
 )
 def fv32() -> list[Figure]:
     return _modes(tapered_membrane, FV32, "mode {}, Hz", 2e-3)
@@ -76,7 +76,7 @@ def fv32() -> list[Figure]:
 @case(
     "square cantilever plate, 16 x 16 elements",
     "SDLS01 (Guide de validation des progiciels de calcul de structures, 1990)",
-    "test_modal_benchmarks.py::test_cantilever_square_plate",
+    "tests/modal/test_benchmarks.py::test_cantilever_square_plate",
 )
 def sdls01() -> list[Figure]:
     return _modes(square_plate, SDLS01, "lambda^2 of mode {}", 5e-3)
@@ -169,7 +169,7 @@ def bending_pairs(frequencies: np.ndarray, expected: np.ndarray) -> np.ndarray:
 @case(
     "free tube in bending, 12 x 2 x 30 curved elements",
     "Timoshenko's theory with the shear coefficient of Hutchinson (2001)",
-    "test_validation_modes.py::test_tube_bends_in_pairs",
+    "tests/validation/test_published_modes.py::test_tube_bends_in_pairs",
 )
 def tube() -> list[Figure]:
     hollow = Tube()

@@ -126,7 +126,7 @@ def harmonic_balance(omega: float, harmonics: int, motion: np.ndarray) -> float:
 @case(
     "two masses and a unilateral spring",
     "NLvib, example 03 (Krack and Gross 2019), 21 harmonics; peak of its script as the port NLvib-py reports it",
-    "test_validation_contact.py::test_orbit_of_nlvib_is_left_where_it_is_unstable",
+    "tests/validation/test_published_contact.py::test_orbit_of_nlvib_is_left_where_it_is_unstable",
 )
 def unilateral_spring() -> list[Figure]:
     """The peak is published of the harmonic balance; the example tells which of its orbits are unstable."""

@@ -1,0 +1,92 @@
+"""Programs of docs/howto run as they stand, and the tutorial from its first block to its last."""
+
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+
+from docs._ext.session import Session
+from tests.docs.test_examples import program, run
+from tests.tools.input_files import SCENE
+from tests.tools.processes import ROOT
+from tests.tools.small_structures import truss
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.modal.matrices import Patch
+from vanedamp.modal.matrix_files import write_folder
+
+TUTORIAL = ROOT / "docs" / "tutorial" / "index.md"
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A folder with the result of a sweep."""
+    folder = tmp_path_factory.mktemp("results")
+    (folder / "scene.toml").write_text(SCENE)
+    sweep(Scene.load(folder / "scene.toml")).save(folder / "sweep.h5")
+    return folder
+
+
+def test_matrices_of_another_code_become_a_reduced_model(tmp_path):
+    from dataclasses import replace
+
+    structure = truss(nodes=12)
+    groups = {"clamp": structure.fixed[::3] // 3, "shroud": [8], "c1_floor": [10]}
+    patches = {name: Patch(np.unique(nodes), np.ones(len(np.unique(nodes)))) for name, nodes in groups.items()}
+    write_folder(replace(structure, patches=patches), tmp_path)
+    printed = run(program("other_matrices.md", "read_matrices"), tmp_path)
+    assert "ReducedModel" in printed and (tmp_path / "rom.h5").is_file()
+
+
+def test_results_open_in_xarray(swept):
+    pytest.importorskip("h5netcdf", reason="needs h5netcdf")
+    printed = run(program("read_results.md", "import xarray"), swept)
+    assert f"{Sweep.load(swept / 'sweep.h5').amplitude_mean.max():.4g}"[:4] in printed
+    assert printed.split()[-1] == "m"
+
+
+def test_results_open_in_h5py(swept):
+    shape, unit = run(program("read_results.md", "import h5py"), swept).rsplit(maxsplit=1)
+    assert (eval(shape), unit) == (Sweep.load(swept / "sweep.h5").shape, "m")
+
+
+def test_program_of_mpi_is_that_of_the_sweeps():
+    """The one that tests/docs/test_examples.py runs."""
+    assert program("supercomputer.md", "mpi4py") == program("sweeps.md", "mpi4py")
+
+
+# the tutorial
+
+
+def blocks(text: str):
+    """Yield the blocks of a page that is run as it is built: directive, argument, options, text."""
+    for kind, argument, body in re.findall(r"^```\{(file|shell|python)\}(.*?)\n(.*?)\n```", text, re.M | re.S):
+        lines, options = body.splitlines(), {}
+        while lines and (found := re.fullmatch(r":(\w+):\s*(.*)", lines[0])):
+            options[found[1]] = found[2]
+            lines.pop(0)
+        yield kind, argument.strip(), options, "\n".join(lines).strip("\n")
+
+
+@pytest.mark.slow
+def test_tutorial_leads_to_a_decision(tmp_path):
+    """Word by word; the chosen design halves the resonance from every start."""
+    pytest.importorskip("dolfinx", reason="needs dolfinx")
+    session, printed = Session(tmp_path / "work"), ""
+    for kind, argument, options, text in blocks(TUTORIAL.read_text(encoding="utf-8")):
+        for name in options.get("files", "").split():
+            shutil.copy(TUTORIAL.parent / name, session.folder)
+        if kind == "file":
+            session.write(argument, text, "append" in options)
+        elif kind == "shell":
+            printed = session.shell(text)
+        else:
+            printed, pictures = session.python(text)
+            assert "alt" not in options or pictures
+    shares = [int(share) for share in re.findall(r"(\d+)% of that without bodies", printed)]
+    assert len(shares) == 3 and max(shares) < 50
+    with (session.folder / "chosen.toml").open("rb") as file:
+        assert 0 < tomllib.load(file)["cavity"][0]["gap"] < 1e-3
