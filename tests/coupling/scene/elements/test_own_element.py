@@ -14,7 +14,7 @@ from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import Element
 from vanedamp.coupling.scene.elements.element import SceneElement, Unit
-from vanedamp.coupling.scene.elements.registry import register
+from vanedamp.coupling.scene.elements.registry import ELEMENTS, register
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.files.reference import key_in, options, schema
@@ -71,8 +71,14 @@ class Shroud(SceneElement):
         yield Unit(normal, 0.0 * normal, self.gap, element=contact, play=play, body=number)
 
 
-register("tether", Tether)
-register("shroud", Shroud)
+@pytest.fixture(scope="module", autouse=True)
+def registered():
+    """Both elements, for the tests of this file only."""
+    register("tether", Tether)
+    register("shroud", Shroud)
+    yield
+    del ELEMENTS.parts["tether"], ELEMENTS.parts["shroud"]
+
 
 MASS, STIFFNESS, SLACK, SPEED = 0.3, 4e3, 1e-3, 0.05
 METHODS = {

@@ -43,8 +43,15 @@ class Hexagon(Polygon):
         return body.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-register("chamfered", Chamfered)
-register("hexagon", Hexagon)
+@pytest.fixture(scope="module", autouse=True)
+def registered():
+    """Both shapes, for the tests of this file only."""
+    register("chamfered", Chamfered)
+    register("hexagon", Hexagon)
+    yield
+    del SHAPES.parts["chamfered"], SHAPES.parts["hexagon"]
+    unit_of.cache_clear()
+
 
 G, FALL, TILT, MASS, E = 9.81, 1e-4, 2e-3, 0.7, 0.6
 SHAPES_OF = {
@@ -187,7 +194,6 @@ def test_keys_of_a_shape_are_read_written_and_described():
         "description": "legs of the cut at each corner [m]", "exclusiveMinimum": 0, "type": "number", "x-unit": "m",
     }  # fmt: skip
     assert {"hexagon", "chamfered"} <= set(key_in(damper, "shape")["enum"])
-    unit_of.cache_clear()
 
 
 @pytest.mark.parametrize(
