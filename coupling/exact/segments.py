@@ -46,24 +46,27 @@ def segment_of(system: System, line: LineSystem, rows: np.ndarray, flows: Flows,
     bend[at] = np.where(still, 0.0, st.free_acceleration[:b])
     for target, own, on_floor in ((shape, flows.motion, modal[:n]), (rate_shape, flows.velocity, modal[n:])):
         target[at] = np.where(still[:, None], 0.0, own[s, :b, awake]) + line.floor @ on_floor
-    # Jenkins elements: a slider rests, or follows what draws it
-    jenkins = slice(units - len(system.tangential), units)
-    place_sliders(system, q, st.displacement[rows[jenkins]])
-    follows = np.where(state[jenkins] == SPRUNG, 0.0, 1.0)[:, None] * system.elongation[:, :n]
-    for part in (v, shape, rate_shape):
-        part[size - len(follows) :] = follows @ part[:n]
-    state[jenkins] = np.where(state[jenkins] == SPRUNG, STICK, state[jenkins])
+    if len(system.tangential):  # a slider of a Jenkins element rests, or follows what draws it
+        jenkins = slice(units - len(system.tangential), units)
+        place_sliders(system, q, st.displacement[rows[jenkins]])
+        follows = np.where(state[jenkins] == SPRUNG, 0.0, 1.0)[:, None] * system.elongation[:, :n]
+        for part in (v, shape, rate_shape):
+            part[size - len(follows) :] = follows @ part[:n]
+        state[jenkins] = np.where(state[jenkins] == SPRUNG, STICK, state[jenkins])
     own = st.state[rows]
     closed = (own == STICK) | (own == CLOSED) | (own == SPRUNG)
-    on = np.arange(units) + np.where(np.arange(units) < system.contacts, 0, units)
+    on = np.arange(units)
+    on[system.contacts :] += units
     force, open_force = np.zeros((2, 2 * units))
     force_shape = np.zeros((2 * units, len(amplitude)), complex)
     force[on] = np.where(closed, st.constant_force[rows], st.applied_force[rows])
     force_shape[on] = np.where(closed[:, None], flows.force[s, rows, awake], 0.0)
     open_force[on] = np.where((own == HELD) | (own == TOUCHING), st.applied_force[rows], 0.0)
     drive, driver = np.zeros((2, len(amplitude)), complex)
-    for h, first, last in zip(range(len(line.frequency)), flows.driven[s], flows.driven[s, 1:], strict=False):
-        drive[first:last], driver[first:last] = flows.load[s, first:last] * amplitude[h], flows.eigenvalue[s, h]
+    e = len(line.frequency)
+    for h in range(e if flows.driven[s, e] > e else 0):
+        driven = slice(flows.driven[s, h], flows.driven[s, h + 1])
+        drive[driven], driver[driven] = flows.load[s, driven] * amplitude[h], flows.eigenvalue[s, h]
     return Segment(
         system=system, period=int(st.counters[PERIOD]), time=float(st.time[0]), state=state, q=q, v=v, bend=bend,
         speed=max(float(st.largest_speed[0]), float(np.abs(st.velocity).max(initial=0.0)), system.speed),

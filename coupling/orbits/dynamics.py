@@ -29,10 +29,8 @@ from vanedamp.coupling.response.segment import Segment
 
 #: singular values below this are zero: rows that depend on each other
 DEPENDENT = 1e-9
-#: points of a period, and of one turn of the fastest motion, between which least margins are sought
-_LOOKS, _TURN = 32, 12
-#: flows that are kept
-_KEPT = 1000
+#: points of a period, and of one turn of the fastest motion, between which least margins are sought; flows kept
+_LOOKS, _TURN, _KEPT = 32, 12, 1000
 
 
 def presses(state: np.ndarray) -> np.ndarray:
