@@ -37,7 +37,7 @@ def test_benchmark_of_methods_leaves_its_results(tmp_path, capsys, pictures):
     assert errors["exact engine", 0.4, 0] < 1e-8
     assert errors["solve_ivp, DOP853 with events", 0.0, 1e-8] < 1e-5
     assert errors["Moreau-Jean", 0.4, 8000] < errors["Moreau-Jean", 0.4, 500]
-    assert "sliders only" in result["absent"]["penalty, HHT"]
+    assert "sliders only" in result["absent"]["co-simulation, Jacobi, hold 0"]
     for panel, friction in zip(pictures["bench_bodies_methods"], methods.FRICTION, strict=True):
         assert panel.title == f"friction {friction:g}" and "CPU time" in panel.x
         mine = [row for row in result["points"] if row["friction"] == friction and row["error"] is not None]

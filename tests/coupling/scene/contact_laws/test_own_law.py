@@ -236,7 +236,7 @@ def test_sweep_over_the_laws_parameter():
     ("law", "message"),
     [
         ({"law": "sixth root"}, "contact.law: must be one of 'newton', 'poisson', 'compliant', 'massless', "
-         "'viscoelastic', 'fifth root', 'same', 'linear'"),
+         "'viscoelastic'.*, 'fifth root'.*"),
         ({"law": "fifth root"}, "contact.c: missing; it is required here"),
         ({"law": "fifth root", "c": 0.0}, r"contact.c: should be greater than 0 \(got 0.0\)"),
         ({"law": "newton", "c": 0.1}, 'contact.c: belongs to law = "fifth root", not to law = "newton"'),
