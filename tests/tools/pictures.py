@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 
@@ -53,7 +54,7 @@ class Pictures:
 
 def _panels(figure: Figure) -> list[Panel]:
     panels = []
-    for axes in figure.axes:
+    for axes in filter(Axes.get_visible, figure.axes):
         curves = {}
         bars = [drawn.lines[0] for drawn in axes.containers if hasattr(drawn, "has_yerr") and drawn.lines[0]]
         labels = {id(drawn.lines[0]): drawn.get_label() for drawn in axes.containers if hasattr(drawn, "has_yerr")}
