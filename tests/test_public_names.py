@@ -13,6 +13,7 @@ import vanedamp as vd
 from docs._ext import python_api
 from tests.tools.processes import environment
 from vanedamp.coupling.scene.contact_laws.newton import Newton
+from vanedamp.coupling.scene.shapes.block import Block
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.key_tables import tables
 from vanedamp.studies.file_kinds import KINDS
@@ -29,7 +30,7 @@ IMPORTS = {
 def test_the_stub_has_every_name_and_they_are_exported():
     assert sorted(IMPORTS) == dir(vd)
     assert set(vd.__all__) < set(IMPORTS)
-    assert {"ContactLaw", "Method", "Scene", "Waveform", "register"} <= set(vd.__all__)
+    assert {"ContactLaw", "Method", "Scene", "Shape", "Waveform", "register"} <= set(vd.__all__)
 
 
 @pytest.mark.parametrize("name", sorted(IMPORTS))
@@ -73,7 +74,8 @@ def test_help_lists_keys_units_and_defaults(record, kind):
         assert "mass: mass of the body [kg]; number > 0; required friction: Coulomb coefficient" in text
 
 
-def test_register_takes_laws_and_waveforms_only():
+def test_register_takes_parts_of_scenes_only():
     assert vd.register(Newton) is Newton
+    assert vd.register(Block) is Block  # that is there under its name
     with pytest.raises(ExtensionError, match="derive it from ContactLaw or Waveform"):
         vd.register(dict)

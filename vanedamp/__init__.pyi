@@ -16,6 +16,7 @@ from vanedamp.coupling.response.response import Status as Status
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw as ContactLaw
 from vanedamp.coupling.scene.registration import register as register
 from vanedamp.coupling.scene.scene import Scene as Scene
+from vanedamp.coupling.scene.shapes.shape import Shape as Shape
 from vanedamp.coupling.scene.waveform import Waveform as Waveform
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states
