@@ -23,8 +23,8 @@ _NAMED = ((Shape, SHAPES), (SceneElement, ELEMENTS))
 def register(part: type[Part], name: str | None = None) -> type[Part]:
     """Add a contact law, a waveform, a shape or an element to those that scenes may name; may decorate the class.
 
-    part: a class derived from `ContactLaw`, `Waveform`, `Shape` or `SceneElement`, whose docstrings are the contract; it is
-    returned. name: of a shape or of an element's table, by default the class's own in small letters. An installed
+    part: a class derived from `ContactLaw`, `Waveform`, `Shape` or `SceneElement`, whose docstrings are the contract;
+    it is returned. name: of a shape or of an element's table, by default the class's own in small letters. An installed
     package adds one without a call, by an entry point (CONTRIBUTING.md). Raises ExtensionError for any other class, and
     for a name that is taken.
     """
