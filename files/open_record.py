@@ -14,7 +14,7 @@ from pydantic_core import CoreSchema, SchemaValidator, core_schema
 from vanedamp.files.toml_input import STRICT
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=STRICT, repr=False)
 class OpenRecord:
     """Base of such records.
 

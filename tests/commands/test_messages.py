@@ -181,7 +181,7 @@ def test_long_work_says_in_a_log_how_far_it_is(capsys, monkeypatch):
         for done in range(100, 401, 100):  # the first hundred was there before
             report(done, 400)
             now[0] += 20.0
-    assert capsys.readouterr().err == "vanedamp: sweep: 300 of 400, 5 a second, 0.333 min left\n"
+    assert capsys.readouterr().err == "vanedamp: sweep: 300 of 400, 5 per second, 0.333 min left\n"
 
 
 def test_figures_of_a_run_have_units(folder, capsys):
