@@ -190,7 +190,7 @@ def test_driven_or_not_is_the_same(name, monkeypatch, driven, tmp_path):
     one = simulate(case, events=True, samples_per_period=16)
     assert any(driven)
     driven.clear()
-    monkeypatch.setattr(flow, "NEAR", 0.0)
+    monkeypatch.setattr(flow, "DRIVEN", 0.0)
     two = simulate(case, events=True, samples_per_period=16)
     assert not any(driven)
     assert len(one.event_list) == len(two.event_list) > 10
