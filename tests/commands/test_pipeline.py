@@ -308,7 +308,7 @@ def test_a_killed_run_goes_on_where_it_was(killed):
     notes = []
     result = vd.pipeline("pipeline.toml", workers=1, note=notes.append)
     assert result.done == ["sweep own", "report"]
-    (resumed,) = [note for note in notes if "the rest goes on" in note]
+    (resumed,) = [note for note in notes if "the rest follows" in note]
     assert int(resumed.split()[2]) >= 1
     assert not list(Path("out").glob("*.partial"))
     np.testing.assert_array_equal(Sweep.load("out/own.h5").amplitude_mean, vd.sweep("own.toml").amplitude_mean)
@@ -318,7 +318,7 @@ def test_the_points_of_another_scene_are_not_taken(killed):
     replace_in(killed / "own.toml", "gap = 2e-4", "gap = 1e-4")
     notes = []
     assert vd.pipeline("pipeline.toml", workers=1, note=notes.append).done == ["sweep own", "report"]
-    assert not [note for note in notes if "goes on" in note]
+    assert not [note for note in notes if "the rest follows" in note]
     np.testing.assert_array_equal(Sweep.load("out/own.h5").amplitude_mean, vd.sweep("own.toml").amplitude_mean)
 
 
