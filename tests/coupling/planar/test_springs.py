@@ -311,12 +311,6 @@ def test_a_slip_that_stops_within_the_resolution_of_time(tmp_path):
     assert simulate(scene).status is Status.OK
 
 
-def test_solve_ivp_refuses_springs():
-    scene = planar_scene(springs(), DISC).replace({"solver": {"method": "solve_ivp"}})
-    with pytest.raises(InputError, match="two phases, is for"):
-        simulate(scene)
-
-
 def alike(slider, planar, count):
     """The first impacts and peaks of two responses are the same."""
     np.testing.assert_allclose(planar.peak[:4], slider.peak[:4], rtol=1e-9)
