@@ -33,6 +33,7 @@ def woodpecker():
     twist = turned @ np.array([0.0, 1.0, -1.0])
     one, three = np.zeros((1, 3)), np.zeros(3)
     system = System(
+        in_plane=True,
         modes=0, bodies=1, contacts=3, scale=1.0, mass=np.ones(3), squares=np.zeros(0), viscous=np.zeros((0, 0)),
         alike=True, omega=2 * np.pi / RECORDED, other=np.full(3, -1), holds=np.zeros(1), casing=np.zeros((0, 3)),
         grip=np.zeros(0), casing_spring=np.zeros(0), stiffness=SPRING * np.outer(twist, twist),
