@@ -23,7 +23,7 @@ from paper import (
     plots_rotation,
 )
 from paper.scene_files import FOLDER, scene_file
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.studies.demo import demo

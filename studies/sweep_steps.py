@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, Points, grid
 from vanedamp.coupling.sweep.record import Sweep

@@ -6,7 +6,6 @@ from vanedamp import meshes as meshes
 from vanedamp import modal as modal
 from vanedamp import rom as rom
 from vanedamp import studies as studies
-from vanedamp.coupling.engine import simulate as simulate
 from vanedamp.coupling.methods import Method as Method
 from vanedamp.coupling.orbits.branch import Branches as Branches
 from vanedamp.coupling.orbits.orbits import find_orbit as find_orbit
@@ -18,6 +17,7 @@ from vanedamp.coupling.scene.registration import register as register
 from vanedamp.coupling.scene.scene import Scene as Scene
 from vanedamp.coupling.scene.shapes.shape import Shape as Shape
 from vanedamp.coupling.scene.waveform import Waveform as Waveform
+from vanedamp.coupling.simulation import simulate as simulate
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states
 from vanedamp.coupling.sweep.sweep import sweep as sweep

@@ -17,9 +17,9 @@ import numpy as np
 
 from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.rows import Rows
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import validate
 

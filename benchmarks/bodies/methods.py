@@ -23,9 +23,9 @@ from benchmarks.methods.peers import PEERS, run_peer, settings_of_peers, version
 from benchmarks.methods.scenes import Key, by, charted, settings, solved
 from benchmarks.rows import Rows
 from benchmarks.timing import spread
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
 #: periods and samples by which motions are compared, and the coefficients of friction

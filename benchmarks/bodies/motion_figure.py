@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.patches import Ellipse, Polygon
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.figures import BLUE, GOLD, GREY, RED, save, subplots
 from vanedamp.studies.report.motion import CLOSED, HIT, OPEN, Motion, motion_of
 

@@ -22,11 +22,11 @@ from benchmarks.benchmark import Benchmark, Result
 from benchmarks.methods.scenes import charted
 from benchmarks.rows import Rows
 from benchmarks.timing import seconds
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.newton import find_orbit
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import finite
 from vanedamp.files.toml_input import validate
 

@@ -1,6 +1,6 @@
 """Measurements inside the engine: modes that are awake, time of a period and of its parts.
 
-The one file of the benchmarks that reaches behind `coupling.engine.simulate`.
+The one file of the benchmarks that reaches behind `coupling.simulation.simulate`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Clock, in_turns, seconds
-from vanedamp.coupling.exact.automaton import amplitude_changes
-from vanedamp.coupling.exact.energy_balance import account
-from vanedamp.coupling.exact.event_driven import EngineRun, is_common
-from vanedamp.coupling.exact.event_functions import next_event
+from vanedamp.coupling.engine.line.automaton import amplitude_changes
+from vanedamp.coupling.engine.line.energy_balance import account
+from vanedamp.coupling.engine.line.event_driven import EngineRun, is_common
+from vanedamp.coupling.engine.line.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import entry

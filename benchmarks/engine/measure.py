@@ -23,8 +23,8 @@ from benchmarks.engine.hand_written_loop import ImpactOscillator, complete_loop,
 from benchmarks.engine.inside import awake_modes, time_of_a_period, time_of_parts, times_in_turns
 from benchmarks.engine.reference_solutions import solve_with_events, truth
 from benchmarks.timing import Clock, format_spread, in_turns, seconds, spread
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 
 _SEED = 20_260_101
 _TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 

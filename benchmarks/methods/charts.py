@@ -25,12 +25,12 @@ from benchmarks.methods.peers import PEERS, PeerRun, run_peer, settings_of_peers
 from benchmarks.methods.scenes import Key
 from benchmarks.rows import Contest, Rows
 from benchmarks.timing import Clock, in_turns, spread
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.scene.structures import Rigid
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
 SEED = 20_260_102

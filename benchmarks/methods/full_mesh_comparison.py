@@ -20,8 +20,8 @@ from benchmarks.methods.full_mesh_run import explicit_run, glued_frequencies_hz
 from benchmarks.methods.scenes import Cluster
 from benchmarks.rows import Take, at_once
 from benchmarks.timing import spread
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.linear_response import receptance
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface

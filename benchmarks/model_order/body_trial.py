@@ -19,11 +19,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from benchmarks.rows import Take, at_once
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.body_choice import judge, with_blocks, with_sliders
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, Time
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import write_csv
 from vanedamp.files.toml_input import validate
 

@@ -29,8 +29,8 @@ from benchmarks.model_order.scenes import SEED
 from benchmarks.model_order.structures import cluster_model
 from benchmarks.model_order.trial import run_trial, summary, trial_rows, trial_text
 from benchmarks.rows import Rows, Take, at_once
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel

@@ -18,9 +18,9 @@ import numpy as np
 from benchmarks.engine.inside import times_in_turns
 from benchmarks.model_order.scenes import Trial, trials
 from benchmarks.rows import Take, at_once
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_orders
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import write_csv
 
 TOLERANCES = (0.1, 0.03, 0.01)

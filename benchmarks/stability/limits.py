@@ -33,8 +33,8 @@ from benchmarks.stability.scenes import (
     touching,
     unsteady,
 )
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.store import finite, write_csv
 

@@ -18,7 +18,7 @@ from scipy.linalg import eigvalsh
 
 from benchmarks.stability import scenes
 from benchmarks.stability.macro_step import largest_stable
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 
 #: exchanges and orders of extrapolation of a co-simulation, by the name of their map
 CO_SIMULATIONS = {

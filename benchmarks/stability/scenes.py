@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import validate
 

@@ -14,8 +14,8 @@ from time import process_time
 def main(scene_file: str, output: str) -> None:
     """Do what `vanedamp run` does, part by part, but for the command line."""
     marks = [0.0, process_time()]
-    from vanedamp.coupling.engine import simulate
     from vanedamp.coupling.scene.scene import Scene
+    from vanedamp.coupling.simulation import simulate
     from vanedamp.files.provenance import versions
 
     marks.append(process_time())

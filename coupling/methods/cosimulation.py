@@ -22,12 +22,12 @@ from vanedamp.coupling.methods.step_records import close_step, copy, open_step, 
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
-from vanedamp.coupling.planar.unit_kinematics import row_speed
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_kinematics import row_speed
 from vanedamp.files.toml_input import Whole
 
 VARIANTS = (

@@ -1,4 +1,4 @@
-"""`solver.method = "exact"`: the event-driven engine (coupling.exact)."""
+"""`solver.method = "exact"`: the event-driven engine (coupling.engine.line)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Options(PlanarOptions):
 
 def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
     """Return a run by the engine, whose kernels are loaded when they are wanted."""
-    from vanedamp.coupling.methods.engines import engine_run
+    from vanedamp.coupling.engine.backends import engine_run
 
     options: Any = scene.solver
     return engine_run(system, start, records, events, options.max_events, options.linearisation)

@@ -35,7 +35,6 @@ from vanedamp.coupling.methods.step_records import (
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, inlined, kernel
-from vanedamp.coupling.planar.unit_kinematics import elongation, has_friction, is_rigid, row_speed
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart_state import RestartState
@@ -43,6 +42,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_kinematics import elongation, has_friction, is_rigid, row_speed
 from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)

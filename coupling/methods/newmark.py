@@ -26,8 +26,8 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, kernel
-from vanedamp.coupling.planar.unit_kinematics import elongation, gap, has_friction, row_speed
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_kinematics import elongation, gap, has_friction, row_speed
 
 
 def newmark_matrices(system: System, step: float, alpha: float) -> tuple[np.ndarray, Sparse, np.ndarray, np.ndarray]:

@@ -10,10 +10,10 @@ from pydantic import Field, model_validator
 from vanedamp.coupling.methods.step_records import product, set_gaps
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record
-from vanedamp.coupling.planar.unit_kinematics import has_friction, row_speed
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.system import SURFACES, System
+from vanedamp.coupling.system.unit_kinematics import has_friction, row_speed
 from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 

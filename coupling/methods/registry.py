@@ -29,7 +29,7 @@ def respond(
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Response:
-    """Return the response of a scene without open choices. Arguments as in coupling.engine.simulate."""
+    """Return the response of a scene without open choices. Arguments as in coupling.simulation.simulate."""
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     ended = run_scene(run, scene, progress)

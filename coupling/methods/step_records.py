@@ -15,10 +15,10 @@ from vanedamp.coupling.numerics.codes import (
     STEPS,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.planar.unit_kinematics import elongation, gap
 from vanedamp.coupling.response.recorder import note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR
+from vanedamp.coupling.system.unit_kinematics import elongation, gap
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from vanedamp.coupling.methods.engines import reuse_subsystems
+from vanedamp.coupling.engine.backends import reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state, run_of, why_no_restart
 from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.evaluation import Run

@@ -37,6 +37,11 @@ DEFECTIVE = 1e7
 #: largest relative residual of an eigenpair, and largest relative error of a state that is split into modes and summed
 LOST = 1e-9
 
+# --- searches for roots
+#: Newton's correction, times the root: below the first the polynomial's remainder is checked, below the second, whose
+#: error is about its square, the root is found
+NEAR_ROOT, AT_ROOT = 1e-2, 1e-8
+
 # --- pivots of linear_complementarity, whose problems are scaled to numbers of size one
 #: entries of the tableau below this are round-off
 PIVOT = 1e-11

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
 from vanedamp.coupling.scene.elements.registry import meets_body
 from vanedamp.coupling.scene.scene import Time
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen
 
 #: samples of an excitation period

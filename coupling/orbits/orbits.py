@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
@@ -25,6 +24,7 @@ from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.rotation import FREQUENCY, hertz_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 

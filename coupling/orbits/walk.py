@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.methods.engines import engine_run
+from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.orbits.derivative import Before, Derivative, Guard, begins
 from vanedamp.coupling.orbits.dynamics import Dynamics, Flow
 from vanedamp.coupling.orbits.event_names import EventNames

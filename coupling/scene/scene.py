@@ -219,7 +219,7 @@ class Scene(OpenRecord, Displayed):
 
     @property
     def planar(self) -> bool:
-        """Whether it is for coupling.planar: a body with extent or a spring of its own, or impacts of two phases."""
+        """Whether it needs the engine for planar bodies: one with extent or on a spring, or impacts of two phases."""
         rubs = any(element.rubs for _, _, element in self.elements)
         return rubs or self.contact.two_phases or any(damper.planar for damper in self.damper)
 

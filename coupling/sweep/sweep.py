@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.numerics.compiler.jit import CacheError
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.methods.engines import engine_run, reuse_subsystems
+from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
@@ -29,6 +28,7 @@ from vanedamp.coupling.response.static_deflection import about_mean, deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble, at_frequency
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from vanedamp.coupling.methods.engines import engine_run
+from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.model_order.selection import warnings_of

@@ -6,9 +6,9 @@ from argparse import Namespace
 from functools import partial
 from typing import Any
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import UNITS
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result

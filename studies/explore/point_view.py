@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import plotly.graph_objects as go
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.motion import motion_of

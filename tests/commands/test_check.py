@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK, CLUSTER, SCENE, changed
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.onset import NEVER_STICKS, onset, onsets, swing
 from vanedamp.files.formats.meshes.msh_header import read_header

@@ -5,8 +5,8 @@ from importlib.metadata import version
 import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
 from vanedamp.studies.cli import BAD_INPUT, main

@@ -21,9 +21,9 @@ from docs.check_site import faults
 from tests.tools.input_files import SCENE
 from tests.tools.processes import ROOT, environment
 from tests.tools.schemas import shipped_schema
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import PEAKS
 from vanedamp.coupling.sweep.worker import IN_PLANE, MEASURES
 from vanedamp.files.reference import options

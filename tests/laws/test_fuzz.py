@@ -11,8 +11,8 @@ import pytest
 from tests.tools.fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn, write_input
 from tests.tools.fuzz_runs import answer, patient, stuck
 from tests.tools.processes import ROOT, environment
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies import sweep_steps

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.tools.laws_of_runs import KINDS, SETTINGS, impacts, laws_of, symmetries_of, whole
 from tests.tools.scene_strategies import between, scene_of, scene_tables
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 
 FAST = settings(SETTINGS, max_examples=15, derandomize=True)
 #: seeds of the slow tier, and scenes of each

@@ -14,7 +14,7 @@ from paper.claims_self_tuning import resonance_on_track, tuned_order
 from paper.plots_rotation import campbell_picture
 from paper.runner import study
 from paper.scene_files import scene_file
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.tables import Case

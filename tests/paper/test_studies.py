@@ -14,8 +14,8 @@ from paper.claims_rigid import attached_closed_form, regime
 from paper.plots import blocks_picture
 from paper.runner import STUDIES, run_paper, study
 from paper.scene_files import FOLDER, scene_file
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import Variable, save

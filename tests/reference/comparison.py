@@ -6,9 +6,9 @@ import numpy as np
 
 from tests.reference.integrator import Reference, with_horizon
 from tests.reference.ledger import ledger
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.rom.reduced import ReducedModel
 
 SAMPLES = 32

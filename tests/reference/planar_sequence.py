@@ -13,6 +13,7 @@ import mpmath as mp
 import numpy as np
 
 from tests.reference.multiprecision import exponential
+from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     BOUNDED,
@@ -30,7 +31,6 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     STOPS,
 )
-from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import Motion

@@ -8,8 +8,8 @@ import pytest
 
 from tests.reference.massless_boundary import Boundary, craig_bampton, frequencies, macneal
 from tests.tools.small_structures import rod, truss
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduction import reduce

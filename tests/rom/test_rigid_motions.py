@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.modal_basis import modal_basis
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.dense_modes import rounding, spectrum

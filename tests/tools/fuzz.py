@@ -193,8 +193,8 @@ def run_all(first: int, count: int, folder: Path) -> int:
     """Run the cases of a range of numbers, print the table and the faults; return the number of these."""
     from tests.tools import fuzz_runs
     from tests.tools.fuzz_files import damaged, write_samples
-    from vanedamp.coupling.engine import simulate
     from vanedamp.coupling.scene.scene import Scene
+    from vanedamp.coupling.simulation import simulate
     from vanedamp.files.toml_input import validate
     from vanedamp.modal import measurements
     from vanedamp.studies import sweep_steps

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tests.tools.segment_stepper import SLIDES, Moment, Segment, Step, Stepper
-from vanedamp.coupling.exact.tolerances import ADHESION
+from vanedamp.coupling.engine.line.tolerances import ADHESION
 from vanedamp.coupling.numerics.codes import CLOSED, DONE, LEAVING, OPEN, STICK, TOUCHING
 from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE, RESOLUTION, SIMULTANEOUS, SPEED_ROUND_OFF
 from vanedamp.coupling.scene.scene import Scene

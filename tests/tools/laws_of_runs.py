@@ -21,15 +21,15 @@ from hypothesis import strategies as st
 from tests.tools.laws_by_event import Worst, check_events
 from tests.tools.scene_strategies import scene_of, scene_tables
 from tests.tools.scene_symmetries import compare, later, mirrored, perturbed, record, renumbered, reordered, unmirrored
-from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.simulation import simulate
 
 #: contact law and whether there are friction dampers
 KINDS = {"newton": ("newton", False), "elements": ("newton", True), "compliant": ("compliant", True)}
 LOSSES = ("viscous", "friction", "impact", "contact")
-# what fails is a scene of its own for tests/coupling/exact/test_traps.py: no time is spent on making it small again
+# what fails becomes a scene in tests/coupling/engine/line/test_traps.py: no time is spent on making it small again
 SETTINGS = settings(
     deadline=None,
     database=None,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.methods import moreau
-from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.event_log import WIDTH
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.restart import motion_of, start_of

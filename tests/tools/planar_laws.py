@@ -18,10 +18,12 @@ import numpy as np
 from scipy.linalg import expm, null_space
 
 from tests.tools.planar import Run, open_run
-from vanedamp.coupling.exact.complex_modes import IllConditioned
-from vanedamp.coupling.exact.event_functions import CHATTER
-from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
-from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.engine.line.event_functions import CHATTER
+from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.engine.line.impacts import COLLAPSE
+from vanedamp.coupling.engine.plane.automaton import advance, begin
+from vanedamp.coupling.engine.plane.contact_flow import add_flow
+from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVENT_BUDGET,
@@ -38,8 +40,6 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     UNDECIDED,
 )
-from vanedamp.coupling.planar.automaton import advance, begin
-from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System

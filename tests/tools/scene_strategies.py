@@ -27,7 +27,7 @@ def between(low, high):
 
 
 def speeds(largest):
-    """Speeds to either side; what is far below round-off has tests of its own (tests/coupling/exact/test_traps.py)."""
+    """Speeds to either side; tests/coupling/engine/line/test_traps.py has those far below round-off."""
     return st.floats(-largest, largest).map(lambda speed: round(speed, 9))
 
 

@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response import evaluation
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 

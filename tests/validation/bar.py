@@ -13,7 +13,7 @@ from benchmarks.model_order.bar_on_wall import bounce
 from tests.tools.closed_form_scenes import scene
 from tests.tools.small_structures import rod
 from tests.validation.page import Figure, case
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduction import reduce
 from vanedamp.rom.truncation import massless

@@ -13,9 +13,9 @@ from tests.tools.closed_form_scenes import ball, one_to_one, period_one_start, r
 from tests.validation.bar import bar_on_a_spring, bar_on_a_wall, falling_bar
 from tests.validation.page import Case, Figure, case
 from tests.validation.unilateral_spring import unilateral_spring
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.simulation import simulate
 
 # a body so heavy that it is the ground: what an impact gives it in speed is below round-off of the structure's
 GROUND = 1e15
@@ -68,7 +68,7 @@ def impact_oscillator() -> list[Figure]:
 @case(
     "two impacts per period",
     "Theurich and Krack; code of tobiaswdm/CC",
-    "tests/coupling/exact/test_closed_forms.py::test_one_to_one_impact_regime",
+    "tests/coupling/engine/line/test_closed_forms.py::test_one_to_one_impact_regime",
 )
 def one_to_one_regime() -> list[Figure]:
     """The theory neglects terms of the order of the body's share of the mass, 0.005."""
@@ -86,7 +86,7 @@ def one_to_one_regime() -> list[Figure]:
 @case(
     "ball on a shaking table",
     "Holmes (1982), J. Sound Vib. 84",
-    "tests/coupling/exact/test_closed_forms.py::test_bouncing_ball_period_one",
+    "tests/coupling/engine/line/test_closed_forms.py::test_bouncing_ball_period_one",
 )
 def bouncing_ball() -> list[Figure]:
     """The orbit with one impact a period doubles where a multiplier of the engine's period map is -1."""
@@ -124,7 +124,9 @@ def _doubling(restitution: float, ratio: float) -> float:
     return float(np.linalg.det(jacobian + np.eye(2)))
 
 
-@case("ball that comes to rest", "closed form", "tests/coupling/exact/test_closed_forms.py::test_ball_comes_to_rest")
+@case(
+    "ball that comes to rest", "closed form", "tests/coupling/engine/line/test_closed_forms.py::test_ball_comes_to_rest"
+)
 def ball_at_rest() -> list[Figure]:
     figures = []
     for restitution in (0.5, 0.9):
@@ -138,7 +140,7 @@ def ball_at_rest() -> list[Figure]:
 @case(
     "mass on an elastic stop",
     "Code_Aster SDND101",
-    "tests/coupling/exact/test_compliant_contacts.py::test_stop_of_a_spring_and_mass",
+    "tests/coupling/engine/line/test_compliant_contacts.py::test_stop_of_a_spring_and_mass",
 )
 def elastic_stop() -> list[Figure]:
     response = simulate(stop(), events=True)
@@ -152,7 +154,7 @@ def elastic_stop() -> list[Figure]:
 @case(
     "free decay with Coulomb friction",
     "Code_Aster SDND100",
-    "tests/coupling/exact/test_closed_forms.py::test_free_decay_with_coulomb_friction",
+    "tests/coupling/engine/line/test_closed_forms.py::test_free_decay_with_coulomb_friction",
 )
 def free_decay() -> list[Figure]:
     start = {"initial": {"displacement": 0.85e-3}, "time": {"periods": 4, "transient": 0}}
@@ -165,7 +167,7 @@ def free_decay() -> list[Figure]:
 @case(
     "mass on a shaking table",
     "Code_Aster SDND104",
-    "tests/coupling/exact/test_closed_forms.py::test_shaking_table_dissipation",
+    "tests/coupling/engine/line/test_closed_forms.py::test_shaking_table_dissipation",
 )
 def shaking_table() -> list[Figure]:
     def rests(acceleration: float) -> bool:
@@ -183,7 +185,11 @@ def shaking_table() -> list[Figure]:
     ]
 
 
-@case("oscillator with dry friction", "Den Hartog (1931)", "tests/coupling/exact/test_closed_forms.py::test_den_hartog")
+@case(
+    "oscillator with dry friction",
+    "Den Hartog (1931)",
+    "tests/coupling/engine/line/test_closed_forms.py::test_den_hartog",
+)
 def den_hartog() -> list[Figure]:
     r, ratio = 0.6, 0.2
     v, u = 1 / (1 - r**2), math.sin(math.pi / r) / (r * (1 + math.cos(math.pi / r)))

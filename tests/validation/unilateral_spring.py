@@ -10,9 +10,9 @@ from scipy.optimize import minimize_scalar, root
 
 from tests.tools.closed_form_scenes import scene
 from tests.validation.page import Figure, case
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.rom.reduced import ReducedModel
 

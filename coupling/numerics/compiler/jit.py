@@ -2,7 +2,7 @@
 
 Those that Python calls are kept on disk between processes, with the code of those that they call. Divisions by zero
 give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than the
-arithmetic: a compiled function allocates nothing and works in the arrays that it is given (exact.state.Scratch).
+arithmetic: a compiled function allocates nothing and works in the arrays that it is given (`Scratch` of the engines).
 """
 
 from __future__ import annotations

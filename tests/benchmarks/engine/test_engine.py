@@ -16,7 +16,7 @@ from benchmarks.engine.hand_written_loop import (
 )
 from benchmarks.engine.measure import Engine
 from benchmarks.engine.reference_solutions import solve_with_events, truth
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.cli import BAD_INPUT, main
 
 PERIODS = 20

@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from benchmarks.methods.full_mesh_comparison import CurveEffort, curve, ladder
 from benchmarks.methods.full_mesh_run import explicit_run, glued_frequencies_hz, lumped
 from tests.tools.small_structures import rod
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.bases.craig_bampton import reduce
 from vanedamp.rom.interface import Interface, InterfaceCoordinate

@@ -16,7 +16,7 @@ from benchmarks.stability import limits as stability
 from benchmarks.stability.macro_step import macro_step
 from benchmarks.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
 from benchmarks.stability.scenes import DAMPING
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.cli import main
 
 SMALL = stability.Stability(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))

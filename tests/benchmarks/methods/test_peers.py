@@ -8,8 +8,8 @@ import pytest
 from benchmarks.bodies.methods import block_scene
 from benchmarks.methods import peers
 from benchmarks.methods import scenes as method_scenes
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError, validate
 
 PERIODS, SAMPLES = 3, 10

@@ -19,7 +19,6 @@ from benchmarks.methods import charts, figures
 from benchmarks.methods.scenes import charted
 from benchmarks.rows import Rows
 from tests.commands.test_extensions import ROOT, install
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Outcome
@@ -30,6 +29,7 @@ from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.files.extensions import ExtensionError
@@ -339,7 +339,7 @@ def test_scenes_load_no_kernels_but_those_of_their_method():
     code = (
         "import sys; from vanedamp.coupling.scene.scene import Scene; from vanedamp.files.toml_input import validate\n"
         f"made = validate(Scene, {DATA!r}, 'scene'); assert 'numba' not in sys.modules\n"
-        "from vanedamp.coupling.engine import simulate; simulate(made)\n"
+        "from vanedamp.coupling.simulation import simulate; simulate(made)\n"
         "print(*(name for name in sys.modules if name.startswith('vanedamp.coupling.methods.')))"
     )
     shown = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, check=True)

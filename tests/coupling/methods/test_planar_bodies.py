@@ -11,7 +11,6 @@ from pydantic.dataclasses import dataclass
 from tests.coupling.system.test_surfaces import FOUR, HEIGHT, INCLINED, LENGTH, cavity_scene, rigid_cavity
 from tests.tools.planar import planar_scene, run_planar, still_table
 from tests.tools.planar_laws import scene_of, tables
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import moreau, penalty, scipy_ivp
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.evaluation import residual
@@ -22,6 +21,7 @@ from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.contact_laws.registry import register as register_law
 from vanedamp.coupling.scene.waveform import Waveform, register
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import STRICT, InputError
 from vanedamp.rom.reduced import ReducedModel

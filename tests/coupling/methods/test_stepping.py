@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.methods.scenes import double
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError, validate
 
 METHODS = {

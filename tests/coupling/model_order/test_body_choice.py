@@ -10,12 +10,12 @@ from benchmarks.bodies.measure import AMPLITUDE, MASS, NATURAL, STIFFNESS
 from benchmarks.model_order.body_trial import body_trial_text, draw, judge_trial, summary
 from benchmarks.model_order.figures import bodies_figure
 from tests.tools.planar import initial_motion
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.model_order.body_choice import judge, judge_all, with_blocks, with_sliders
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene, Time
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.system import FLOOR

@@ -9,9 +9,9 @@ import pytest
 from benchmarks.model_order.structures import beam_model
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_order, select_model_orders
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError, validate

@@ -16,12 +16,12 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.reference.orbit_upright_body import UprightBody
 from tests.tools.closed_form_scenes import ball, scene
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.newton import OrbitStatus
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.simulation import simulate
 
 UNIT = {"model": "rigid", "mass": 1.0, "stiffness": 1.0}
 

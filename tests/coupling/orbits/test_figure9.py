@@ -8,8 +8,8 @@ import pytest
 
 from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.tools.closed_form_scenes import scene
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.orbits import orbits
+from vanedamp.coupling.simulation import simulate
 
 MASS, STIFFNESS, RATIO, AMPLITUDE = 0.15696, 3.6046e7, 0.002, 7e-5
 NATURAL = math.sqrt(STIFFNESS / MASS) / (2 * math.pi)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import classify
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.tools.random_scenes import random_reduced
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 

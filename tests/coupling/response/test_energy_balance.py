@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.coupling.exact.test_traps import cluster
+from tests.coupling.engine.line.test_traps import cluster
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import evaluate, residual

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError, validate
 
 BODY = {"cavity": "c", "mass": 0.1, "friction": 0.3, "restitution": 0.6}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.tools.periodic_scenes import scene_of
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import CLOSES, STOPS
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import Walk
+from vanedamp.coupling.simulation import simulate
 
 PERIODS = 2
 #: sliders with stick and slip, with impacts, with Jenkins elements; blocks and discs of three laws, on springs too

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.tools.steady_scenes import KINDS, outcome_of
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.transient import Transient, left_over

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.coupling.exact.test_closed_forms import cluster
-from vanedamp.coupling.engine import simulate
+from tests.coupling.engine.line.test_closed_forms import cluster
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
+from vanedamp.coupling.simulation import simulate
 
 
 def autoregressive(rng, n, correlation):

@@ -12,7 +12,7 @@ import pytest
 
 from tests.tools.processes import environment
 from tests.tools.sweep_processes import RESONANCE, command, kill_after_a_flush, scene, write
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.record import Sweep

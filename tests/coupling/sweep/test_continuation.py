@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.tools.sweep_processes import DATA, scene
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep

@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from tests.tools.sweep_processes import RESONANCE, scene
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES, sweep, warm_up

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import DAMPED_BLOCK
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.modal.base_excitation import base_response

@@ -11,10 +11,10 @@ from tests.coupling.methods.test_planar_bodies import last, run_by
 from tests.tools.planar import run_planar
 from tests.tools.processes import ROOT
 from vanedamp import InputError, ReducedModel, Scene
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.records import FRICTION
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import body_loads, load_warnings

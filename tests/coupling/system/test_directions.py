@@ -12,9 +12,9 @@ import pytest
 from scipy import sparse
 
 from tests.tools.input_files import CLUSTER, changed
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.excitation import Gravity
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.modal.matrices import Patch, SystemMatrices

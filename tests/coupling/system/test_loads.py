@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_order
 from vanedamp.coupling.orbits.orbits import find_orbit
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.resonance import chosen_resonance

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools.laws_by_event import check_events
 from tests.tools.random_scenes import random_reduced, random_scene
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Initial
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel

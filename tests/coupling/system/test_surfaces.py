@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.tools.input_files import CLUSTER, changed
 from tests.tools.planar import run_planar
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble as assemble_scene
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.modal_basis import modal_basis

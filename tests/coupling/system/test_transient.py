@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_order
 from vanedamp.coupling.response.records import IMPACT_LOSS, new_records
 from vanedamp.coupling.response.steadiness import judge
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.transient import LIMIT, Transient, left_over, settled_after
 from vanedamp.files.toml_input import validate

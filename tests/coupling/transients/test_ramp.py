@@ -13,8 +13,8 @@ import vanedamp as vd
 from tests.coupling.sweep.test_continuation import BISTABLE, DAMPING, EPS, RATIOS, one_to_one
 from tests.coupling.system.test_loads import ring, travelling
 from tests.tools.processes import ROOT
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes
 from vanedamp.coupling.transients.lewis import chirp_response, peak_ratio

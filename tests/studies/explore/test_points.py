@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.history import late_history
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel

@@ -10,7 +10,7 @@ import tomli_w
 import xarray
 
 from tests.tools.processes import ROOT
-from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.optimisation import search as module

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from tests.studies.report.test_report import charts
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import load
 from vanedamp.files.toml_input import validate

@@ -7,12 +7,12 @@ import pytest
 
 from tests.coupling.sweep.test_continuation import BISTABLE, HALF_GAP
 from tests.studies.report.test_report import charts
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.history import SAMPLES, orbit_history
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.branch_charts import joined

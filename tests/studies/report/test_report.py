@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import OSCILLATOR, RESONANCE
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import Variable, load, save, write_json

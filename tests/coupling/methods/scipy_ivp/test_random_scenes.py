@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from tests.tools.laws_of_runs import SETTINGS, whole
 from tests.tools.random_scenes import random_jenkins, random_scene
 from tests.tools.scene_strategies import scene_of, scene_tables
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 
 PERIODS, RTOL, APART = 4, 1e-10, 1e-11

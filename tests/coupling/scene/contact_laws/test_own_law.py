@@ -16,13 +16,13 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 from tests.tools.processes import environment
-from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.exact.automaton import advance
+from vanedamp.coupling.engine.line.automaton import advance
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.contact_laws.registry import register
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import STRICT, InputError, Positive, validate

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
@@ -16,6 +15,7 @@ from vanedamp.coupling.scene.contact_laws.law import Element
 from vanedamp.coupling.scene.elements.element import SceneElement, Unit
 from vanedamp.coupling.scene.elements.registry import ELEMENTS, register
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.files.reference import key_in, options, schema
 from vanedamp.files.toml_input import STRICT, Fraction, InputError, NonNegative, Positive, Whole, validate

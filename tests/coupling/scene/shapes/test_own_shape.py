@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import planar_scene, still_table
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.shapes.registry import SHAPES, register
 from vanedamp.coupling.scene.shapes.shape import Polygon, common_heights
 from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.reference import key_in, schema
 from vanedamp.files.toml_input import InputError, validate

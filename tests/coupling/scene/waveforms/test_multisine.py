@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.scene.waveforms.multisine import Multisine
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import InputError, validate

@@ -19,11 +19,11 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 from tests.commands.test_extensions import ROOT, install
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveform import Waveform, register
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.transient import left_over

@@ -1,0 +1,563 @@
+"""The compiled heart of the engine: a hybrid automaton that jumps from event to event.
+
+Between two events the state flows exactly (exact.subsystem_assembly); the next event is found with a guarantee
+(exact.event_functions); what happens there is decided by complementarity (exact.contact_states); every joule is
+accounted for (exact.energy_balance). No segment is longer than an excitation period, so that the phase is exact at
+every period's start, where the section of the response is recorded.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.engine.line.compliant_contacts import begin_contact, change_contact, spring_force
+from vanedamp.coupling.engine.line.contact_states import (
+    add_force,
+    constant_loads,
+    keep_released,
+    resolve_contact_states,
+    stop_attached_bodies,
+)
+from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell
+from vanedamp.coupling.engine.line.event_functions import ENDLESS, carry_over_period, hop_speed, next_event
+from vanedamp.coupling.engine.line.gap_kinematics import (
+    align_gaps,
+    close_gaps,
+    join_places,
+    join_speeds,
+    mark_only,
+    measure_gaps,
+    rigid,
+    shift_slip,
+)
+from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
+from vanedamp.coupling.engine.line.section import record_start, structure_state
+from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
+from vanedamp.coupling.numerics.codes import (
+    ACCURACY_LOST,
+    AWAKE,
+    CLOSED,
+    CLOSED_ROWS,
+    CLOSES,
+    DONE,
+    EVENT_BUDGET,
+    EVENTS,
+    FLOW,
+    HELD,
+    ILL_CONDITIONED,
+    LEAVING,
+    LOGGED,
+    NEEDS_FLOW,
+    NO_SOLUTION,
+    OPEN,
+    PAUSED,
+    PERIOD,
+    POSITION,
+    RECLOSES,
+    SEARCHING,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STATES_GO_ON,
+    STATES_OPEN,
+    STICK,
+    TOUCHING,
+    UNDECIDED,
+    VELOCITY,
+)
+from vanedamp.coupling.numerics.compiler.jit import comparing, entry, inlined, kernel, summing
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, long_minus_line, secular
+from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
+from vanedamp.coupling.numerics.vectors import whole_vectors
+from vanedamp.coupling.response.records import FRICTION
+
+#: segments after which a run returns to Python, which sees interrupts
+_SLICE = 4096
+
+
+@entry
+def advance(system, flows, st, watched, rec, scratch, periods, max_events):
+    """Run until all periods are done or something is needed. Return the code (numerics.codes) of why it returns."""
+    deciding, segments = False, 0
+    while True:
+        if deciding:
+            # one place only: its code is compiled into the loop, as a call costs more than it does
+            if not resolve_contact_states(system, st, rec, scratch):
+                return UNDECIDED
+            if not _within_walls(system, st):
+                return ACCURACY_LOST
+            deciding = False
+        if st.counters[SEARCHING] == 1:
+            s = _find_flow(flows, st.active_set)
+            if s < 0:
+                return NEEDS_FLOW
+            _begin_subsystem(system, flows, st, scratch, s)
+            if stop_attached_bodies(system, flows, st):
+                keep_released(st, scratch)
+                deciding = True
+                continue
+            if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
+                record_start(system, flows, st, rec, scratch)
+        if st.counters[PERIOD] >= periods:
+            return DONE
+        if st.counters[EVENTS] >= max_events:
+            return EVENT_BUDGET
+        if segments == _SLICE or st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
+            return PAUSED
+        segments += 1
+        tau, event, side = next_event(system, flows, st, watched)
+        if event == ENDLESS:
+            return ILL_CONDITIONED
+        amplitude_changes(flows, st, scratch, tau)
+        account(system, flows, st, rec, scratch, tau)
+        _advance_motion(system, flows, st, scratch, tau)
+        # the end of a period is no event: a row that has let go just before it still does
+        if tau > (0.0 if event >= 0 else AT_START * system.period):
+            for r in range(len(st.released)):
+                st.released[r] = 0
+        if event < 0:
+            carry_over_period(system, st, watched, tau)
+            account_spell(system, flows, st, rec, scratch)
+            st.counters[PERIOD] += 1
+            st.time[0] = 0.0
+            for r in range(len(st.last_impact)):
+                st.last_impact[r] -= system.period
+            _set_phases(system, st)
+            _select_awake_modes(flows, st)
+            record_start(system, flows, st, rec, scratch)
+            align_gaps(system, st, scratch.coordinates)
+            continue
+        st.counters[EVENTS] += 1
+        st.time[0] += tau
+        _set_phases(system, st)
+        outcome = _handle_event(
+            system, flows, st, rec, scratch, watched.row[event, side], watched.order[event],
+            watched.meaning[event, side],
+        )  # fmt: skip
+        if outcome == NO_SOLUTION:
+            return UNDECIDED
+        deciding = outcome == STATES_OPEN
+        if deciding:
+            account_spell(system, flows, st, rec, scratch)
+        if not deciding and not _within_walls(system, st):
+            return ACCURACY_LOST
+
+
+@entry
+def begin(system, st, rec, scratch):
+    """Decide the contact states of the initial state. Return False if that fails."""
+    n, hit = len(st.constant), False
+    for r in range(system.friction_rows):
+        if not rigid(system, r) and system.limit[r] > 0.0:
+            st.state[r] = _jenkins_state(system, st, r)
+    for r in range(len(st.state)):
+        scratch.forced[r] = 0
+        if r >= system.friction_rows and st.displacement[r] <= SIMULTANEOUS * system.free_travel[r]:
+            if not rigid(system, r) and st.displacement[r] < -SIMULTANEOUS * system.free_travel[r]:
+                # compressed from the start: its impact was before the run
+                st.state[r] = SPRUNG if spring_force(system, st, r) > 0.0 else LEAVING
+                continue
+            _close_gap(system, st, scratch, r)
+            if st.velocity[r] < 0.0 and rigid(system, r):
+                hit = True
+            elif st.velocity[r] < 0.0:
+                begin_contact(system, st, rec, r)
+    if hit:
+        if not simultaneous_impacts(system, st, rec, scratch):
+            return False
+        _structure_jump(system, scratch)
+        for i in range(n):
+            st.coordinates[n + i] += scratch.velocity_jump[i]
+    return resolve_contact_states(system, st, rec, scratch)
+
+
+@inlined
+def _jenkins_state(system, st, r):
+    """Return the state of a Jenkins element with its elongation: its spring holds, or it slides on at its bound."""
+    at_bound = abs(system.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * system.limit[r]
+    if at_bound and st.displacement[r] * st.velocity[r] > 0.0:
+        return SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
+    return SPRUNG
+
+
+@inlined
+def _close_gap(system, st, scratch, r):
+    """Set the gap of row r to zero exactly, and those that close with it."""
+    mark_only(scratch, r)
+    join_places(system, st, scratch)
+    st.displacement[r] = 0.0
+    measure_gaps(system, st)
+    if rigid(system, r):
+        close_gaps(system, st, scratch)
+
+
+@kernel
+def _find_flow(flows, active_set):
+    """Return the place of the subsystem of these closed rows, -1 if there is none yet."""
+    for s in range(len(flows.modes)):
+        same = flows.modes[s] > 0
+        for r in range(len(active_set)):
+            if not same:
+                break
+            same = flows.active_set[s, r] == active_set[r]
+        if same:
+            return s
+    return -1
+
+
+@inlined
+def _set_phases(system, st):
+    """Set the phases of the harmonics exactly from the time."""
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * st.time[0]
+        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
+
+
+@inlined
+def _begin_subsystem(system, flows, st, scratch, s):
+    """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
+    n, b, e, y = len(st.constant), system.bodies, len(system.frequency), st.coordinates
+    st.counters[FLOW], st.counters[SEARCHING] = s, 0
+    sprung = flows.sprung[s]
+    constant_loads(system, st, scratch)
+    if sprung:
+        _preload(system, flows, st, scratch, s, y)
+    for i in range(n + b if sprung else n):
+        total = 0.0
+        for k in range(n + b):
+            total += flows.static[s, i, k] * scratch.loads[k]
+        for k in range(n):
+            total += flows.constrained[s, i, k] * y[k]
+        if i < n:
+            st.constant[i] = total
+        else:
+            st.slip_constant[i - n] = total
+    for i in range(b):
+        st.coordinate_acceleration[n + i] = 0.0
+        for k in range(b):
+            st.coordinate_acceleration[n + i] += flows.body_acceleration[s, i, k] * scratch.loads[n + k]
+    _set_phases(system, st)
+    for i in range(2 * n):
+        scratch.coordinates[i] = y[i]
+        for h in range(e):
+            scratch.coordinates[i] -= (flows.shape[s, h, i] * st.amplitude[h]).real
+        if i < n:
+            scratch.coordinates[i] -= st.constant[i]
+    if sprung:
+        for i in range(b):
+            scratch.slips[i], scratch.slips[b + i] = st.displacement[i], st.velocity[i]
+            for h in range(e):
+                scratch.slips[i] -= (flows.excited[s, i, h] * st.amplitude[h]).real
+                scratch.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
+            scratch.slips[i] -= st.slip_constant[i]
+    for j in range(e, flows.modes[s]):
+        total = 0.0j
+        for i in range(2 * n):
+            total += flows.project[s, j, i] * scratch.coordinates[i]
+        if sprung:
+            for i in range(2 * b):
+                total += flows.project_slip[s, j, i] * scratch.slips[i]
+        st.amplitude[j] = total
+    for j in range(flows.modes[s], len(st.amplitude)):
+        st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
+    _constant_forces(system, flows, st, scratch, s)
+    st.offset[0] = 0.0
+    for i in range(n):
+        st.offset[0] += system.response[i] * st.constant[i]
+    st.counters[AWAKE] = flows.modes[s]
+    _select_awake_modes(flows, st)
+
+
+@kernel
+def _preload(system, flows, st, scratch, s, y):
+    """Add the forces that closed springs have at p = 0 and xi = 0: of a wall's gap, an anchor, bodies that stick."""
+    for r in range(len(st.state)):
+        if st.state[r] == SPRUNG:
+            offset = 0.0
+            if r < system.friction_rows:
+                offset = st.displacement[r]
+                for i in range(len(st.constant)):
+                    offset -= system.J[r, i] * y[i]
+            else:
+                offset = system.rest[r]
+                for b in range(system.bodies):
+                    if flows.attached[s, b]:
+                        offset += system.J[r, system.modes + b] * st.displacement[b]
+            add_force(system, scratch, r, -system.spring[r] * offset)
+
+
+@kernel
+def _constant_forces(system, flows, st, scratch, s):
+    """Set the constant parts of the rows' accelerations and of the closed rows' forces."""
+    n, b, r_count = len(st.constant), system.bodies, len(st.state)
+    sprung = flows.sprung[s]
+    if sprung:
+        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
+    for r in range(r_count):
+        st.free_acceleration[r], st.constant_force[r] = 0.0, 0.0
+        if sprung and st.state[r] == SPRUNG:
+            st.constant_force[r] = spring_force(system, st, r)
+            for j in range(flows.modes[s]):
+                st.constant_force[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+        size = 0.0
+        for i in range(n + b):
+            part = system.J[r, i] * st.coordinate_acceleration[i]
+            st.free_acceleration[r] += part
+            size += abs(part)
+        if abs(st.free_acceleration[r]) <= CANCELLED * size:
+            st.free_acceleration[r] = 0.0  # bodies that fall together
+    for i in range(n):
+        scratch.loads[i] -= system.stiffness[i] * st.constant[i]
+    for i in range(n, n + b):
+        scratch.loads[i] /= system.mass[i]
+    for r in range(r_count):
+        scratch.acceleration[r], scratch.jerk[r] = 0.0, 0.0
+        for i in range(n + b):
+            part = system.J[r, i] * scratch.loads[i]
+            scratch.acceleration[r] += part
+            scratch.jerk[r] += abs(part)
+        if sprung:
+            for k in range(r_count):
+                scratch.acceleration[r] += system.delassus[r, k] * st.constant_force[k]
+                scratch.jerk[r] += abs(system.delassus[r, k] * st.constant_force[k])
+    for r in range(r_count):
+        if flows.closed_inverse[s, r, r] == 0.0:
+            continue
+        force, size = 0.0, 0.0
+        for k in range(r_count):
+            force -= flows.closed_inverse[s, r, k] * scratch.acceleration[k]
+            size += abs(flows.closed_inverse[s, r, k]) * scratch.jerk[k]
+        st.constant_force[r] = force if abs(force) > CANCELLED * size else 0.0
+
+
+@inlined
+def _select_awake_modes(flows, st):
+    """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives.
+
+    Modes are in order of their rates: what is awake are the first counters[AWAKE] of them.
+    """
+    s, e = st.counters[FLOW], flows.driven.shape[1] - 1
+    largest = _largest_acceleration(flows, st, s, st.counters[AWAKE])
+    last, count = flows.driven[s, e], flows.driven[s, e]
+    for j in range(last, st.counters[AWAKE]):
+        c = st.amplitude[j]
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > INACTIVE * largest:
+            count = j + 1
+        else:
+            st.amplitude[j] = 0.0
+    st.counters[AWAKE] = count
+
+
+@inlined
+def _wake_modes(flows, st):
+    """Wake the modes that an impulse has set in motion. None goes to sleep before its spell has ended."""
+    s = st.counters[FLOW]
+    largest, count = _largest_acceleration(flows, st, s, flows.modes[s]), flows.modes[s]
+    while count > st.counters[AWAKE]:
+        c = st.amplitude[count - 1]
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > INACTIVE * largest:
+            break
+        count -= 1
+        st.amplitude[count] = 0.0
+        st.change[2 * count], st.change[2 * count + 1] = 0.0, 0.0
+    st.counters[AWAKE] = count
+
+
+@inlined
+def _largest_acceleration(flows, st, s, count):
+    """Return the largest acceleration of the first `count` modes, and set the bound of their speeds."""
+    largest, st.largest_speed[0] = _largest(st.amplitude, flows.acceleration[s], flows.speed[s], count)
+    return largest
+
+
+@comparing
+def _largest(amplitude, acceleration, speed, count):
+    largest, fastest = 0.0, 0.0
+    for j in range(count):
+        size = abs(amplitude[j].real) + abs(amplitude[j].imag)
+        largest = max(largest, size * acceleration[j])
+        fastest = max(fastest, size * speed[j])
+    return largest, fastest
+
+
+@inlined
+def amplitude_changes(flows, st, scratch, tau):
+    """Set the changes of the awake modes' amplitudes over the segment."""
+    s, e = st.counters[FLOW], flows.driven.shape[1] - 1
+    count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
+    if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[AWAKE], tau):
+        _grow(long_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
+    else:
+        _grow(exp_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
+    if flows.driven[s, e] > e:
+        _add_driven_growth(
+            flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
+        )
+
+
+@summing
+def _grow(term, eigenvalue, amplitude, count, tau, gain, bend):
+    """Set the changes of amplitudes over a time, and the same less their tangents, by this function of z."""
+    for j in range(count):
+        rate, c = eigenvalue[j], amplitude[j]
+        z = complex(rate.real * tau, rate.imag * tau)
+        first = exp_minus_one(z)
+        gain[j] = c * first
+        bend[j] = c * term(z, first)
+
+
+@kernel
+def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
+    """Add the growth of the modes that the harmonics drive: the first ones, always awake."""
+    for h in range(len(driven) - 1):
+        for j in range(driven[h], driven[h + 1]):
+            growth, beyond = secular(eigenvalue[j], eigenvalue[h], tau)
+            gain[j] += load[j] * phase[h] * growth
+            bend[j] += load[j] * phase[h] * beyond
+
+
+@inlined
+def _advance_motion(system, flows, st, scratch, tau):
+    """Advance rows and amplitudes by tau."""
+    s, count, friction = st.counters[FLOW], st.counters[AWAKE], system.friction_rows
+    for r in range(len(st.state)):
+        state = st.state[r]
+        if (r >= friction and (system.moves_with_floor[r] or state == CLOSED or state == TOUCHING)) or (
+            r < friction and (state == STICK or state == HELD)
+        ):
+            continue
+        shift, speed = _row_change(flows.motion[s, r], flows.velocity[s, r], scratch.bend, scratch.gain, count)
+        shift += tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau)
+        speed += st.free_acceleration[r] * tau
+        st.velocity[r] += speed
+        if r < friction:
+            st.ledger[FRICTION] -= st.applied_force[r] * shift
+        if r >= friction or rigid(system, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
+            shift_slip(st, r, shift)
+    if flows.sprung[s]:
+        _add_contact_impulses(system, flows, st, scratch, tau)
+    if st.counters[CLOSED_ROWS] > 0:
+        _stay_together(system, st, scratch)
+    measure_gaps(system, st)
+    for j in range(count):
+        gain = scratch.gain[j]
+        st.amplitude[j] += gain
+        st.change[2 * j] += gain.real
+        st.change[2 * j + 1] += gain.imag
+
+
+@summing
+def _row_change(motion, velocity, bend, gain, count):
+    """Return what the modes add to displacement and velocity of a row."""
+    shift, speed = 0.0, 0.0
+    for j in range(count):
+        shift += motion[j].real * bend[j].real - motion[j].imag * bend[j].imag
+        speed += velocity[j].real * gain[j].real - velocity[j].imag * gain[j].imag
+    return shift, speed
+
+
+@inlined
+def _stay_together(system, st, scratch):
+    """Keep bodies that move as one exactly together."""
+    closed = False
+    for r in range(system.friction_rows, len(st.state)):
+        scratch.touching[r] = rigid(system, r) and st.state[r] != OPEN
+        closed = closed or scratch.touching[r]
+    if closed:
+        join_places(system, st, scratch)
+        join_speeds(system, st, scratch)
+
+
+@kernel
+def _add_contact_impulses(system, flows, st, scratch, tau):
+    """Add the segment to the impulses of compliant contacts."""
+    s = st.counters[FLOW]
+    for r in range(system.friction_rows, len(st.state)):
+        if st.state[r] == SPRUNG:
+            st.contact_impulse[r] += st.constant_force[r] * tau
+            for j in range(st.counters[AWAKE]):
+                st.contact_impulse[r] += (flows.impulse[s, r, j] * scratch.gain[j]).real
+
+
+@inlined
+def _within_walls(system, st):
+    """Whether round-off has kept every body inside its cavity."""
+    friction = system.friction_rows
+    for r in range(friction, len(st.state)):
+        pressed = st.state[r] == SPRUNG or st.state[r] == LEAVING
+        if not pressed and not st.displacement[r] >= -OVERLAP * system.free_travel[r]:
+            return False
+    return True
+
+
+@inlined
+def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
+    """Apply the event of row r, a jump of velocities or a change at a row.
+
+    Returns STATES_GO_ON, STATES_OPEN where contact states must be decided again, or NO_SOLUTION.
+    """
+    n = len(st.constant)
+    if order == POSITION and meaning == CLOSES and single_impact(system, st, rec, scratch, r):
+        _change_amplitudes(system, flows, st, rec, scratch)
+        return STATES_GO_ON
+    keep_released(st, scratch)
+    if order == POSITION and meaning != RECLOSES:
+        # a gap that closes while it still widens, to round-off, is a touch without speed
+        if meaning == CLOSES and st.velocity[r] > 0.0:
+            st.velocity[r] = 0.0
+            mark_only(scratch, r)
+            join_speeds(system, st, scratch)
+        _close_gap(system, st, scratch, r)
+    if order == POSITION and meaning == CLOSES and rigid(system, r):
+        for i in range(system.friction_rows, len(st.state)):
+            if st.state[i] == CLOSED:
+                st.capture_speed[i] = hop_speed(system, flows, st, i)
+            elif st.state[i] == TOUCHING:
+                st.capture_speed[i] = 0.0
+        if not simultaneous_impacts(system, st, rec, scratch):
+            return NO_SOLUTION
+        if all_in_flight(system, st):
+            _change_amplitudes(system, flows, st, rec, scratch)
+            return STATES_GO_ON
+        structure_state(flows, st, st.coordinates)
+        _structure_jump(system, scratch)
+        for i in range(n):
+            st.coordinates[n + i] += scratch.velocity_jump[i]
+        return STATES_OPEN
+    if order == VELOCITY:
+        st.velocity[r] = 0.0
+    elif r < system.friction_rows or rigid(system, r):
+        scratch.forced[r] = meaning
+    elif meaning != CLOSES:
+        change_contact(system, st, rec, scratch, r, meaning)
+    elif st.velocity[r] < 0.0:
+        begin_contact(system, st, rec, r)
+    structure_state(flows, st, st.coordinates)
+    if meaning == CLOSES:
+        align_gaps(system, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
+    return STATES_OPEN
+
+
+@inlined
+def _change_amplitudes(system, flows, st, rec, scratch):
+    """Apply the impulses of the rows to the amplitudes, within the same subsystem."""
+    s = st.counters[FLOW]
+    for r in range(len(st.state)):
+        impulse = scratch.impulse[r]
+        if impulse != 0.0:
+            account_impact(system, flows, st, rec, r, impulse)
+            for j in range(flows.driven[s, 0], flows.modes[s]):
+                jump = flows.impulse_response[s, r, j] * impulse
+                st.amplitude[j] += jump
+                st.change[2 * j] += jump.real
+                st.change[2 * j + 1] += jump.imag
+    _wake_modes(flows, st)
+
+
+@inlined
+def _structure_jump(system, scratch):
+    """Set the jump of the structure's modal velocities under the impulses."""
+    for i in range(len(scratch.velocity_jump)):
+        scratch.velocity_jump[i] = 0.0
+        for r in range(len(scratch.impulse)):
+            scratch.velocity_jump[i] += system.J[r, i] * scratch.impulse[r]

@@ -1,0 +1,351 @@
+"""Exact motion while every contact keeps its state: open, sticking, or slipping one way.
+
+The forces of closed contacts keep their gaps (and the slips of those that stick) at zero: they are linear in what
+presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
+the projection of the accelerations is oblique. Only what is stretched, xi = B q with B a basis of the rows of stiffness
+and damping, moves by a differential equation of its own, whose modes are complex and may grow; everything else follows
+by quadrature. A closed compliant contact is a spring and a dashpot whose force has the direction W_N - sigma mu W_T.
+Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
+
+All is computed in coordinates sqrt(M) q, where the mass matrix is one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import eig, null_space, orth
+
+from vanedamp.coupling.engine.plane.tolerances import (
+    APART,
+    FASTEST,
+    HELD_ROUND_OFF,
+    RANK,
+    REFINED,
+    SINGULAR,
+    SLOWEST,
+    SQUARED,
+    STIFFEST,
+)
+from vanedamp.coupling.engine.run import IllConditioned
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
+from vanedamp.coupling.system.system import System
+
+
+@record
+class ContactFlows(NamedTuple):
+    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
+
+    key: np.ndarray  # (s, u) int: the states
+    modes: np.ndarray  # (s,) int, 0: a free place
+    eigenvalue: np.ndarray  # (s, m)
+    project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
+    offset: np.ndarray  # (s, m)
+    in_phase: np.ndarray  # (s, m, e): share of the real part of the phase of each harmonic in c
+    in_quadrature: np.ndarray  # (s, m, e): of the imaginary part
+    motion: np.ndarray  # (s, N, m): q of each mode
+    rows: np.ndarray  # (s, 2u, m): J motion
+    bend: np.ndarray  # (s, N): constant acceleration
+    bend_held: np.ndarray  # (s, N, N): and what displacements held by constraints add
+    force: np.ndarray  # (s, 2u, m)
+    force_constant: np.ndarray  # (s, 2u)
+    force_held: np.ndarray  # (s, 2u, N)
+    self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
+    close_gaps: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
+    stop_rows: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
+    held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
+    drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
+    loss: np.ndarray  # (s, m, m): G^T C G
+    loss_apart: np.ndarray  # (s, m, m): G^T C conj G
+    growth: np.ndarray  # (s,) largest rate of growth, 1/s
+    fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
+
+
+def empty_flows(system: System, capacity: int = 8) -> ContactFlows:
+    """Room for `capacity` flows."""
+    size, u, e = len(system.mass), len(system.rest), len(system.frequency)
+    springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
+    m = e + 2 * len(_stretched(system, springs))
+    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
+    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
+    return ContactFlows(
+        key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
+        project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
+        rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
+        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), close_gaps=f(size, u), stop_rows=f(size, 2 * u),
+        held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
+        fastest=f(),
+    )  # fmt: skip
+
+
+def add_flow(flows: ContactFlows, system: System, state: np.ndarray) -> ContactFlows:
+    """The stack with the flow of the states (u,) in its first free place.
+
+    Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
+    """
+    free = np.flatnonzero(flows.modes == 0)
+    if len(free) == 0:
+        if sum(part.nbytes for part in flows) > _ROOM:
+            flows = empty_flows(system, len(flows.modes))
+        else:
+            more = empty_flows(system, len(flows.modes))
+            flows = ContactFlows(*(np.concatenate(pair) for pair in zip(flows, more, strict=True)))
+        free = np.flatnonzero(flows.modes == 0)
+    _fill(flows, system, int(free[0]), state)
+    return flows
+
+
+#: bytes that the flows of one run may take
+_ROOM = 2**28
+
+
+def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and those of springs (s, N)."""
+    root = np.sqrt(system.mass)
+    matrix = system.stiffness / root / root[:, None]
+    size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
+    rows = springs / root
+    rows *= (size**2 or 1.0) / np.linalg.norm(rows, axis=1)[:, None]
+    both = np.vstack([matrix, size * system.damping / root / root[:, None], rows])
+    touched = np.flatnonzero(both.any(axis=0))
+    if not len(touched):
+        return np.zeros((0, len(root)))
+    if np.linalg.matrix_rank(both[:, touched]) == len(touched):
+        return np.eye(len(root))[touched]
+    basis: np.ndarray = orth(both.T, rcond=RANK).T
+    return basis
+
+
+def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> None:
+    u, e, size = len(system.rest), len(system.frequency), len(system.mass)
+    root = np.sqrt(system.mass)
+    rows = system.J / root
+    units = np.arange(u)
+    compliant = np.isfinite(system.spring)
+    closed = np.flatnonzero((state < OPEN) & (units < system.contacts) & ~compliant)
+    pressed = np.flatnonzero((state < OPEN) & compliant)
+    stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
+    way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
+    kept = np.r_[closed, u + stick]
+    constraints = rows[kept]
+    drag = way * system.friction
+    wrench = np.vstack([rows[closed] - drag[closed, None] * rows[u + closed], rows[u + stick]]).T
+    sliders = len(system.tangential)
+    holds, follows = (np.flatnonzero((state[u - sliders :] == STICK) == rests) for rests in (True, False))
+    # a slider that moves hands its force on to what draws it
+    drawn = rows[u:].copy()
+    drawn[u - sliders :] += system.elongation / root
+    slides = np.flatnonzero((units >= system.contacts) & (way != 0))
+    applied = -(way * system.limit)[slides] @ drawn[slides]
+    carried, oblique = _forces(constraints, wrench)
+    stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
+    push = (rows[pressed] - drag[pressed, None] * rows[u + pressed]).T
+    spring, dashpot = (part[pressed, None] * rows[pressed] for part in (system.spring, system.dashpot))
+    stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
+    if len(holds):
+        stretch = system.elongation[holds] / root
+        mobility = (stretch[:, : size - sliders] ** 2).sum(axis=1)
+        if (system.tangential[holds] * mobility).max() > (STIFFEST * system.frequency[0]) ** 2:
+            raise IllConditioned("the spring of a friction damper is as good as rigid")
+        stiffness = stiffness + stretch.T @ (system.tangential[holds, None] * stretch)
+    basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
+    allowed = np.eye(len(basis))
+    if len(basis) and len(constraints):
+        # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
+        turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=SINGULAR), full_matrices=False)
+        allowed = turned[:, sine > SINGULAR]
+    k = allowed.shape[1]
+    held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
+    held[np.abs(held) < HELD_ROUND_OFF] = 0.0
+    inner = allowed.T @ basis  # eta = inner sqrt(M) q
+    inner[:, size - sliders :] = 0.0  # sliders rest, or follow
+    own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
+    preload = system.spring[pressed] * system.rest[pressed]
+    weight = system.weight / root + applied
+    eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
+    order = np.argsort(np.abs(eigenvalue), kind="stable")
+    eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
+    count = e + len(eigenvalue)
+    rate = np.r_[1j * system.frequency, eigenvalue]
+    # constant part, of loads and of what constraints hold
+    still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
+    rest, rest_held = still @ weight, -still @ stiffness @ held
+    if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
+        rest = rest - np.linalg.solve(own, inner @ oblique @ push @ preload)
+        weight = weight - push @ preload
+    load = system.load / root
+    wave = np.zeros((k, e), complex)
+    for h, omega in enumerate(system.frequency):
+        wave[:, h] = np.linalg.solve(own - omega**2 * np.eye(k) + 1j * omega * loss, inner @ oblique @ load[h])
+    eta = np.hstack([wave, shape[:k]])
+    net = -(stiffness @ inner.T @ eta + damping @ inner.T @ (eta * rate))
+    net[:, :e] += load.T
+    net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
+    motion = (oblique @ net) / rate**2
+    bend, bend_held = oblique @ net_constant, oblique @ net_held
+    if len(pressed) or len(holds):  # forces of stiff springs nearly cancel: of what they stretch, more is known
+        motion += inner.T @ (eta - inner @ motion)
+        bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
+    for a, row in zip(size - sliders + follows, system.elongation[follows] / root, strict=True):
+        for part in (motion, bend, bend_held):
+            part[a] = root[a] * (row[:-sliders] @ part[:-sliders])
+    # a coordinate that constraints hold is at rest, not at round-off
+    motion[np.abs(motion) <= HELD_ROUND_OFF * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
+    flows.key[s], flows.modes[s] = state, count
+    flows.eigenvalue[s, :count] = rate
+    both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
+    flows.project[s, e:count] = project @ np.vstack(both)
+    flows.project[s, e:count, :size] -= project[:, :k] @ rest_held * root
+    flows.offset[s, e:count] = project[:, :k] @ rest
+    full = np.vstack([wave, 1j * system.frequency * wave])
+    flows.in_phase[s, e:count], flows.in_quadrature[s, e:count] = project @ full.real, -(project @ full.imag)
+    flows.motion[s, :, :count] = motion / root[:, None]
+    turned = system.J @ flows.motion[s, :, :count]
+    terms = np.abs(system.J) @ np.abs(flows.motion[s, :, :count])
+    flows.rows[s, :, :count] = np.where(np.abs(turned) <= CANCELLED * terms, 0, turned)
+    flows.bend[s], flows.bend_held[s] = bend / root, bend_held / root[:, None] * root
+    flows.force[s], flows.force_constant[s], flows.force_held[s] = 0.0, 0.0, 0.0
+    for part, target in ((net, flows.force[s, :, :count]), (net_constant, flows.force_constant[s])):
+        _spread(target, carried @ part, closed, stick, drag, u)
+    _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
+    strained = inner.T @ eta
+    for part, target in (
+        (-spring @ strained - dashpot @ (strained * rate), flows.force[s, :, :count]),
+        (-preload - spring @ inner.T @ rest, flows.force_constant[s]),
+        (-spring @ (held + inner.T @ rest_held) * root, flows.force_held[s]),
+    ):
+        target[pressed] = part
+        target[u + pressed] -= (drag[pressed] * part.T).T
+    flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
+    flows.self_stress[s] = 0.0
+    if len(kept):
+        lever = np.linalg.norm(wrench, axis=0)
+        balanced = null_space(wrench / lever, rcond=SINGULAR)
+        spread = np.zeros((2 * u, len(kept)))
+        _spread(spread, balanced @ balanced.T / lever[:, None] * lever, closed, stick, drag, u)
+        flows.self_stress[s][:, kept] = spread
+    touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~compliant)
+    flows.close_gaps[s], flows.stop_rows[s] = 0.0, 0.0
+    flows.close_gaps[s][:, touching] = np.linalg.pinv(rows[touching], rcond=SINGULAR) / root[:, None]
+    still_rows = np.r_[touching, u + stick]
+    flows.stop_rows[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=SINGULAR) / root[:, None]
+    free = drawn - drawn @ np.linalg.pinv(constraints, rcond=SINGULAR) @ constraints
+    flows.held[s] = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
+    speeds = flows.motion[s, :, :count] * rate
+    drag = system.damping @ speeds
+    flows.drag[s, :, :count] = drag
+    flows.loss[s, :count, :count], flows.loss_apart[s, :count, :count] = speeds.T @ drag, speeds.T @ drag.conj()
+    flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
+    flows.fastest[s] = (np.abs(rate.real) + np.abs(rate.imag)).max()
+
+
+def _spread(
+    target: np.ndarray, forces: np.ndarray, closed: np.ndarray, stick: np.ndarray, drag: np.ndarray, u: int
+) -> None:
+    """Put the forces of the kept rows, and the friction of those that slip, into their places."""
+    normal = forces[: len(closed)]
+    target[closed] = normal
+    target[u + closed] = -(drag[closed] * normal.T).T
+    target[u + stick] = forces[len(closed) :]
+
+
+def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the forces of the kept rows (k, N) and accelerations (N, N) by the loads. Raises IllConditioned."""
+    size = constraints.shape[1]
+    if not len(constraints):
+        return np.zeros((0, size)), np.eye(size)
+    mobility = constraints @ wrench
+    scale = 1 / np.linalg.norm(constraints, axis=1)
+    inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=SINGULAR) * scale * scale[:, None]
+    carried = -inverse @ constraints
+    oblique = np.eye(size) + wrench @ carried
+    if _yielding(constraints, oblique, scale) > SQUARED:
+        carried, oblique = _forces_of_near_dependent(constraints, wrench, scale, carried, oblique)
+        if _yielding(constraints, oblique, scale) > LOST:
+            raise IllConditioned("its friction forces have no solution")
+    return carried, oblique
+
+
+def _yielding(constraints: np.ndarray, oblique: np.ndarray, scale: np.ndarray) -> float:
+    """Return the largest acceleration that is left in a row that is to have none, per unit of load and length."""
+    return float(np.abs((constraints @ oblique) * scale[:, None]).max())
+
+
+def _forces_of_near_dependent(
+    constraints: np.ndarray, wrench: np.ndarray, scale: np.ndarray, carried: np.ndarray, oblique: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces and accelerations as `_forces` does, for rows that nearly depend on each other.
+
+    The mobility of a block that stands wedged on two corners, one almost above the other, has the square of their
+    constraints' condition. Not so the projector N (Y^T N)^-1 Y^T on the motions N that the constraints leave, along the
+    wrenches, to which Y is normal. Where there is none, as wrenches and constraints differ in rank, those given are
+    returned.
+    """
+    wrench = wrench * scale
+    free = null_space(constraints * scale[:, None], rcond=SINGULAR)
+    normal = null_space(wrench.T, rcond=SINGULAR)
+    meeting = normal.T @ free  # cosines
+    if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < SINGULAR:
+        return carried, oblique
+    oblique = free @ np.linalg.solve(meeting, normal.T)
+    carried = np.linalg.pinv(wrench, rcond=SINGULAR) @ (oblique - np.eye(len(oblique))) * scale[:, None]
+    return carried, oblique
+
+
+def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues (c,), vectors (2k, c) and their inverse (c, 2k) of eta'' + damping eta' + stiffness eta = 0.
+
+    Of complex pairs one is returned, twice in the inverse: real parts count.
+    """
+    k = len(stiffness)
+    if not k:
+        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
+    scale = np.sqrt(np.abs(stiffness).max())
+    matrix = np.block([[np.zeros((k, k)), np.eye(k) * scale], [-stiffness / scale, -damping]])
+    values, vectors = eig(matrix)
+    vectors /= np.linalg.norm(vectors, axis=0)
+    if np.abs(values).max() > FASTEST * omega:
+        raise IllConditioned("a mode is too fast for the excitation")
+    if np.abs(values).min() < SLOWEST * omega or np.linalg.cond(vectors) > DEFECTIVE:
+        raise IllConditioned("its modes are one to round-off, or it has no stiffness")
+    if np.abs(values).max() > APART * np.abs(values).min():
+        values, shapes = _polish(values, vectors[:k], stiffness, damping)
+        vectors = np.vstack([shapes, shapes * values / scale])
+        vectors /= np.linalg.norm(vectors, axis=0)
+    inverse = np.linalg.inv(vectors)
+    vectors[k:] *= scale
+    inverse[:, k:] /= scale
+    keep = values.imag >= 0.0
+    inverse[values.imag > 0.0] *= 2.0
+    return values[keep], vectors[:, keep], inverse[keep]
+
+
+def _polish(
+    values: np.ndarray, shapes: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take two of Newton's steps on the quadratic problem for eigenvalues (m,) and shapes (k, m), lengths kept.
+
+    Beside stiff contacts the linear problem leaves slow modes with round-off relative to the quick ones. Equal modes,
+    whose steps are not small, stay as they are.
+    """
+    values, eye = values.copy(), np.eye(len(stiffness))
+    shapes = (shapes / np.linalg.norm(shapes, axis=0)).astype(complex)
+    for n, value in enumerate(values):
+        shape = shapes[:, n]
+        for _ in range(2):
+            force = value**2 * eye + value * damping + stiffness
+            slope = (2 * value * eye + damping) @ shape
+            system = np.block([[force, slope[:, None]], [shape.conj()[None], np.zeros((1, 1))]])
+            size = np.maximum(np.abs(system).max(axis=1), np.finfo(float).tiny)
+            try:
+                change = np.linalg.solve(system / size[:, None], np.r_[-(force @ shape), 0.0] / size)
+            except np.linalg.LinAlgError:
+                break
+            if not max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= REFINED:
+                break
+            shape, value = shape + change[:-1], value + change[-1]
+        values[n], shapes[:, n] = value, shape
+    return values, shapes

@@ -1,0 +1,156 @@
+"""The state of a run of bodies with extent, and scratch space. Sizes as in constraints.System; m modes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.engine.root_search import Expansion, new_expansion
+from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
+from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
+from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import System
+
+
+@record
+class PlanarState(NamedTuple):
+    """The state at the start of a segment."""
+
+    # changes all the time
+    counters: np.ndarray  # int (numerics.codes)
+    time: np.ndarray  # (1,) within the period, s
+    q: np.ndarray  # (N,)
+    v: np.ndarray  # (N,)
+    # (u,) int: OPEN; LEAVING, a compliant contact that has ended before its gap is open; TOUCHING, closed but others
+    # carry its force, or nothing presses it; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
+    # contact without friction counts. A friction element sticks or slips
+    state: np.ndarray
+    other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
+    known: np.ndarray  # (u,) int: states as last logged
+    fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
+    rate: np.ndarray  # (2u,) speeds of rows, scratch
+    scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
+    last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
+    pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
+    lost: np.ndarray  # (u,) what it has taken since then, J
+    ledger: np.ndarray  # (6,) J
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
+    lifted: np.ndarray  # (periods + 1, b) time off the floor, s
+    sampled: np.ndarray  # (samples, N) coordinates
+    shut: np.ndarray  # (samples, u) int: whether contacts are closed
+    # of a segment
+    amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
+    bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
+    force: np.ndarray  # (2u,) constant part of the forces, N
+    # (2u,) self-stress of contacts that depend on each other, N: what their forces have beside the least ones
+    prestress: np.ndarray
+
+
+@record
+class Guards(NamedTuple):
+    """The event functions of a segment."""
+
+    unit: np.ndarray  # (k,) int
+    order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of exact.root_search
+    # (k,) int: CLOSES, OPENS, a gap; STOPS, a slip; PARTS, a normal force vanishes; RECLOSES, it would push again;
+    # AT_LOW, AT_HIGH, friction at its bound
+    what: np.ndarray
+    status: np.ndarray  # (k,) int
+    k0: np.ndarray
+    k1: np.ndarray
+    k2: np.ndarray
+    noise: np.ndarray
+    no_root_before: np.ndarray  # s
+    g: np.ndarray  # (k, m) complex
+    expansion: Expansion
+
+
+@record
+class Scratch(NamedTuple):
+    """Space for intermediate results."""
+
+    free: np.ndarray  # (N,) acceleration without contact forces
+    terms: np.ndarray  # (N,) size of the terms that it is a sum of
+    ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
+    speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
+    before_impact: np.ndarray  # (2u,) speeds
+    impulse: np.ndarray  # (2u,)
+    compression: np.ndarray  # (2u,) impulse of the phase of compression
+    compressed: np.ndarray  # (2u,) speeds after it
+    least: np.ndarray  # (u,) normal impulse of expansion that compression asks for
+    bound: np.ndarray  # (u,) friction that a listed unit has whatever its unknown normal force, N or N s
+    before: np.ndarray  # (u,) int: states before the event
+    listed: np.ndarray  # (u,) int: units of a problem
+    way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
+    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop; what it does in a short step
+    place: np.ndarray  # (u,) int: where its unknowns begin
+    verdict: np.ndarray  # (u,) int
+    doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
+    first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
+    doubt: np.ndarray  # (u,) int: doubtful now
+    sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
+    resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and what it does then
+    span: np.ndarray  # (N, N) orthonormal basis of rows
+    lemke: Lemke
+    split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)
+    part: np.ndarray  # (4u,) int: kind of each of its unknowns
+    column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
+    attempt: np.ndarray  # (1,) int: how often a decision has been made anew
+    turn: np.ndarray  # (m,) complex
+    # of integrals in closed form (exponential_integrals)
+    moment: np.ndarray  # (3, m) complex: integrals of t^k exp(lambda t)
+    pair: np.ndarray  # (2, m, m) complex: of products of exponentials, and of one with the conjugate of the other
+    constant: np.ndarray  # (4, 3): powers of t in each signal
+    signal: np.ndarray  # (4, m) complex: exponentials in each signal
+    wave: np.ndarray  # (m,) complex
+
+
+def new_state(system: System, modes: int, initial: Motion, records: Records) -> PlanarState:
+    """Return the state at time zero. A spring that is compressed pushes, or lags behind the body that leaves it."""
+    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
+    samples, sprung = len(records.samples), np.isfinite(system.spring)
+    gap, speed = system.rest + system.J[:u] @ initial.q, system.J[:u] @ initial.v
+    pushes = np.where(sprung, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
+    state = np.where(sprung & (gap < -SIMULTANEOUS * system.play), np.where(pushes, SLIP_RIGHT, LEAVING), OPEN)
+    return PlanarState(
+        counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
+        state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
+        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
+        lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
+        sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
+        amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
+        prestress=np.zeros(2 * u),
+    )  # fmt: skip
+
+
+def new_guards(system: System, modes: int) -> Guards:
+    """Return room for three event functions a unit."""
+    k = 3 * len(system.rest)
+    return Guards(
+        unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
+        status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
+        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), expansion=new_expansion(modes),
+    )  # fmt: skip
+
+
+def new_scratch(system: System, modes: int) -> Scratch:
+    """Return scratch space for a scene."""
+    u, size = len(system.rest), len(system.mass)
+    integers = iter(np.zeros((11, u), np.int64))
+    return Scratch(
+        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
+        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
+        least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
+        way=next(integers), slips=next(integers), place=next(integers), verdict=next(integers),
+        doubtful=next(integers), first=next(integers), doubt=next(integers),
+        sliding=next(integers), resting=next(integers),
+        span=np.zeros((size, size)), lemke=new_lemke(3 * u),
+        split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
+        attempt=np.zeros(1, np.int64),
+        moment=np.zeros((3, modes), complex), pair=np.zeros((2, modes, modes), complex), constant=np.zeros((4, 3)),
+        signal=np.zeros((4, modes), complex), turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
+    )  # fmt: skip
