@@ -42,28 +42,23 @@ def check_run(scene: Scene, samples: int = 0) -> None:
     _check_time("time.periods", f"{periods:.3g} periods", run_seconds(scene))
 
 
-def check_sweep(scene: Scene, workers: int | None) -> None:
+def check_sweep(scene: Scene, workers: int) -> None:
     """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
-    from vanedamp.studies.workers import available_cores
-
-    points, count = scene.points, workers or available_cores()
-    seconds = sweep_seconds(scene, count)
+    points, seconds = scene.points, sweep_seconds(scene, workers)
     if points > MOST_POINTS:
         raise InputError(
-            f"sweep: {points:.3g} points take {duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
+            f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
     check_run(scene)
-    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {count} workers", seconds)
+    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {workers} workers", seconds)
 
 
-def check_optimise(study: Study, workers: int | None) -> None:
+def check_optimise(study: Study, workers: int) -> None:
     """Refuse an optimisation that takes a month. Raises InputError."""
-    from vanedamp.studies.workers import available_cores
-
-    scenes, count = scenes_of(study), workers or available_cores()
+    scenes = scenes_of(study)
     check_run(study.scene)
-    _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
+    _check_time("optimise", f"{scenes:.3g} scenes on {workers} workers", scenes * run_seconds(study.scene) / workers)
 
 
 def _modes(scene: Scene) -> int:

@@ -23,8 +23,7 @@ from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run, check_sweep, run_seconds, sweep_seconds
 from vanedamp.studies.commands.support.facts import Fact
-from vanedamp.studies.commands.support.outputs import Outputs
-from vanedamp.studies.commands.support.scenes import load_any_scene
+from vanedamp.studies.scene_checks import load_scene
 from vanedamp.studies.workers import available_cores
 
 #: natural frequencies that are listed
@@ -35,9 +34,9 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 
 def facts(path: str | Path) -> list[Fact]:
     """Return what the scene in a file means. Raises InputError, as its commands do."""
-    scene = load_any_scene(str(path), Outputs(()))
+    scene = load_scene(path)
     if scene.sweep:
-        check_sweep(scene, None)
+        check_sweep(scene, available_cores())
     else:
         check_run(scene)
     commands = [name for table, name in _COMMANDS.items() if getattr(scene, table)]
