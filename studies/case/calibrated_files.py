@@ -23,22 +23,6 @@ _GAPS, _BODY, _RANGE = (1.0, 0.5, 0.1), 0.02, (0.95, 1.03)
 _SCHEMA = "#:schema "
 
 
-def save_calibration(
-    source: str | Path,
-    calibration: Calibration,
-    record: str | Path | None,
-    case: str | Path | None,
-    scene: str | Path | None,
-) -> None:
-    """Write the record, the tuned case and the rigid scene of a calibrated case file `source`; None: not that one."""
-    if record is not None:
-        calibration.save(record)
-    if case is not None:
-        save_tuned_case(source, calibration, case)
-    if scene is not None:
-        save_rigid_scene(source, calibration, scene)
-
-
 def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write the case file of a calibration with its tuned numbers, and all else as it was.
 

@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.case.stages import assemble, reduced_case, unit_doubts
+from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 
@@ -16,7 +16,7 @@ def run(arguments: Namespace, case: Case) -> None:
     """Reduce the case."""
     started = time.perf_counter()
     structure = assemble(case)
-    model = reduced_case(
+    model = reduction(
         structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots,
         arguments.recovery,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,15 +110,6 @@ def curves(sweep: Sweep, name: str) -> list[Curve]:
         _curve(*parts, unit or parts[0].reference)
         for parts in zip(responses, confidence, harmonic, classification, strict=True)
     ]
-
-
-def means_of(curves: Sequence[Curve]) -> np.ndarray:
-    """Return the means (k, f) of k curves at all f frequencies that one of them has; nan where a run is not ok."""
-    frequencies = np.unique(np.concatenate([curve.frequency for curve in curves]))
-    means = np.full((len(curves), len(frequencies)), np.nan)
-    for row, curve in zip(means, curves, strict=True):
-        row[np.searchsorted(frequencies, curve.frequency)] = curve.mean
-    return means
 
 
 def _curve(

@@ -6,6 +6,7 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vanedamp.coupling.scene.scene import Scene
@@ -63,10 +64,13 @@ def check_optimise(study: Study, workers: int) -> None:
 
 def _modes(scene: Scene) -> int:
     """Return the number of modal coordinates that samples have: at most those of the model's file."""
-    if not isinstance(scene.structure, Rom):
+    structure = scene.structure
+    if not isinstance(structure, Rom):
         return 0
-    modes = scene.structure.modes
-    return modes if isinstance(modes, int) else coordinates_in_file(scene.structure)
+    if isinstance(structure.modes, int):
+        return structure.modes
+    # a pipeline checks its scenes before it makes their model
+    return coordinates_in_file(structure) if Path(structure.file).is_file() else 0
 
 
 def designs_of(study: Study) -> int:
