@@ -171,6 +171,16 @@ def _direction(
         raise InputError(f"interface.{label}.{key}: {error}") from None
 
 
+@dataclass(frozen=True)
+class Fatigue:
+    """Where the first bending's stress reaches a share of the fatigue strength (spot), and the displacement (amplitude,
+    m) of the response coordinate at which it does."""
+
+    share: float
+    amplitude: float
+    spot: HotSpot
+
+
 @dataclass(frozen=True, eq=False)
 class ModalAnalysis:
     """Modes and their figures.
@@ -181,10 +191,7 @@ class ModalAnalysis:
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
     cavities        how that mode moves the case's cavities, those interface coordinates that move across, too, by label
     functional      (N,) that coordinate; None without
-    amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
-                    without one
-    hot_spot        where it does; None without
-    share           of the fatigue strength
+    fatigue         of that mode; None without a rigid model or a fatigue strength
     warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
     gyroscopic      as many modes with the gyroscopic coupling, if the case wants them
     """
@@ -196,9 +203,7 @@ class ModalAnalysis:
     rigid: RigidModel | None
     cavities: dict[str, CavityMotion]
     functional: np.ndarray | None
-    amplitude: float | None
-    hot_spot: HotSpot | None
-    share: float
+    fatigue: Fatigue | None
     warnings: tuple[str, ...]
     wall_time_s: float
     gyroscopic: GyroscopicModes | None = None
@@ -225,14 +230,14 @@ class ModalAnalysis:
                 "whirl": self.gyroscopic.whirl.tolist(),
                 "residual": self.gyroscopic.residuals.tolist(),
             }
-        if self.amplitude is not None:
-            assert self.hot_spot is not None
+        if self.fatigue is not None:
+            spot = self.fatigue.spot
             data["fatigue"] = {
-                "strength": self.hot_spot.strength,
-                "share": self.share,
-                "amplitude": self.amplitude,
-                "coordinates": list(self.hot_spot.coordinates),
-                "group": self.hot_spot.group,
+                "strength": spot.strength,
+                "share": self.fatigue.share,
+                "amplitude": self.fatigue.amplitude,
+                "coordinates": list(spot.coordinates),
+                "group": spot.group,
             }
         return data
 
@@ -275,10 +280,9 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Return modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
+    label, rigid, fatigue = case.response_label, None, None
     cavities: dict[str, CavityMotion] = {}
-    if label is not None:
-        functional = _functional(case, matrices, label)
+    functional = None if label is None else _functional(case, matrices, label)
     modes = _modes(case, matrices, functional)
     bending, warnings = _first_bending(case, modes, matrices)
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
@@ -294,18 +298,14 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         if strengths:
             spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
             amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
-    gyroscopic = _gyroscopic(structure, len(modes))
+            fatigue = Fatigue(table.share, amplitude, spot)
+    gyroscopic = None
+    if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
+        gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
     return ModalAnalysis(
-        structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, amplitude, spot,
-        table.share, warnings, time.perf_counter() - started, gyroscopic,
+        structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, fatigue, warnings,
+        time.perf_counter() - started, gyroscopic,
     )  # fmt: skip
-
-
-def _gyroscopic(structure: Structure, count: int) -> GyroscopicModes | None:
-    rotation, rotating = structure.case.rotation, structure.rotating
-    if rotation is None or rotating is None or not rotation.gyroscopic:
-        return None
-    return gyroscopic_modes(rotating, rotation.omega, count)
 
 
 def _cavities(

@@ -100,24 +100,17 @@ def curves(sweep: Sweep, name: str) -> list[Curve]:
     Along an engine order the last axis is the speed, and the frequency the excitation's.
     """
     responses = forced_responses(sweep, name)
-    count = len(responses[0].x)
-    confidence, harmonic, classification = (
-        values.reshape(-1, count)
-        for values in (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
-    )
+    measures = (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
+    confidence, harmonic, kinds = (values.reshape(len(responses), -1) for values in measures)
     unit = sweep.scene.excitation.resonance_amplitude
     return [
-        _curve(*parts, unit or parts[0].reference)
-        for parts in zip(responses, confidence, harmonic, classification, strict=True)
+        _curve(response, confidence[row], harmonic[row], kinds[row], unit or response.reference)
+        for row, response in enumerate(responses)
     ]
 
 
 def _curve(
-    response: ForcedResponse,
-    confidence: np.ndarray,
-    harmonic: np.ndarray,
-    classification: np.ndarray,
-    unit: float,
+    response: ForcedResponse, confidence: np.ndarray, harmonic: np.ndarray, classification: np.ndarray, unit: float
 ) -> Curve:
     done = np.isfinite(response.damped_mean)
 
