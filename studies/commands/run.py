@@ -23,13 +23,16 @@ def run(arguments: Namespace, scene: Scene) -> None:
         response = simulate(scene, arguments.events, arguments.samples, progress=report)
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
-    lines = (
+    lines = [
         f"{name:26} {_format(value)} {UNITS.get(name, '')}".rstrip()
         for name, value in result.items()
         if not isinstance(value, dict | list)
-    )
-    provenance = {"versions": versions(), "scene": scene.to_dict()}
-    write_result(arguments, result, lines, output=lambda path: response.save(path, provenance))
+    ]
+
+    def save(path: str) -> None:
+        response.save(path, {"versions": versions(), "scene": scene.to_dict()})
+
+    write_result(arguments, result, lines, output=save)
 
 
 def _format(value: Any) -> str:
