@@ -35,6 +35,9 @@ from vanedamp.coupling.numerics.exponentials import (
 from vanedamp.coupling.numerics.tolerances import AT_ROOT, NEAR_ROOT, SUM_ROUND_OFF
 from vanedamp.coupling.numerics.vectors import whole_vectors
 
+#: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
+#: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
+MOST, ENDLESS = 1_000_000, -3
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
 _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
@@ -325,6 +328,43 @@ def _step_by_parabola(a, sign, f, h):
     c7, c8, c9 = min(sign * a[7], 0.0), min(sign * a[8], 0.0), min(sign * a[9], 0.0)
     lowest = (c3 * h + (c4 + c5 * h) * h2) + ((c6 + c7 * h) + (c8 + c9 * h) * h2) * h4 - a[10] * (h4 * h4)
     return min(h, first_root_of_parabola(f, sign * a[1], 2.0 * (sign * a[2] + lowest)))
+
+
+@kernel
+def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
+    """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
+
+    The third value returned: whether k0_far - sign motion has no root on the step either; False is not known.
+    expansion, noise, second, calm, fast: of the motion, as set and returned by `expand`.
+    """
+    whole, slow = expansion.taylor[0], expansion.taylor[1]
+    noise += SUM_ROUND_OFF * abs(k0)
+    f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
+    if f <= noise:
+        if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
+            return 0.0, True, False
+        f = 0.0
+    longest = max(longest, shortest)
+    far = 0.0
+    if calm >= 0.0:
+        above = k0 + sign * slow[0] - fast
+        if above > noise:
+            far, _, _ = safe_step(slow, sign, above, 0.0, 0.0, calm, longest)
+            if far >= longest:
+                return far, False, False
+    step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
+    if far > step:
+        return far, False, False
+    if calm >= 0.0 and far == 0.0 and not found and shortest < step < longest:
+        # the slow motion has left the fast one behind by then
+        above = k0 + sign * slow[0] - fast + shift(slow, sign, step, expansion.shifted)
+        if above > noise:
+            far, _, _ = safe_step(expansion.shifted, 1.0, above, 0.0, 0.0, calm, longest - step)
+            return step + far, False, False
+    if step < shortest:
+        falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
+        return (0.0, True, False) if falls else (shortest, False, False)
+    return step, found, clear
 
 
 @kernel
