@@ -15,14 +15,14 @@ periods.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
 from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.exponentials import (
     exp_minus_line,
     exp_minus_one,
@@ -55,20 +55,17 @@ _FAST = 4.0
 class Expansion(NamedTuple):
     """The expansion of an event function at a time, and room for it."""
 
-    taylor: np.ndarray  # (2, DEGREE + 1) polynomials of its motion, and of that without fast modes
-    amplitude: np.ndarray  # (m,) complex: those of the exponentials at its time
-    slow: np.ndarray  # sums over the slow modes
-    fast: np.ndarray  # those over the fast ones
-    more: np.ndarray
-    shifted: np.ndarray  # (DEGREE + 1,) polynomial from another time on
+    taylor: Annotated[np.ndarray, "2 degrees"]  # polynomials of its motion, and of that without fast modes
+    amplitude: Annotated[np.ndarray, "m", complex]  # those of the exponentials at its time
+    slow: Annotated[np.ndarray, "sums"]  # sums over the slow modes
+    fast: Annotated[np.ndarray, "sums"]  # those over the fast ones
+    more: Annotated[np.ndarray, "sums"]
+    shifted: Annotated[np.ndarray, "degrees"]  # polynomial from another time on
 
 
 def new_expansion(modes: int) -> Expansion:
     """Return room for the expansion of event functions of m modes."""
-    slow, fast, more = np.zeros((3, _SUMS))
-    return Expansion(
-        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), slow, fast, more, np.zeros(DEGREE + 1)
-    )  # fmt: skip
+    return room(Expansion, {"m": modes, "degrees": DEGREE + 1, "sums": _SUMS})
 
 
 @kernel
