@@ -12,9 +12,8 @@ from scipy.interpolate import barycentric_interpolate
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.corrector import near
 from vanedamp.coupling.orbits.multipliers import decided, indicators
-from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
+from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, near, point_of, with_symmetry
 
 #: share of the parameter to which bifurcations are located
 _CLOSE = 1e-10

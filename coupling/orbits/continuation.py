@@ -13,10 +13,20 @@ import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
-from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Point, Problem, point_of, solve, with_symmetry
+from vanedamp.coupling.orbits.newton import (
+    HALVINGS,
+    ITERATIONS,
+    Orbit,
+    OrbitStatus,
+    Point,
+    Problem,
+    corrected,
+    point_of,
+    solve,
+    with_symmetry,
+)  # fmt: skip
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
-from vanedamp.coupling.orbits.sequence_changes import change, forecast
+from vanedamp.coupling.orbits.passage import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -112,8 +122,7 @@ class Follower:
             share = (edge - head.y[-1]) / (y[-1] - head.y[-1])
             start = head.y + share * (y - head.y)
             start[-1] = edge
-            row = np.append(np.zeros(self.problem.size), 1.0)
-            at_edge = solve(self.problem, start, row, head.slope, ITERATIONS, HALVINGS)
+            at_edge = solve(self.problem, start, self.problem.along_parameter, head.slope, ITERATIONS, HALVINGS)
             if at_edge.status is OrbitStatus.OK:
                 orbit = at_edge
         return point_of(self.problem, orbit, head.tangent)
@@ -155,10 +164,8 @@ class Follower:
         return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
 
     def _note(self, trace: Trace, found: Located) -> None:
-        orbit = found.orbit
-        trace.special.append(
-            SpecialPoint(len(trace.points) - 1, orbit.parameter, found.kind, found.note, orbit.state)
-        )  # fmt: skip
+        last, orbit = len(trace.points) - 1, found.orbit
+        trace.special.append(SpecialPoint(last, orbit.parameter, found.kind, found.note, orbit.state))
 
     def _returned(self, trace: Trace, before: Point, point: Point) -> bool:
         """Say whether the branch passes its first orbit between two points."""
@@ -216,11 +223,8 @@ class Follower:
         for attempt in range(_ATTEMPTS):
             if high - low <= close:
                 break
-            at, margin = (
-                forecast([(where, found.passage) for where, found in seen[-2:]]),
-                max(1e-3 * (high - low), close / 4),
-            )
-            middle = (low + high) / 2
+            at = forecast([(where, found.passage) for where, found in seen[-2:]])
+            middle, margin = (low + high) / 2, max(1e-3 * (high - low), close / 4)
             if at is None or attempt % 3 == 2:
                 at = middle
             else:

@@ -114,7 +114,7 @@ class Diagram:
         """Return the branch through the first orbit. Raises InputError if there is none."""
         follower = self._follower(self.table.periods)
         problem = follower.problem
-        start, row = problem.pack(self.start(), self.low), _along_parameter(problem)
+        start, row = problem.pack(self.start(), self.low), problem.along_parameter
         orbit = solve(problem, start, row, np.zeros(problem.size))
         problem.count["iterations"] += orbit.iterations
         if orbit.status is not OrbitStatus.OK:
@@ -180,7 +180,3 @@ class Diagram:
             f"no orbit found on the other branch at the {point.kind} at {self.table.parameter} = {point.parameter:.9g}"
         )
         return None
-
-
-def _along_parameter(problem: Problem) -> np.ndarray:
-    return np.append(np.zeros(problem.size), 1.0)

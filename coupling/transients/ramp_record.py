@@ -5,21 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.records import ENERGIES
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import Variable, frozen, load, reader, save
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import Variable, frozen
 
 if TYPE_CHECKING:
     import xarray
 
-KIND = "ramp"
 DIRECTIONS = ("up", "down")
 #: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
@@ -84,7 +82,7 @@ class RampRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Ramp:
+class Ramp(SceneRecord):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
@@ -95,6 +93,7 @@ class Ramp:
     be read before figures are used; provenance: versions and further data of the caller (JSON-able).
     """
 
+    KIND: ClassVar[str] = "ramp"
     scene: Scene
     runs: tuple[RampRun, ...]
     curves: Mapping[str, np.ndarray]
@@ -168,25 +167,19 @@ class Ramp:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
 
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens."""
-        attributes = {
-            "scene": self.scene.to_dict(), "tops": dict(self.tops),
-            "warnings": json.dumps(list(self.warnings)), "provenance": dict(self.provenance),
-        }  # fmt: skip
-        save(path, KIND, self.variables(), attributes)
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        return super().attributes() | {"tops": dict(self.tops)}
 
     @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Ramp:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, KIND)
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ramp:
+        """Return the record in the variables and attributes of a file."""
+        given = cls.common(attributes, path)
         values.setdefault("amplitude_dynamic", values["amplitude"])  # all that earlier files have
-        scene = validate(Scene, json.loads(attributes["scene"]), str(path))
         runs = []
         for number, rate in enumerate(values["rate"]):
             inside, starts = values["run_of_period"] == number, values["run_of_start"] == number
-            stuck = values["stuck"][inside] if scene.damper else np.zeros((np.count_nonzero(inside), 0))
+            stuck = values["stuck"][inside] if given["scene"].damper else np.zeros((np.count_nonzero(inside), 0))
             runs.append(
                 RampRun(
                     rate=float(rate), status=str(values["status"][number]), stuck=frozen(stuck, bool),
@@ -197,14 +190,10 @@ class Ramp:
                 )
             )  # fmt: skip
         return cls(
-            scene=scene, runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
-            tops=json.loads(attributes["tops"]), warnings=tuple(json.loads(attributes["warnings"])),
-            provenance=json.loads(attributes["provenance"]),
+            runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
+            tops=json.loads(attributes["tops"]), **given,
         )  # fmt: skip
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the variables of the file as a data set of xarray, which must be installed."""
-        from xarray import Dataset
-
-        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
-        return Dataset(data, attrs={"quantity": self.table.quantity})
+        """Return the data set of xarray, which must be installed, that the file opens as; with the quantity."""
+        return super().to_xarray().assign_attrs(quantity=self.table.quantity)
