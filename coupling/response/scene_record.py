@@ -1,4 +1,4 @@
-"""The base of results of a scene that are kept on disk: sweeps, branches of orbits, run-ups, ring-downs."""
+"""The bases of results of a scene on disk, sweeps, branches of orbits, run-ups, ring-downs, and of checkpoints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import Variable, dataset, load, reader, save
+from vanedamp.files.checkpoint_file import CheckpointFile, digests
+from vanedamp.files.store import StoreError, Variable, dataset, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -60,3 +61,27 @@ class SceneRecord:
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as."""
         return dataset(self.variables(), self.attributes())
+
+
+class SceneCheckpoint(CheckpointFile):
+    """The checkpoint of a command on a scene. A context manager, which writes what has changed as it ends."""
+
+    def __init__(self, path: str | Path | None, kind: str, scene: Scene, provenance: Mapping[str, Any]) -> None:
+        belongs = {
+            "scene": ("scene", scene.to_dict()),
+            "model": ("reduced model or CSV file", digests(scene.files)),
+            "provenance": ("version of the software", provenance),
+        }
+        super().__init__(path, kind, belongs, self.content)
+
+    def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
+        """Return variables and further attributes of the file, and how much is finished, in words."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # a file that could not be written will not be now
+        if kind is None or not issubclass(kind, StoreError):
+            self.write()
