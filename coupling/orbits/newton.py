@@ -38,7 +38,7 @@ _FLOOR = 1e-3
 #: scaled distance of an orbit from its mirror image
 _SYMMETRIC = 1e-6
 #: corrections of a point of a branch before its step is shortened, which is better than many
-ITERATIONS, HALVINGS = 8, 3
+_ITERATIONS, _HALVINGS = 8, 3
 
 
 class OrbitStatus(StrEnum):
@@ -280,12 +280,18 @@ def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.nda
             if (passage := problem.passage(predicted)) is None:
                 return None
             slope = problem.slope(predicted, passage)
-        orbit = solve(problem, predicted, row, slope, ITERATIONS, HALVINGS)
+        orbit = solve(problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
         problem.count["iterations"] += orbit.iterations
         if orbit.status is OrbitStatus.OK:
             off = np.linalg.norm(problem.pack(orbit.state, orbit.parameter) - predicted)
             return orbit if off <= distance else None
     return None
+
+
+def at_parameter(problem: Problem, y: np.ndarray, slope: np.ndarray) -> Orbit | None:
+    """Return the orbit near y (k + 1,) with its parameter; None if there is none near."""
+    orbit = solve(problem, y, problem.along_parameter, slope, _ITERATIONS, _HALVINGS)
+    return orbit if orbit.status is OrbitStatus.OK else None
 
 
 def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:

@@ -16,19 +16,16 @@ from scipy.optimize import brentq
 
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import (
-    HALVINGS,
-    ITERATIONS,
     Orbit,
-    OrbitStatus,
     Point,
     Problem,
+    at_parameter,
     bordered,
     corrected,
     least_squares,
     near,
     point_of,
-    solve,
-)  # fmt: skip
+)
 from vanedamp.coupling.orbits.passage import Passage
 
 #: what happens to a body that comes to a wall and has room on the other side
@@ -118,9 +115,8 @@ class OtherSide:
 
     def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
         """Return the orbit of the same sequence at the parameter of y; None if there is none."""
-        orbit = solve(self.problem, y, self.problem.along_parameter, last.slope, ITERATIONS, HALVINGS)
-        same = orbit.passage.sequence == last.orbit.passage.sequence
-        return orbit if orbit.status is OrbitStatus.OK and same else None
+        orbit = at_parameter(self.problem, y, last.slope)
+        return orbit if orbit is not None and orbit.passage.sequence == last.orbit.passage.sequence else None
 
     def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
         """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
