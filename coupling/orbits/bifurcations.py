@@ -14,13 +14,13 @@ from scipy.optimize import brentq
 from vanedamp.coupling.orbits.multipliers import Indicators, decided, indicators
 from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, near, point_of, with_symmetry
 
-#: share of the parameter to which bifurcations are located
+#: fraction of the parameter to which bifurcations are located
 _CLOSE = 1e-10
-#: a test function that is larger than this share of its ends' at its root has jumped there, and has no zero
+#: a test function that is larger than this fraction of its ends' at its root has jumped there, and has no zero
 _ZERO = 1e-3
 #: distance of a pair's imaginary part from zero, of its modulus from 1
 _PAIR = 1e-4
-#: distance of two bifurcations that are one, as a share of the step
+#: distance of two bifurcations that are one, as a fraction of the step
 _SAME = 1e-3
 
 #: kinds of points from which branches of other orbits go out
@@ -36,7 +36,7 @@ class Located(NamedTuple):
 
 
 class _Lost(Exception):
-    """No orbit was found where one was looked for."""
+    """No orbit was found where one was sought."""
 
 
 def bifurcations(problem: Problem, before: Point, after: Point) -> Iterator[Located]:
@@ -75,7 +75,7 @@ def _root(
 ) -> tuple[float, Point] | None:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
-    Orbits are looked for on the parabola through the three nearest that are known: beside a pitchfork Newton's method,
+    Orbits are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
     whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, the
     zero is that of the chord.
     """

@@ -169,17 +169,11 @@ class Branches(SceneRecord, Displayed):
         """Return the variables of a file: the points of all branches one after the other, special points, branches."""
         unit, branches = unit_of(self.parameter), self.branches
         special = [(number, point) for number, branch in enumerate(branches) for point in branch.special]
-        k = len(self.names)
-
-        def joined(name: str) -> np.ndarray:
-            return np.concatenate([getattr(branch, name) for branch in branches])
-
-        of_points = {
-            "branch_of_point": np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches]),
-            "neutral": joined("neutral"), "sequence": joined("sequence"),
-            **{name: joined(name).astype(np.int8) for name in FLAGS},
-        }  # fmt: skip
         sources = [(-1, -1) if branch.source is None else branch.source for branch in branches]
+        points = {name: np.concatenate([getattr(branch, name) for branch in branches]) for name in BranchPoint._fields}
+        points |= {name: points[name].astype(np.int8) for name in FLAGS}
+        points["branch_of_point"] = np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches])
+        state, multipliers, units = points.pop("state"), points.pop("multipliers"), {"parameter": unit} | MEASURES
         of_special = {
             "special_branch": np.array([number for number, _ in special], int),
             "special_index": np.array([point.index for _, point in special], int),
@@ -192,19 +186,16 @@ class Branches(SceneRecord, Displayed):
             "source_branch": np.array([source[0] for source in sources], int),
             "source_special": np.array([source[1] for source in sources], int),
         }
+        states = np.reshape([point.state for _, point in special], (len(special), len(self.names)))
         return {
             "coordinate": Variable(np.array(self.names, object), ("coordinate",)),
             "scale": Variable(self.scale, ("coordinate",)),
-            "parameter": Variable(joined("parameter"), ("point",), unit),
-            "state": Variable(joined("state"), ("point", "coordinate")),
-            "multiplier_real": Variable(joined("multipliers").real, ("point", "multiplier")),
-            "multiplier_imag": Variable(joined("multipliers").imag, ("point", "multiplier")),
-            **{name: Variable(joined(name), ("point",), units) for name, units in MEASURES.items()},
-            **{name: Variable(values, ("point",)) for name, values in of_points.items()},
+            "state": Variable(state, ("point", "coordinate")),
+            "multiplier_real": Variable(multipliers.real, ("point", "multiplier")),
+            "multiplier_imag": Variable(multipliers.imag, ("point", "multiplier")),
+            **{name: Variable(values, ("point",), units.get(name, "1")) for name, values in points.items()},
             "special_parameter": Variable([point.parameter for _, point in special], ("special",), unit),
-            "special_state": Variable(
-                np.reshape([point.state for _, point in special], (len(special), k)), ("special", "coordinate")
-            ),
+            "special_state": Variable(states, ("special", "coordinate")),
             **{name: Variable(values, ("special",)) for name, values in of_special.items()},
             **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
         }

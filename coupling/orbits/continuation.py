@@ -2,7 +2,7 @@
 
 Between events the period map is smooth, and so is a branch as long as the sequence of events along the orbit stays.
 Where the sequence changes a branch may have a kink, turn back or end. That point is located from the side where the
-branch comes from; then an orbit of the other sequence is looked for (orbits.other_side).
+branch comes from; then an orbit of the other sequence is sought (orbits.other_side).
 """
 
 from __future__ import annotations

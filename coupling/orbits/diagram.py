@@ -19,7 +19,7 @@ from vanedamp.files.toml_input import InputError
 _MOST_BRANCHES, _MOST_PERIODS = 32, 64
 #: how often the first step onto another branch, `step`, is quartered
 _QUARTERS = 6
-#: distance of two special points that are one, as a share of the range and of the coordinates' scale
+#: distance of two special points that are one, as a fraction of the range and of the coordinates' scale
 _SAME = 1e-3
 
 _MEANING = {
@@ -33,7 +33,7 @@ class Diagram:
     """The branches of a period map, found one after the other.
 
     table: how to follow them; low, to: range of the parameter, to: None for a single orbit; start: returns the state
-    (k,) from which the first orbit is looked for; notes: what could not be done.
+    (k,) from which the first orbit is sought; notes: what could not be done.
     """
 
     def __init__(

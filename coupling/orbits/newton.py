@@ -33,7 +33,7 @@ _ROUND_OFF = 1e-13
 _DIFFERENCE = 3e-5
 #: by which steps are shortened where the passage is not smooth over them, and how far from straight it may be
 _SHRINKS, _BEND = (1.0, 1e-2, 1e-4, 1e-6), 1e-2
-#: smallest size of a parameter, as a share of the branch's range, that its differences are relative to
+#: smallest size of a parameter, as a fraction of the branch's range, that its differences are relative to
 _FLOOR = 1e-3
 #: scaled distance of an orbit from its mirror image
 _SYMMETRIC = 1e-6
@@ -58,9 +58,9 @@ class Orbit:
     """A periodic orbit, or the last state of a search for one.
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
-    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest share of the scale by
-    which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a period
-    later.
+    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest fraction of the scale
+    by which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a
+    period later.
     """
 
     status: OrbitStatus
@@ -248,7 +248,7 @@ def solve(
         bound = math.inf if last else float(np.linalg.norm(residual))
         taken, changed = _taken(problem, y, step, passage, bound, halvings)
         if taken is None:
-            # beside a bifurcation a residual at round-off is an orbit, and the next step is noise
+            # near a bifurcation a residual at round-off is an orbit, and the next step is noise
             if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, relative, size):
                 status = OrbitStatus.OK
             else:
@@ -329,7 +329,7 @@ def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndar
 
 
 def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
-    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without a share of neutral coordinates."""
+    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without neutral coordinates."""
     tangent = least_squares(bordered(problem, passage, slope, row), problem.along_parameter)
     length = float(np.linalg.norm(tangent))
     return tangent / length if length > 0.0 else row

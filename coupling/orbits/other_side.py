@@ -1,9 +1,9 @@
 """Orbits beyond the place where the sequence of events along a branch ends.
 
-An orbit of another sequence is looked for where the branch would go on, at the root of the distance along it where a
+An orbit of another sequence is sought where the branch would go on, at the root of the distance along it where a
 new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
 event does, while the orbit goes on as if nothing had happened. The state on the other side is how a passage ends that
-begins a little beside the last orbit: the event, which comes at both of its ends, is then inside of the period at one
+begins close to the last orbit: the event, which comes at both of its ends, is then inside of the period at one
 end and outside at the other.
 """
 
@@ -30,7 +30,7 @@ from vanedamp.coupling.orbits.passage import Passage
 
 #: what happens to a body that comes to a wall and has room on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
-#: scaled distance within which a neutral coordinate is looked for an end
+#: scaled distance within which a neutral coordinate is sought an end
 _FARTHEST = 10.0
 #: how often the search for the place of a new event is widened
 _WIDENINGS = 6

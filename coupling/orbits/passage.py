@@ -34,7 +34,7 @@ class Crossing(NamedTuple):
     """An event on the way.
 
     time: s since the start; name: of the event with its bodies, corners and surfaces, the same in every passage, such
-    as "impact c.left.0" or "sticks 0"; speed: rate of its event function at the crossing, in units of the function a
+    as "impact c.left.0" or "sticks 0"; speed: rate of its event function at the crossing, in units of the function per
     second: zero is grazing; energy: J that it takes away.
     """
 
@@ -50,7 +50,7 @@ class Passage(NamedTuple):
     state: (k,) after the periods; derivative: (k, k) of it with respect to the state before, one-sided where the map
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;
     clearance: the smallest distance to an event that did not happen (a gap that nearly closed, a force near its bound),
-    as a share of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
+    as a fraction of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
     peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response.
     """
 

@@ -30,14 +30,14 @@ class Sweep(SceneRecord, Displayed):
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
-                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          structure without bodies and with every body fixed in its cavity; `mean_confidence` is the
                           half width of the mean's 95 % confidence interval, nan where there are too few periods;
                           `max_dynamic` and `mean_dynamic` count from the static deflection under the bodies' loads,
                           as `undamped` and `fixed` do
-    attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
-    energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
+    attached_mass_fraction  fraction of the bodies' mass that the structure feels; nan without bodies or motion
+    energy_share          (*grid, 4) fraction of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
-    in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), share of the time off the
+    in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
                           floor, what small tilts neglect over the smallest play; nan for sliders; empty for a scene
                           of sliders
     peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 DIRECTIONS = ("up", "down")
 #: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
-#: series of a run, an entry a period, and their units
+#: series of a run, an entry per period, and their units
 SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "amplitude_dynamic": "m", "impacts": "1"}
 #: states at both ends of every period, and their units
 STATES = {"displacement": "m", "velocity": "m/s"}
@@ -33,7 +33,7 @@ CURVES = {"frequency": "Hz", "speed": "rad/s", "undamped": "m", "fixed": "m"}
 class RampRun:
     """A run through p excitation periods with b bodies.
 
-    rate             change of the ramp's quantity in a second, below zero where it falls
+    rate             change of the ramp's quantity per second, below zero where it falls
     status           "ok", or another response.response.Status that ended the run early or spoils its figures
     time             (p,) s, at the start of each period
     frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
@@ -86,7 +86,7 @@ class Ramp(SceneRecord):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
-    linear structure in steady state without bodies and with every body glued to its cavity; tops: the largest of both
+    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the largest of both
     from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
     `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
     which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to

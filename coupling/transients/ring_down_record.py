@@ -25,7 +25,7 @@ PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 class LinearMode:
     """The followed natural mode: its number from 0, frequency (Hz, undamped) and damping ratio without bodies.
 
-    fixed_frequency, fixed_damping_ratio: with every body glued to its cavity.
+    fixed_frequency, fixed_damping_ratio: with every body fixed in its cavity.
     """
 
     mode: int
@@ -42,7 +42,7 @@ class RingDown(SceneRecord):
     scene: with its [ring_down] table; linear: the mode without bodies
     duration            s, of the free motion
     time                (k,) s of the turning points, from the start of the free motion
-    displacement        (k,) m there, the mode's share of that at excitation.at
+    displacement        (k,) m there, the mode's contribution to that at excitation.at
     energy              (k,) J there, of structure, bodies and springs
     structure_energy    (k,) J there, of all modes of the structure
     impacts             (k - 1,) in each half cycle
