@@ -228,9 +228,9 @@ def _checkpoint() -> dict[str, float]:
             kept.finished.put(np.arange(size), rng.normal(size=(size, len(COLUMNS))), np.zeros((size, 2), int), ["ok"])
             took = []
             for _ in range(5):
-                kept._file._unsaved = True
+                kept._unsaved = True
                 started = time.perf_counter()
-                kept._file.write()
+                kept.write()
                 took.append(time.perf_counter() - started)
             times.append(min(took))
             files.append(path.stat().st_size)

@@ -33,7 +33,7 @@ def respond(
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     ended = run_scene(run, scene, progress)
-    response = evaluate(scene, run.outcome(), ended.status, ended.transient, started, ended.confidence)
+    response = evaluate(scene, run.outcome(), ended, started)
     return replace(response, final=final_state(scene, run))
 
 

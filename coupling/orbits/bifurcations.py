@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,17 +11,16 @@ from scipy.interpolate import barycentric_interpolate
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.corrector import near
-from vanedamp.coupling.orbits.multipliers import decided, indicators
-from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
+from vanedamp.coupling.orbits.multipliers import Indicators, decided, indicators
+from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, near, point_of, with_symmetry
 
-#: share of the parameter to which bifurcations are located
+#: fraction of the parameter to which bifurcations are located
 _CLOSE = 1e-10
-#: a test function that is larger than this share of its ends' at its root has jumped there, and has no zero
+#: a test function that is larger than this fraction of its ends' at its root has jumped there, and has no zero
 _ZERO = 1e-3
 #: distance of a pair's imaginary part from zero, of its modulus from 1
 _PAIR = 1e-4
-#: distance of two bifurcations that are one, as a share of the step
+#: distance of two bifurcations that are one, as a fraction of the step
 _SAME = 1e-3
 
 #: kinds of points from which branches of other orbits go out
@@ -38,7 +36,7 @@ class Located(NamedTuple):
 
 
 class _Lost(Exception):
-    """No orbit was found where one was looked for."""
+    """No orbit was found where one was sought."""
 
 
 def bifurcations(problem: Problem, before: Point, after: Point) -> Iterator[Located]:
@@ -48,7 +46,11 @@ def bifurcations(problem: Problem, before: Point, after: Point) -> Iterator[Loca
     length = float((after.y - before.y) @ before.tangent)
     neutral, found = before.orbit.neutral, []
     for kind, test in _TESTS.items():
-        function = partial(test, neutral=neutral)
+
+        def function(point: Point, test: Callable[[Point, Indicators], float] = test) -> float:
+            # neutral multipliers are as many as on the piece, since at its end one more may be 1
+            return test(point, indicators(point.orbit.multipliers, neutral))
+
         low, high = function(before), function(after)
         if low * high >= 0.0:
             continue
@@ -73,7 +75,7 @@ def _root(
 ) -> tuple[float, Point] | None:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
-    Orbits are looked for on the parabola through the three nearest that are known: beside a pitchfork Newton's method,
+    Orbits are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
     whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, the
     zero is that of the chord.
     """
@@ -116,27 +118,14 @@ def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[
     return root
 
 
-def _fold(point: Point, neutral: int) -> float:
-    return float(point.tangent[-1])
-
-
-def _pitchfork(point: Point, neutral: int) -> float:
-    """A multiplier passes 1 while the parameter does not turn: the bordered derivative is singular (Keller 1977)."""
-    return indicators(point.orbit.multipliers, neutral).unity * float(np.sign(point.tangent[-1]))
-
-
-def _doubling(point: Point, neutral: int) -> float:
-    return indicators(point.orbit.multipliers, neutral).doubling
-
-
-def _torus(point: Point, neutral: int) -> float:
-    return indicators(point.orbit.multipliers, neutral).torus
-
-
-#: by kind; the number of neutral multipliers is that of the piece, since at its end one more may be 1
-_TESTS: dict[str, Callable[..., float]] = {
-    "fold": _fold, "period doubling": _doubling, "neimark-sacker": _torus, "pitchfork": _pitchfork
-}  # fmt: skip
+#: test functions of a point and its indicators, by kind; at a pitchfork a multiplier passes 1 while the parameter does
+#: not turn: the bordered derivative is singular (Keller 1977)
+_TESTS: dict[str, Callable[[Point, Indicators], float]] = {
+    "fold": lambda point, of: float(point.tangent[-1]),
+    "period doubling": lambda point, of: of.doubling,
+    "neimark-sacker": lambda point, of: of.torus,
+    "pitchfork": lambda point, of: of.unity * float(np.sign(point.tangent[-1])),
+}
 
 
 def _on_circle(orbit: Orbit, neutral: int) -> bool:

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Displayed
-from vanedamp.files.store import Variable, frozen, load, reader, save
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import Variable, frozen
 
-if TYPE_CHECKING:
-    import xarray
-
-KIND = "orbits"
 #: measures of an orbit and their units, each an array over the points of a branch
 MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
 FLAGS = ("stable", "symmetric", "undetermined")
+#: types of the arrays over the points of a branch; others are floats
+_TYPES = {"multipliers": complex, "neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
 
 
 class BranchPoint(NamedTuple):
@@ -110,8 +106,7 @@ class Branch:
     ) -> Branch:  # fmt: skip
         """Return the branch of some points."""
         columns = dict(zip(BranchPoint._fields, zip(*points, strict=True), strict=True))
-        types = {"multipliers": complex, "neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
-        arrays = {name: frozen(column, types.get(name, float)) for name, column in columns.items()}
+        arrays = {name: frozen(column, _TYPES.get(name, float)) for name, column in columns.items()}
         return cls(periods=periods, special=tuple(special), end=end, source=source, **arrays)
 
     @property
@@ -131,7 +126,7 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches(Displayed):
+class Branches(SceneRecord, Displayed):
     """Branches of periodic orbits of a scene over one of its numbers.
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
@@ -139,6 +134,7 @@ class Branches(Displayed):
     further data of the caller (JSON-able).
     """
 
+    KIND: ClassVar[str] = "orbits"
     scene: Scene
     names: tuple[str, ...]
     scale: np.ndarray
@@ -173,17 +169,11 @@ class Branches(Displayed):
         """Return the variables of a file: the points of all branches one after the other, special points, branches."""
         unit, branches = unit_of(self.parameter), self.branches
         special = [(number, point) for number, branch in enumerate(branches) for point in branch.special]
-        k = len(self.names)
-
-        def joined(name: str) -> np.ndarray:
-            return np.concatenate([getattr(branch, name) for branch in branches])
-
-        of_points = {
-            "branch_of_point": np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches]),
-            "neutral": joined("neutral"), "sequence": joined("sequence"),
-            **{name: joined(name).astype(np.int8) for name in FLAGS},
-        }  # fmt: skip
         sources = [(-1, -1) if branch.source is None else branch.source for branch in branches]
+        points = {name: np.concatenate([getattr(branch, name) for branch in branches]) for name in BranchPoint._fields}
+        points |= {name: points[name].astype(np.int8) for name in FLAGS}
+        points["branch_of_point"] = np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches])
+        state, multipliers, units = points.pop("state"), points.pop("multipliers"), {"parameter": unit} | MEASURES
         of_special = {
             "special_branch": np.array([number for number, _ in special], int),
             "special_index": np.array([point.index for _, point in special], int),
@@ -196,53 +186,32 @@ class Branches(Displayed):
             "source_branch": np.array([source[0] for source in sources], int),
             "source_special": np.array([source[1] for source in sources], int),
         }
+        states = np.reshape([point.state for _, point in special], (len(special), len(self.names)))
         return {
             "coordinate": Variable(np.array(self.names, object), ("coordinate",)),
             "scale": Variable(self.scale, ("coordinate",)),
-            "parameter": Variable(joined("parameter"), ("point",), unit),
-            "state": Variable(joined("state"), ("point", "coordinate")),
-            "multiplier_real": Variable(joined("multipliers").real, ("point", "multiplier")),
-            "multiplier_imag": Variable(joined("multipliers").imag, ("point", "multiplier")),
-            **{name: Variable(joined(name), ("point",), units) for name, units in MEASURES.items()},
-            **{name: Variable(values, ("point",)) for name, values in of_points.items()},
+            "state": Variable(state, ("point", "coordinate")),
+            "multiplier_real": Variable(multipliers.real, ("point", "multiplier")),
+            "multiplier_imag": Variable(multipliers.imag, ("point", "multiplier")),
+            **{name: Variable(values, ("point",), units.get(name, "1")) for name, values in points.items()},
             "special_parameter": Variable([point.parameter for _, point in special], ("special",), unit),
-            "special_state": Variable(
-                np.reshape([point.state for _, point in special], (len(special), k)), ("special", "coordinate")
-            ),
+            "special_state": Variable(states, ("special", "coordinate")),
             **{name: Variable(values, ("special",)) for name, values in of_special.items()},
             **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
         }
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        return {
-            "parameter_path": self.parameter, "scene": self.scene.to_dict(), "iterations": self.iterations,
-            "warnings": json.dumps(list(self.warnings)), "provenance": dict(self.provenance),
-        }  # fmt: skip
-
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens."""
-        save(path, KIND, self.variables(), self.attributes())
+        return super().attributes() | {"parameter_path": self.parameter, "iterations": self.iterations}
 
     @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Branches:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        return cls.of(*load(path, KIND), str(path))
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str) -> Branches:
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Branches:
         """Return the record in the variables and attributes of a file."""
-        multipliers = values["multiplier_real"] + 1j * values["multiplier_imag"]
-        types = {"neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
+        values["multipliers"] = values["multiplier_real"] + 1j * values["multiplier_imag"]
         branches = []
         for number, periods in enumerate(values["periods"]):
             own = values["branch_of_point"] == number
-            columns = {
-                name: frozen(values[name][own], types.get(name, float))
-                for name in BranchPoint._fields
-                if name != "multipliers"
-            }
+            arrays = {name: frozen(values[name][own], _TYPES.get(name, float)) for name in BranchPoint._fields}
             special = [
                 SpecialPoint(
                     int(values["special_index"][s]), float(values["special_parameter"][s]), values["special_kind"][s],
@@ -254,22 +223,10 @@ class Branches(Displayed):
             branches.append(
                 Branch(
                     periods=int(periods), special=tuple(special), end=values["end"][number],
-                    source=None if source[0] < 0 else source, multipliers=frozen(multipliers[own], complex), **columns,
+                    source=None if source[0] < 0 else source, **arrays,
                 )
             )  # fmt: skip
         return cls(
-            scene=validate(Scene, json.loads(attributes["scene"]), path),
-            names=tuple(values["coordinate"]),
-            scale=frozen(values["scale"]),
-            branches=tuple(branches),
-            iterations=int(attributes["iterations"]),
-            warnings=tuple(json.loads(attributes["warnings"])),
-            provenance=json.loads(attributes["provenance"]),
-        )
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the variables of the file as a data set of xarray, which must be installed."""
-        from xarray import Dataset
-
-        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
-        return Dataset(data, attrs={"parameter_path": self.parameter})
+            names=tuple(values["coordinate"]), scale=frozen(values["scale"]), branches=tuple(branches),
+            iterations=int(attributes["iterations"]), **cls.common(attributes, path),
+        )  # fmt: skip

@@ -2,21 +2,27 @@
 
 Between events the period map is smooth, and so is a branch as long as the sequence of events along the orbit stays.
 Where the sequence changes a branch may have a kink, turn back or end. That point is located from the side where the
-branch comes from; then an orbit of the other sequence is looked for (orbits.other_side).
+branch comes from; then an orbit of the other sequence is sought (orbits.other_side).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
+from vanedamp.coupling.orbits.bifurcations import bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
-from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Point, Problem, point_of, solve, with_symmetry
+from vanedamp.coupling.orbits.newton import (
+    Orbit,
+    OrbitStatus,
+    Point,
+    Problem,
+    at_parameter,
+    corrected,
+    point_of,
+    with_symmetry,
+)
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
-from vanedamp.coupling.orbits.sequence_changes import change, forecast
+from vanedamp.coupling.orbits.passage import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -30,58 +36,56 @@ _CLOSE = 1e-10
 _ATTEMPTS = 120
 
 
-@dataclass(eq=False)
-class Trace:
-    """A branch while it is followed: its orbits, the last of them with its tangent, and the next step.
+class Continuation:
+    """A branch while it is followed, within the range of its problem's parameter.
 
-    source: the branch and the special point that it was switched from; end: why it is not followed further, "" while
-    it is.
+    points: its orbits; special: its special points; head: the last orbit with its tangent; step: the next one; source:
+    the branch and the special point that it was switched from; end: why it is not followed further, "" while it is.
     """
 
-    points: list[BranchPoint]
-    special: list[SpecialPoint]
-    head: Point
-    step: float
-    source: tuple[int, int] | None = None
-    end: str = ""
+    def __init__(
+        self, problem: Problem, table: Table, points: list[BranchPoint], head: Point, source: tuple[int, int] | None
+    ) -> None:
+        self.problem, self.table, self.points, self.head, self.source = problem, table, points, head, source
+        self.special, self.step, self.end = list[SpecialPoint](), table.step, ""
+        self._other_side = OtherSide(problem, table.step, table.min_step)
 
-
-class Follower:
-    """Continuation of the branches of one problem, within its range of the parameter."""
-
-    def __init__(self, problem: Problem, table: Table) -> None:
-        self.problem, self.table = problem, table
-        self.other_side = OtherSide(problem, table.step, table.min_step)
-
-    def begin(self, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None) -> Trace:
+    @classmethod
+    def begin(
+        cls, problem: Problem, table: Table, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None
+    ) -> Continuation:
         """Return a branch of one orbit that goes on in the direction of `row` (k + 1,)."""
-        head = point_of(self.problem, orbit, row)
-        return Trace([BranchPoint.of(with_symmetry(self.problem, orbit))], [], head, self.table.step, source)
+        point = BranchPoint.of(with_symmetry(problem, orbit))
+        return cls(problem, table, [point], point_of(problem, orbit, row), source)
 
-    def resume(self, branch: Branch, tangent: np.ndarray, step: float) -> Trace | None:
+    @classmethod
+    def resume(
+        cls, problem: Problem, table: Table, branch: Branch, tangent: np.ndarray, step: float
+    ) -> Continuation | None:
         """Return a branch that was interrupted, from its last point and the tangent there; None if that is no orbit."""
         last = branch.points[-1]
-        y = self.problem.pack(last.state, last.parameter)
-        passage = self.problem.passage(y)
+        y = problem.pack(last.state, last.parameter)
+        passage = problem.passage(y)
         if passage is None:
             return None
-        missed = float(np.abs(self.problem.residual(y, passage)).max(initial=0.0))
-        orbit = Orbit(
-            OrbitStatus.OK, last.parameter, last.state, branch.periods, self.problem.map.scale, passage, missed, 0
-        )
-        head = Point(y, orbit, self.problem.slope(y, passage), tangent)
-        return Trace(branch.points, list(branch.special), head, step, branch.source, branch.end)
+        missed = float(np.abs(problem.residual(y, passage)).max(initial=0.0))
+        orbit = Orbit(OrbitStatus.OK, last.parameter, last.state, branch.periods, problem.map.scale, passage, missed, 0)
+        head = Point(y, orbit, problem.slope(y, passage), tangent)
+        resumed = cls(problem, table, branch.points, head, branch.source)
+        resumed.special, resumed.step, resumed.end = list(branch.special), step, branch.end
+        return resumed
 
-    def branch(self, trace: Trace) -> Branch:
-        """Return the record of a branch, whole or not."""
-        return Branch.of(trace.points, self.problem.map.periods, trace.special, trace.end, trace.source)
+    @property
+    def branch(self) -> Branch:
+        """The record of the branch, whole or not."""
+        return Branch.of(self.points, self.problem.map.periods, self.special, self.end, self.source)
 
-    def advance(self, trace: Trace) -> None:
-        """Add the next point to a branch, with the special points before it, or end it."""
-        if len(trace.points) >= self.table.max_points:
-            self._end(trace, f"max_points ({self.table.max_points}) reached", trace.head.orbit)
+    def advance(self) -> None:
+        """Add the next point to the branch, with the special points before it, or end it."""
+        if len(self.points) >= self.table.max_points:
+            self._end(f"max_points ({self.table.max_points}) reached", self.head.orbit)
             return
-        head, step, failed = trace.head, trace.step, trace.step
+        head, step, failed = self.head, self.step, self.step
         while step >= self.table.min_step:
             point = self._reach(head, step)
             if point is None:
@@ -91,13 +95,13 @@ class Follower:
                 failed = step
                 break
             if point.tangent @ head.tangent > _BENT or step <= 2 * self.table.min_step:
-                if not self._search(trace, head, point):
-                    self._accept(trace, head, point)
+                if not self._search(head, point):
+                    self._accept(head, point)
                 quick = point.orbit.iterations <= _QUICK and point.tangent @ head.tangent > _STRAIGHT
-                trace.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
+                self.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
                 return
             step /= 2
-        self._cross(trace, failed)
+        self._cross(failed)
 
     # -- smooth pieces
 
@@ -112,40 +116,37 @@ class Follower:
             share = (edge - head.y[-1]) / (y[-1] - head.y[-1])
             start = head.y + share * (y - head.y)
             start[-1] = edge
-            row = np.append(np.zeros(self.problem.size), 1.0)
-            at_edge = solve(self.problem, start, row, head.slope, ITERATIONS, HALVINGS)
-            if at_edge.status is OrbitStatus.OK:
-                orbit = at_edge
+            orbit = at_parameter(self.problem, start, head.slope) or orbit
         return point_of(self.problem, orbit, head.tangent)
 
-    def _accept(self, trace: Trace, before: Point, point: Point) -> None:
+    def _accept(self, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
-        trace.points.append(BranchPoint.of(with_symmetry(self.problem, point.orbit)))
-        trace.head = point
+        self.points.append(BranchPoint.of(with_symmetry(self.problem, point.orbit)))
+        self.head = point
         share = point.y[-1]
         if share >= 1.0 or share <= 0.0:
-            self._end(trace, "the end of the parameter's range", point.orbit)
-        elif len(trace.points) > 3 and self._returned(trace, before, point):
-            self._end(trace, "closed: back at its first orbit", point.orbit)
+            self._end("the end of the parameter's range", point.orbit)
+        elif len(self.points) > 3 and self._returned(before, point):
+            self._end("closed: back at its first orbit", point.orbit)
 
-    def _search(self, trace: Trace, before: Point, point: Point) -> bool:
+    def _search(self, before: Point, point: Point) -> bool:
         """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
         for found in bifurcations(self.problem, before, point):
             # where a branch meets its own mirror image it turns, so that it looks like a fold, too
             turns = found.kind in ("fold", "pitchfork")
-            if turns and (why := self._joined(trace, found.orbit)):
-                self._note(trace, Located(found.orbit, "pitchfork", "branches meet"))
-                self._end(trace, why, found.orbit)
+            if turns and (why := self._joined(found.orbit)):
+                self._note(found.orbit, "pitchfork", "branches meet")
+                self._end(why, found.orbit)
                 return True
-            self._note(trace, found)
+            self._note(*found)
         return False
 
-    def _joined(self, trace: Trace, orbit: Orbit) -> str:
+    def _joined(self, orbit: Orbit) -> str:
         """Say on which branch of more symmetric orbits this one ends; "" if it does not."""
-        if not trace.points[-1].symmetric and with_symmetry(self.problem, orbit).symmetric:
+        if not self.points[-1].symmetric and with_symmetry(self.problem, orbit).symmetric:
             return "joins a branch of symmetric orbits"
         periods = self.problem.map.periods
-        if periods % 2 == 0 and not self._repeats(trace.head.orbit) and self._repeats(orbit):
+        if periods % 2 == 0 and not self._repeats(self.head.orbit) and self._repeats(orbit):
             return f"joins a branch of orbits of {periods // 2} period{'s' if periods > 2 else ''}"
         return ""
 
@@ -154,47 +155,44 @@ class Follower:
         passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state)
         return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
 
-    def _note(self, trace: Trace, found: Located) -> None:
-        orbit = found.orbit
-        trace.special.append(
-            SpecialPoint(len(trace.points) - 1, orbit.parameter, found.kind, found.note, orbit.state)
-        )  # fmt: skip
+    def _note(self, orbit: Orbit, kind: str, note: str) -> None:
+        self.special.append(SpecialPoint(len(self.points) - 1, orbit.parameter, kind, note, orbit.state))
 
-    def _returned(self, trace: Trace, before: Point, point: Point) -> bool:
+    def _returned(self, before: Point, point: Point) -> bool:
         """Say whether the branch passes its first orbit between two points."""
         piece = point.y - before.y
-        first = self.problem.pack(trace.points[0].state, trace.points[0].parameter)
+        first = self.problem.pack(self.points[0].state, self.points[0].parameter)
         share = (first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
         away = np.linalg.norm(first - before.y - share * piece)
         return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
 
-    def _end(self, trace: Trace, why: str, orbit: Orbit) -> None:
-        self._note(trace, Located(orbit, "end", why))
-        trace.end = why
+    def _end(self, why: str, orbit: Orbit) -> None:
+        self._note(orbit, "end", why)
+        self.end = why
 
     # -- changes of the event sequence
 
-    def _cross(self, trace: Trace, step: float) -> None:
+    def _cross(self, step: float) -> None:
         """Go on with the next sequence of events from where the present one ends, within a step; or end the branch."""
-        head = trace.head
+        head = self.head
         last, point = self._last(head, step)
-        if last is not head and self._search(trace, head, last):
+        if last is not head and self._search(head, last):
             return
         how = ""
-        if (centred := self.other_side.centred(last)) is not None:
+        if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED
         elif point is None:
-            point, how = self.other_side.find(last, step)
+            point, how = self._other_side.find(last, step)
         if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
-        after = self.other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage
+        after = self._other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage
         kind, what = change(last.orbit.passage, after)
-        self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
+        self._note(last.orbit, kind, f"{what}{how}")
         if point is None:
-            self._end(trace, self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
+            self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
             return
-        self._accept(trace, last, point)
-        trace.step = max(self.table.step / 8, self.table.min_step)
+        self._accept(last, point)
+        self.step = max(self.table.step / 8, self.table.min_step)
 
     def _refusal(self, last: Point, step: float) -> str:
         """Say why values of the parameter beyond a point make no scene; "" if they do."""
@@ -216,11 +214,8 @@ class Follower:
         for attempt in range(_ATTEMPTS):
             if high - low <= close:
                 break
-            at, margin = (
-                forecast([(where, found.passage) for where, found in seen[-2:]]),
-                max(1e-3 * (high - low), close / 4),
-            )
-            middle = (low + high) / 2
+            at = forecast([(where, found.passage) for where, found in seen[-2:]])
+            middle, margin = (low + high) / 2, max(1e-3 * (high - low), close / 4)
             if at is None or attempt % 3 == 2:
                 at = middle
             else:

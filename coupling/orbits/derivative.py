@@ -1,4 +1,4 @@
-"""The derivative of a passage by its start, event by event, from the equations of motion beside the engine's motion.
+"""The derivative of a passage by its start, event by event, from the equations of motion, apart from the engine's.
 
 It is the product, in the order of time, of the propagators of segments (orbits.dynamics) and of the saltation matrices
 of events (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
@@ -28,7 +28,7 @@ _LAW = 1e-9
 _CAUGHT = 1e-11
 #: largest motion of rows at rest by the derivative, relative to its terms
 _STILL = 1e-7
-#: an event is tangential if its function would come back from beyond zero within this share of its scale
+#: an event is tangential if its function would come back from beyond zero within this fraction of its scale
 _TANGENTIAL = 1e-12
 #: what reaches its bound without a jump is the same on both sides but for this part of its terms: at forces, others
 _CONTINUOUS, _ROUND_OFF = 1e-9, 1e-12
@@ -255,7 +255,7 @@ class Derivative:
         return float(np.abs(self.dynamics.to_state @ M / self._scale[:, None]).max(initial=0.0))
 
     def _meets(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> bool:
-        """Return whether another event takes place at the instant of one, but not in motions beside this one."""
+        """Return whether another event takes place at the instant of one, but not in neighbouring motions."""
         events = [(guard, shifts[guard.part]) for guard in guards[1:]]
         if time - self._last[0] <= _INSTANT * self.system.period:
             events += [(guard, self._last[1][guard.part]) for guard in guards[:1] if guard.part in self._last[1]]
@@ -293,7 +293,7 @@ class Derivative:
             raise Untrusted
 
     def _check_idle(self, segment: Segment, M: np.ndarray) -> None:
-        """Note contacts that touch without force and that motions beside this one open or hit: they have a kink."""
+        """Note contacts that touch without force and that neighbouring motions open or hit: they have a kink."""
         idle, dynamics, k = np.flatnonzero(segment.state == codes.TOUCHING), self.dynamics, self.dynamics.one
         if not len(idle):
             return

@@ -8,7 +8,7 @@ import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
-from vanedamp.coupling.orbits.continuation import Follower, Trace
+from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
@@ -19,7 +19,7 @@ from vanedamp.files.toml_input import InputError
 _MOST_BRANCHES, _MOST_PERIODS = 32, 64
 #: how often the first step onto another branch, `step`, is quartered
 _QUARTERS = 6
-#: distance of two special points that are one, as a share of the range and of the coordinates' scale
+#: distance of two special points that are one, as a fraction of the range and of the coordinates' scale
 _SAME = 1e-3
 
 _MEANING = {
@@ -33,7 +33,7 @@ class Diagram:
     """The branches of a period map, found one after the other.
 
     table: how to follow them; low, to: range of the parameter, to: None for a single orbit; start: returns the state
-    (k,) from which the first orbit is looked for; notes: what could not be done.
+    (k,) from which the first orbit is sought; notes: what could not be done.
     """
 
     def __init__(
@@ -42,15 +42,14 @@ class Diagram:
         self.map, self.table, self.low, self.to, self.start = period_map, table, low, to, start
         self.problems: dict[int, Problem] = {}
         self.finished: list[Branch] = []
-        self.current: tuple[Follower, Trace] | None = None
+        self.current: Continuation | None = None
         self.notes: list[str] = []
         self._before = 0
 
     @property
     def branches(self) -> list[Branch]:
         """The branches found so far, the last one perhaps unfinished."""
-        growing = [] if self.current is None else [self.current[0].branch(self.current[1])]
-        return self.finished + growing
+        return self.finished + ([] if self.current is None else [self.current.branch])
 
     @property
     def iterations(self) -> int:
@@ -62,38 +61,34 @@ class Diagram:
         """Tangent (k + 1,) and step with which the last branch goes on."""
         if self.current is None:
             return np.zeros(len(self.map.scale) + 1), 0.0
-        trace = self.current[1]
-        return trace.head.tangent, trace.step
+        return self.current.head.tangent, self.current.step
 
     def resume(self, branches: Sequence[Branch], tangent: np.ndarray, step: float, iterations: int) -> None:
         """Take up what an interrupted search has found."""
         *self.finished, last = branches
         self._before = iterations
-        follower = self._follower(last.periods)
-        trace = follower.resume(last, tangent, step)
-        if trace is None:
+        self.current = Continuation.resume(self._problem(last.periods), self.table, last, tangent, step)
+        if self.current is None:
             raise InputError("the last orbit of the checkpoint is none any more; delete the checkpoint to start again")
-        self.current = follower, trace
 
     def follow(self, changed: Callable[[int, int], None]) -> None:
         """Find all branches; changed: called with the number of orbits found and of those that there may be."""
         while True:
-            self.current = self.current or self._next()
-            if self.current is None:
+            current = self.current = self.current or self._next()
+            if current is None:
                 return
-            follower, trace = self.current
             if self.to is None:
-                trace.end = "a single orbit: `to` is not given"
+                current.end = "a single orbit: `to` is not given"
             while True:
-                done = sum(len(branch.parameter) for branch in self.finished) + len(trace.points)
+                done = sum(len(branch.parameter) for branch in self.finished) + len(current.points)
                 changed(done, self.table.max_points * (len(self.finished) + 1))
-                if trace.end:
+                if current.end:
                     break
-                follower.advance(trace)
-            self.finished.append(follower.branch(trace))
+                current.advance()
+            self.finished.append(current.branch)
             self.current = None
 
-    def _next(self) -> tuple[Follower, Trace] | None:
+    def _next(self) -> Continuation | None:
         """Return the next branch to follow; None if there is none."""
         if not self.finished:
             return self._first()
@@ -110,11 +105,10 @@ class Diagram:
                     return found
         return None
 
-    def _first(self) -> tuple[Follower, Trace]:
+    def _first(self) -> Continuation:
         """Return the branch through the first orbit. Raises InputError if there is none."""
-        follower = self._follower(self.table.periods)
-        problem = follower.problem
-        start, row = problem.pack(self.start(), self.low), _along_parameter(problem)
+        problem = self._problem(self.table.periods)
+        start, row = problem.pack(self.start(), self.low), problem.along_parameter
         orbit = solve(problem, start, row, np.zeros(problem.size))
         problem.count["iterations"] += orbit.iterations
         if orbit.status is not OrbitStatus.OK:
@@ -123,16 +117,15 @@ class Diagram:
                 f"orbit: no orbit of {problem.map.periods} excitation period(s) at {self.table.parameter} = "
                 f"{self.low:g}: {_MEANING[orbit.status]}; try other periods, another `from`, or start = {other}"
             )
-        return follower, follower.begin(orbit, row)
+        return Continuation.begin(problem, self.table, orbit, row)
 
     @property
     def _span(self) -> float:
         """Range of the parameter, with its sign; 1 for a single orbit."""
         return 1.0 if self.to is None else self.to - self.low
 
-    def _follower(self, periods: int) -> Follower:
-        problem = self.problems.setdefault(periods, Problem(self.map.over(periods), self.low, self._span))
-        return Follower(problem, self.table)
+    def _problem(self, periods: int) -> Problem:
+        return self.problems.setdefault(periods, Problem(self.map.over(periods), self.low, self._span))
 
     def _known(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> bool:
         """Say whether a bifurcation's other branch was followed already, from here or to here."""
@@ -149,14 +142,14 @@ class Diagram:
                 return True
         return point.note == "branches meet" and branch.special[-1].note.startswith("joins")
 
-    def _switched(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> tuple[Follower, Trace] | None:
+    def _switched(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> Continuation | None:
         """Return the branch that goes out from a bifurcation; None, with a note, if no orbit of it is found."""
         doubled = point.kind == "period doubling"
         periods = branch.periods * (2 if doubled else 1)
         if periods > _MOST_PERIODS:
             return None
-        parent, follower = self._follower(branch.periods).problem, self._follower(periods)
-        problem, y = follower.problem, follower.problem.pack(point.state, point.parameter)
+        parent, problem = self._problem(branch.periods), self._problem(periods)
+        y = problem.pack(point.state, point.parameter)
         here = parent.passage(y)
         regular = parent.passage(parent.pack(branch.state[point.index], float(branch.parameter[point.index])))
         if here is None or regular is None:
@@ -175,12 +168,9 @@ class Diagram:
             if orbit.status is OrbitStatus.OK:
                 onward = problem.pack(orbit.state, orbit.parameter) - y
                 if np.linalg.norm(onward) < 3 * step:
-                    return follower, follower.begin(orbit, onward / np.linalg.norm(onward), (number, place))
+                    row = onward / np.linalg.norm(onward)
+                    return Continuation.begin(problem, self.table, orbit, row, (number, place))
         self.notes.append(
             f"no orbit found on the other branch at the {point.kind} at {self.table.parameter} = {point.parameter:.9g}"
         )
         return None
-
-
-def _along_parameter(problem: Problem) -> np.ndarray:
-    return np.append(np.zeros(problem.size), 1.0)

@@ -16,15 +16,15 @@ from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
-#: a speed after an impact below this share of the fastest of its contacts is none: the end of a chatter
+#: a speed after an impact below this fraction of the fastest of its contacts is none: the end of a chatter
 _PLASTIC = 1e-9
-#: energy that an impact may bring, as a share of what is there
+#: energy that an impact may bring, as a fraction of what is there
 _GAIN = 1e-12
-#: share of its bound by which friction is short of it where a contact sticks; of a slip that is round-off
+#: fraction of its bound by which friction is short of it where a contact sticks; of a slip that is round-off
 _EDGE, _ROUND_OFF = 1e-9, 1e-13
-#: slips that count as none, as a share of the fastest speed
+#: slips that count as none, as a fraction of the fastest speed
 _SLOW = 1e-11
-#: steps of the differences that find the slope of a restitution, as shares of the speed, and how well they agree
+#: steps of the differences that find the slope of a restitution, as fractions of the speed, and how well they agree
 _STEPS, _SMOOTH = (1e-2, 5e-3), 1e-8
 
 
@@ -104,7 +104,7 @@ def _newton(
 ) -> Jump:  # fmt: skip
     """Return the jump by Newton's law with restitutions (u,), and their derivatives by the speeds of approach (u,).
 
-    Where they would bring energy, with the share of all of them that brings none: it depends on the speeds.
+    Where they would bring energy, with the fraction of all of them that brings none: it depends on the speeds.
     """
     roles = _roles(system, begun.v, event.impulse, speed)
     hit, rows = roles.hit, system.J[roles.hit]

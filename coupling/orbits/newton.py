@@ -33,10 +33,12 @@ _ROUND_OFF = 1e-13
 _DIFFERENCE = 3e-5
 #: by which steps are shortened where the passage is not smooth over them, and how far from straight it may be
 _SHRINKS, _BEND = (1.0, 1e-2, 1e-4, 1e-6), 1e-2
-#: smallest size of a parameter, as a share of the branch's range, that its differences are relative to
+#: smallest size of a parameter, as a fraction of the branch's range, that its differences are relative to
 _FLOOR = 1e-3
 #: scaled distance of an orbit from its mirror image
 _SYMMETRIC = 1e-6
+#: corrections of a point of a branch before its step is shortened, which is better than many
+_ITERATIONS, _HALVINGS = 8, 3
 
 
 class OrbitStatus(StrEnum):
@@ -56,9 +58,9 @@ class Orbit:
     """A periodic orbit, or the last state of a search for one.
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
-    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest share of the scale by
-    which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a period
-    later.
+    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest fraction of the scale
+    by which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a
+    period later.
     """
 
     status: OrbitStatus
@@ -140,6 +142,11 @@ class Problem:
     count: Counter[str] = field(default_factory=Counter)
     _maps: dict[float, PeriodMap] = field(default_factory=dict)
 
+    @cached_property
+    def along_parameter(self) -> np.ndarray:
+        """The unit row (k + 1,) of the parameter: orbits in a plane normal to it have one value of that."""
+        return np.append(np.zeros(self.size), 1.0)
+
     @property
     def size(self) -> int:
         """Number of coordinates of a state."""
@@ -212,8 +219,8 @@ class Problem:
 def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
     """Return the periodic orbit that Newton's method finds from a state (k,), or its last state and why it is none."""
     problem = Problem(period_map)
-    fixed = np.append(np.zeros(problem.size), 1.0)
-    orbit = solve(problem, problem.pack(np.asarray(start, float), math.nan), fixed, np.zeros(problem.size))
+    start = problem.pack(np.asarray(start, float), math.nan)
+    orbit = solve(problem, start, problem.along_parameter, np.zeros(problem.size))
     return with_symmetry(problem, orbit) if orbit.status is OrbitStatus.OK else orbit
 
 
@@ -228,7 +235,9 @@ def solve(
     """
     y, passage = start, problem.passage(start)
     if passage is None:
-        return _stopped(problem, start)
+        state, periods = start[:-1] * problem.weight, problem.map.periods
+        parameter, nothing = problem.parameter(start), Passage.stopped(np.full(problem.size, np.nan), periods)
+        return Orbit(OrbitStatus.STOPPED, parameter, state, periods, problem.map.scale, nothing, math.nan, 0)
     residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
     relative = problem.map.scale / problem.map.scale[:, None]
     for count in range(1, iterations + 1):  # noqa: B007
@@ -236,11 +245,10 @@ def solve(
         step = least_squares(bordered(problem, passage, slope, row), right)
         size = 1.0 + float(np.linalg.norm(y))
         last = float(np.linalg.norm(step)) <= _SMALL * size
-        taken, changed = _taken(
-            problem, y, step, passage, math.inf if last else float(np.linalg.norm(residual)), halvings
-        )
+        bound = math.inf if last else float(np.linalg.norm(residual))
+        taken, changed = _taken(problem, y, step, passage, bound, halvings)
         if taken is None:
-            # beside a bifurcation a residual at round-off is an orbit, and the next step is noise
+            # near a bifurcation a residual at round-off is an orbit, and the next step is noise
             if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, relative, size):
                 status = OrbitStatus.OK
             else:
@@ -260,18 +268,39 @@ def solve(
     )
 
 
+def corrected(problem: Problem, head: Point, step: float) -> Orbit | None:
+    """Return the orbit in the plane normal to the tangent, at a distance along it; None if there is none near."""
+    return near(problem, head.y + step * head.tangent, head.tangent, head.slope, abs(step))
+
+
+def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.ndarray, distance: float) -> Orbit | None:
+    """Return the orbit in the plane through a point; with the slope there, if the one given does not serve."""
+    for renewed in (False, True):
+        if renewed:
+            if (passage := problem.passage(predicted)) is None:
+                return None
+            slope = problem.slope(predicted, passage)
+        orbit = solve(problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
+        problem.count["iterations"] += orbit.iterations
+        if orbit.status is OrbitStatus.OK:
+            off = np.linalg.norm(problem.pack(orbit.state, orbit.parameter) - predicted)
+            return orbit if off <= distance else None
+    return None
+
+
+def at_parameter(problem: Problem, y: np.ndarray, slope: np.ndarray) -> Orbit | None:
+    """Return the orbit near y (k + 1,) with its parameter; None if there is none near."""
+    orbit = solve(problem, y, problem.along_parameter, slope, _ITERATIONS, _HALVINGS)
+    return orbit if orbit.status is OrbitStatus.OK else None
+
+
 def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:
     """Return the size of what a passage adds up: scaled states times its derivative."""
     return size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0)))
 
 
 def _taken(
-    problem: Problem,
-    y: np.ndarray,
-    step: np.ndarray,
-    passage: Passage,
-    bound: float,
-    halvings: int,
+    problem: Problem, y: np.ndarray, step: np.ndarray, passage: Passage, bound: float, halvings: int
 ) -> tuple[tuple[np.ndarray, Passage, np.ndarray] | None, bool]:
     """Take a step, or the largest part of it that brings the residual below a bound.
 
@@ -300,8 +329,8 @@ def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndar
 
 
 def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
-    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without a share of neutral coordinates."""
-    tangent = least_squares(bordered(problem, passage, slope, row), np.append(np.zeros(problem.size), 1.0))
+    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without neutral coordinates."""
+    tangent = least_squares(bordered(problem, passage, slope, row), problem.along_parameter)
     length = float(np.linalg.norm(tangent))
     return tangent / length if length > 0.0 else row
 
@@ -315,8 +344,7 @@ def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
 
 def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the solution (k + 1,) of least norm, in which neutral coordinates do not move."""
-    solution = lstsq(matrix, right, cond=NULL, check_finite=False)[0]
-    return np.asarray(solution)
+    return np.asarray(lstsq(matrix, right, cond=NULL, check_finite=False)[0])
 
 
 def with_symmetry(problem: Problem, orbit: Orbit) -> Orbit:
@@ -328,12 +356,3 @@ def with_symmetry(problem: Problem, orbit: Orbit) -> Orbit:
     for free in null_space(orbit.derivative):  # where a body rests is nothing that a mirror could change
         difference = difference - free * (free @ difference)
     return replace(orbit, symmetric=bool(np.abs(difference).max() < _SYMMETRIC * size))
-
-
-def _stopped(problem: Problem, y: np.ndarray) -> Orbit:
-    """Return a search that could not begin."""
-    k, periods = problem.size, problem.map.periods
-    unknown, matrix = np.full(k, np.nan), np.full((k, k), np.nan)
-    passage = Passage(unknown, matrix, (), (math.inf, ""), PassageStatus.STOPPED, np.full(periods, np.nan))
-    state = y[:-1] * problem.weight
-    return Orbit(OrbitStatus.STOPPED, problem.parameter(y), state, periods, problem.map.scale, passage, math.nan, 0)

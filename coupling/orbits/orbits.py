@@ -119,7 +119,7 @@ class _Search:
         self.map: PeriodMap = period_map(self.first, path, self.table.periods)
 
     def start(self) -> np.ndarray:
-        """Return the state (k,) from which the first orbit is looked for. Raises InputError if the run ends early."""
+        """Return the state (k,) from which the first orbit is sought. Raises InputError if the run ends early."""
         if self.table.start == "linear":
             return self.map.linear_orbit()
         response = simulate(self.first)

@@ -1,7 +1,10 @@
 """Orbits beyond the place where the sequence of events along a branch ends.
 
-An orbit of another sequence is looked for where the branch would go on, at the root of the distance along it where a
-new impact grazes, and on the other side of the period's start (orbits.period_start).
+An orbit of another sequence is sought where the branch would go on, at the root of the distance along it where a
+new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
+event does, while the orbit goes on as if nothing had happened. The state on the other side is how a passage ends that
+begins close to the last orbit: the event, which comes at both of its ends, is then inside of the period at one
+end and outside at the other.
 """
 
 from __future__ import annotations
@@ -11,27 +14,28 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected, near
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import (
     Orbit,
-    OrbitStatus,
     Point,
     Problem,
+    at_parameter,
     bordered,
+    corrected,
     least_squares,
+    near,
     point_of,
-    solve,
-)  # fmt: skip
+)
 from vanedamp.coupling.orbits.passage import Passage
-from vanedamp.coupling.orbits.period_start import past_the_start
 
 #: what happens to a body that comes to a wall and has room on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
-#: scaled distance within which a neutral coordinate is looked for an end
+#: scaled distance within which a neutral coordinate is sought an end
 _FARTHEST = 10.0
 #: how often the search for the place of a new event is widened
 _WIDENINGS = 6
+#: scaled distances from the last orbit, and how much farther a state is that has jumped
+_BESIDE, _FARTHER = (1e-8, 1e-7, 1e-6, 1e-5), 1e3
 
 
 class OtherSide:
@@ -43,7 +47,7 @@ class OtherSide:
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
-        if (passed := past_the_start(self.problem, last)) is not None:
+        if (passed := self._past_the_start(last)) is not None:
             return passed, " at the start of the period"
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
@@ -60,6 +64,25 @@ class OtherSide:
             if orbit is not None:
                 return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
         return None, ""
+
+    def _past_the_start(self, last: Point) -> Point | None:
+        """Return an orbit beyond the last one, where an event passes the start; None if none is found."""
+        problem = self.problem
+        ahead = np.sign(last.tangent[-1]) * problem.along_parameter
+        for size in _BESIDE:
+            for direction in (*np.eye(problem.size), *-np.eye(problem.size)):
+                y = last.y + size * (np.append(direction, 0.0) + ahead)
+                passage = problem.passage(y)
+                if passage is None:
+                    continue
+                image = problem.pack(passage.state, problem.parameter(y))
+                beyond = problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
+                if beyond is None:
+                    continue
+                orbit = near(problem, image, ahead, problem.slope(image, beyond), _FARTHER * size)
+                if orbit is not None:
+                    return point_of(problem, orbit, ahead)
+        return None
 
     def passage(self, last: Point) -> Passage | None:
         """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
@@ -92,10 +115,8 @@ class OtherSide:
 
     def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
         """Return the orbit of the same sequence at the parameter of y; None if there is none."""
-        row = np.append(np.zeros(self.problem.size), 1.0)
-        orbit = solve(self.problem, y, row, last.slope, ITERATIONS, HALVINGS)
-        same = orbit.passage.sequence == last.orbit.passage.sequence
-        return orbit if orbit.status is OrbitStatus.OK and same else None
+        orbit = at_parameter(self.problem, y, last.slope)
+        return orbit if orbit is not None and orbit.passage.sequence == last.orbit.passage.sequence else None
 
     def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
         """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
@@ -130,16 +151,15 @@ class OtherSide:
         length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
         for share in (1e-3, 1e-2, 1e-1, 1.0):
             measure = share * self.step / length
-            distance = self._root(
-                last, last.y + measure * alpha, away * min(measure / kick, (measure / kick) ** 2), residual
-            )
+            base = last.y + measure * alpha
+            distance = self._root(last, base, away * min(measure / kick, (measure / kick) ** 2), residual)
             if distance is None:
                 continue
-            start = last.y + measure * alpha + distance * last.tangent
+            start = base + distance * last.tangent
             found = problem.passage(start)
             if found is None:
                 continue
-            orbit = near(self.problem, start, alpha / length, problem.slope(start, found), 2 * length * measure)
+            orbit = near(problem, start, alpha / length, problem.slope(start, found), 2 * length * measure)
             if orbit is not None and orbit.passage.sequence != sequence:
                 return orbit
         return None
@@ -148,12 +168,9 @@ class OtherSide:
         """Return how far along the tangent from `base` the residual has no part in another; None if nowhere near."""
 
         def part(at: float) -> float:
-            passage = self.problem.passage(base + at * last.tangent)
-            return (
-                np.nan
-                if passage is None
-                else float(residual @ self.problem.residual(base + at * last.tangent, passage))
-            )
+            y = base + at * last.tangent
+            passage = self.problem.passage(y)
+            return np.nan if passage is None else float(residual @ self.problem.residual(y, passage))
 
         for _ in range(_WIDENINGS):
             if part(-distance) * part(distance) < 0.0:

@@ -1,4 +1,4 @@
-"""What a period map returns: a state at the start of an excitation period goes to the state some periods later.
+"""What a period map returns for a state at the start of an excitation period, and where its event sequence changes.
 
 States are physical: modal coordinates of the structure and their rates, then those of the bodies relative to their
 cavities, in the order of RestartState, without the coordinates that a body does not have.
@@ -6,6 +6,9 @@ cavities, in the order of RestartState, without the coordinates that a body does
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -31,7 +34,7 @@ class Crossing(NamedTuple):
     """An event on the way.
 
     time: s since the start; name: of the event with its bodies, corners and surfaces, the same in every passage, such
-    as "impact c.left.0" or "sticks 0"; speed: rate of its event function at the crossing, in units of the function a
+    as "impact c.left.0" or "sticks 0"; speed: rate of its event function at the crossing, in units of the function per
     second: zero is grazing; energy: J that it takes away.
     """
 
@@ -47,7 +50,7 @@ class Passage(NamedTuple):
     state: (k,) after the periods; derivative: (k, k) of it with respect to the state before, one-sided where the map
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;
     clearance: the smallest distance to an event that did not happen (a gap that nearly closed, a force near its bound),
-    as a share of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
+    as a fraction of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
     peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response.
     """
 
@@ -62,3 +65,58 @@ class Passage(NamedTuple):
     def sequence(self) -> tuple[str, ...]:
         """Names of the events in order."""
         return tuple(crossing.name for crossing in self.crossings)
+
+    @classmethod
+    def stopped(cls, state: np.ndarray, periods: int) -> Passage:
+        """Return a passage that ends with its start (k,): nothing of it is known."""
+        unknown = np.full((len(state), len(state)), np.nan)
+        return cls(state, unknown, (), (np.inf, ""), PassageStatus.STOPPED, np.full(periods, np.nan))
+
+
+def forecast(seen: Sequence[tuple[float, Passage]]) -> float | None:
+    """Return the arclength at which the sequence of the last two passages of a branch will end, None if unknown.
+
+    seen: arclengths, rising, and passages of one sequence. Quantities that vanish there are continued as straight
+    lines: the speeds of crossings, the clearances of events that do not happen, the times between events.
+    """
+    if len(seen) < 2:
+        return None
+    (early, one), (late, two) = seen[-2:]
+    before, after = _vanishing(one), _vanishing(two)
+    found = [
+        late + (late - early) * after[name] / (before[name] - after[name])
+        for name in before.keys() & after.keys()
+        if 0.0 <= after[name] < before[name]
+    ]
+    return min(found, default=None)
+
+
+def _vanishing(passage: Passage) -> dict[str, float]:
+    """Return the quantities of a passage that are positive and vanish where its sequence ends, by name."""
+    crossings = passage.crossings
+    found = {f"speed {place}": abs(crossing.speed) for place, crossing in enumerate(crossings)}
+    for place, (one, other) in enumerate(itertools.pairwise(crossings)):
+        found[f"order {place}"] = other.time - one.time
+    if crossings:
+        found["start"] = crossings[0].time
+    share, name = passage.clearance
+    if name:
+        found[f"clearance {name}"] = share
+    return found
+
+
+def change(before: Passage, after: Passage | None) -> tuple[str, str]:
+    """Return the kind of a special point where the sequence changes, and what happens there.
+
+    "grazing" where an impact begins or ceases, "sequence" for any other change; after: None if that is not known.
+    """
+    if after is None:
+        near = before.clearance[1]
+        slow = min(before.crossings, key=lambda crossing: abs(crossing.speed), default=None)
+        grazing = before.status is PassageStatus.GRAZING or "impact" in near
+        name = near or ("" if slow is None else slow.name)
+        return ("grazing" if grazing else "sequence"), f"the sequence of events ends, at {name or 'an unknown event'}"
+    lost, new = Counter(before.sequence) - Counter(after.sequence), Counter(after.sequence) - Counter(before.sequence)
+    words = [f"{name} begins" for name in new] + [f"{name} ceases" for name in lost]
+    kind = "grazing" if any("impact" in name for name in (*lost, *new)) else "sequence"
+    return kind, ", ".join(words) or "events change their order"

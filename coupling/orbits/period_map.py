@@ -1,4 +1,7 @@
-"""The period map of a scene: a state at the start of an excitation period goes to the state some periods later."""
+"""The period map of a scene: a state at the start of an excitation period goes to the state some periods later.
+
+The engine's motion is walked segment by segment, and with it the derivative of where it leads.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,28 @@ from functools import cached_property
 
 import numpy as np
 
+from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.orbits.dynamics import Dynamics
+from vanedamp.coupling.orbits.derivative import Before, Derivative, Guard, begins
+from vanedamp.coupling.orbits.dynamics import Dynamics, Flow
 from vanedamp.coupling.orbits.event_names import EventNames
 from vanedamp.coupling.orbits.frame import Frame
-from vanedamp.coupling.orbits.passage import Passage, PassageStatus
-from vanedamp.coupling.orbits.walk import PassageWalk
+from vanedamp.coupling.orbits.jump import Untrusted
+from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
+from vanedamp.coupling.orbits.start import Start
+from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import fitted
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.segment import EventRun
+from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
+
+#: events per period after which a passage gives up: each is a step of Python
+_EVENTS_PER_PERIOD = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,16 +71,19 @@ class PeriodMap:
     def __call__(self, state: np.ndarray) -> Passage:
         """Return the passage that begins with a state (k,)."""
         if not np.all(np.isfinite(state)):
-            nothing = np.full((len(state), len(state)), np.nan)
-            return Passage(state, nothing, (), (np.inf, ""), PassageStatus.STOPPED, np.full(self.periods, np.nan))
+            return Passage.stopped(state, self.periods)
         return self._walk(state, self.periods)[0]
 
     def _walk(self, state: np.ndarray, periods: int) -> tuple[Passage, np.ndarray | None]:
         """Return a passage from a state (k,), and the state half a period after the start."""
-        walk = PassageWalk(self._frame, self._dynamics, self._event_names, state, periods, *self._earlier)
-        passage = walk.passage()
-        self._earlier[:] = [walk.run]
-        return passage, walk.half_way
+        system = self._frame.system
+        start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
+        run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
+        for earlier in self._earlier:
+            run.reuse(earlier)
+        self._earlier[:] = [run]
+        walk = _PassageWalk(self._frame, self._dynamics, self._event_names, state)
+        return walk.passage(run, periods), walk.half_way
 
     def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
@@ -103,6 +118,69 @@ class PeriodMap:
             return None
         passage, half = self._walk(state, 1)
         return None if half is None or passage.status is PassageStatus.STOPPED else image @ half
+
+
+class _PassageWalk:
+    """One passage from a state (k,).
+
+    half_way: (k,) the state half a period after the start, None if the engine has not come so far.
+    """
+
+    def __init__(self, frame: Frame, dynamics: Dynamics, names: EventNames, state: np.ndarray) -> None:
+        self._frame, self._dynamics, self._names = frame, dynamics, names
+        self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
+        self._crossings, self._clearance = list[Crossing](), (np.inf, "")
+        self.half_way: np.ndarray | None = None
+
+    def passage(self, run: EventRun, periods: int) -> Passage:
+        """Walk a run to the end of the periods."""
+        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self._derivative
+        state, derivative = np.full(k, np.nan), np.full((k, k), np.nan)
+        with np.errstate(invalid="ignore"):  # a derivative that is not known is nan
+            before = self._walked(walk)
+            final = run.final() if walk.status is Status.OK else None
+            if before is None or final is None:
+                made.worsen(PassageStatus.STOPPED)
+            else:
+                state = self._frame.state_of(final)
+                derivative = made.end(before, state, periods * self._frame.system.period)
+        peaks = run.records.peak[:periods].copy()
+        return Passage(state, derivative, tuple(self._crossings), self._clearance, made.status, peaks)
+
+    def _walked(self, walk: Walk) -> Before | None:
+        """Walk to the end. Returns the end of the last segment, None without any."""
+        dynamics, half = self._dynamics, 0.5 * self._frame.system.period
+        before: Before | None = None
+        for segment in walk:
+            assert segment.event is not None
+            flow, u = dynamics.flow(segment.state, segment.open_force), dynamics.state(segment)
+            M = self._next(walk, before, segment, flow, u)
+            z = dynamics.extended(u, segment.time)
+            if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
+                middle, _ = flow.after(z, half - segment.time)
+                self.half_way = dynamics.to_state @ middle[: dynamics.one]
+            least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
+            if least < self._clearance[0]:
+                self._clearance = least, self._names.possible(unit, what)
+            z, power = flow.after(z, segment.duration)
+            before = Before(segment, segment.event, flow, z, power @ M)
+        return before
+
+    def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
+        """Return the derivative as a segment begins, nan where it is not known, and keep the event before it."""
+        made, guards = self._derivative, list[Guard]()
+        if before is not None and before.event.unit >= 0:
+            guards = made.guards(before, segment)
+            name = self._names.event(before.flow.named, flow.named, before.event.struck)
+            if name and (before.event.impulse.any() or not begins(segment)):
+                self._crossings.append(Crossing(segment.start, name, guards[0].rate, before.event.loss))
+        try:
+            if before is None:
+                return made.begin(walk.start, segment, flow, u)
+            return made.after(before, segment, flow, u, guards)
+        except Untrusted:
+            made.worsen(PassageStatus.UNDETERMINED)
+            return np.full_like(self._dynamics.from_state, np.nan)
 
 
 def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1) -> PeriodMap:

@@ -29,9 +29,9 @@ from vanedamp.coupling.system.transient import Transient
 _CHUNK = 100
 #: relaxations within the longest run below which an open one does not go on
 _HOPELESS = 3.0
-#: share of the energy there is that counts as flow in any case
+#: fraction of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
-#: share of the largest order's load below which that of order 1 is none
+#: fraction of the largest order's load below which that of order 1 is none
 _NO_SHARE = 1e-9
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
@@ -159,19 +159,13 @@ def _run_until_known(
     return ended
 
 
-def evaluate(
-    scene: Scene, run: Outcome, status: Status, transient: int, started: float, confidence: float | None = None
-) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter) and dropped `transient` periods.
-
-    confidence: that of the mean, m, where the run was judged.
-    """
-    system, records, done = run.system, run.records, run.periods
-    first = min(transient, max(done - 1, 0))
+def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Response:
+    """Return the response of a run that began at `started` (time.perf_counter)."""
+    system, records, done, status = run.system, run.records, run.periods, ended.status
+    first = min(ended.transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * system.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
-    b = system.bodies
     section = records.section[: done + 1]
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
@@ -183,19 +177,18 @@ def evaluate(
     )
     if not balance <= run.open_ledger and status in _USABLE:
         status = Status.ENERGY
-    samples = records.samples_per_period
     extent: dict[str, Any] = {}
     if run.plane is not None:
         extent, tilted = _in_plane(run.plane, window, span)
         status = Status.TILTED if tilted and status in _USABLE else status
-        if samples:
-            extent["in_plane"] = run.plane.samples(records.samples[: done * samples, 0])
+        if records.samples_per_period:
+            extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     return Response(
         status=status,
         frequency=scene.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
-        amplitude_mean_confidence=mean_confidence(peaks) if confidence is None else confidence,
+        amplitude_mean_confidence=mean_confidence(peaks) if ended.confidence is None else ended.confidence,
         static_deflection=static,
         amplitude_max_dynamic=float(dynamic.max(initial=0.0)),
         amplitude_mean_dynamic=float(dynamic.mean()) if len(dynamic) else 0.0,
@@ -221,24 +214,25 @@ def evaluate(
         periods=done,
         transient=first,
         counters=run.counters,
-        peak=records.peak[:done].copy(),
-        section=section[:, :2].copy(),
-        slip=section[:, 3 : 3 + b].copy(),
-        slip_velocity=section[:, 3 + b :].copy(),
         event_list=events_of(run.rows, run.log),
-        time=np.arange(done * samples) * (system.period / max(samples, 1)),
-        displacement=records.samples[: done * samples, 0].copy(),
-        body_displacement=records.samples[: done * samples, 1:].copy(),
-        coordinates=_coordinates(records, done * samples),
         penetration=run.penetration,
+        **_series(system, records, done),
         **extent,
     )
 
 
-def _coordinates(records: Records, count: int) -> np.ndarray | None:
-    """Return the first samples of modal coordinates; None where they were not wanted, or the method keeps none."""
-    kept = records.coordinates[:count]
-    return kept.copy() if kept.size and np.all(np.isfinite(kept)) else None
+def _series(system: System, records: Records, done: int) -> dict[str, Any]:
+    """Return the series of a response: of its periods, and of its samples."""
+    section, b, count = records.section[: done + 1], system.bodies, done * records.samples_per_period
+    samples, coordinates = records.samples[:count], records.coordinates[:count]
+    kept = coordinates.size and np.all(np.isfinite(coordinates))  # not where none were wanted, or the method keeps none
+    return {
+        "peak": records.peak[:done].copy(), "section": section[:, :2].copy(), "slip": section[:, 3 : 3 + b].copy(),
+        "slip_velocity": section[:, 3 + b :].copy(),
+        "time": np.arange(count) * (system.period / max(records.samples_per_period, 1)),
+        "displacement": samples[:, 0].copy(), "body_displacement": samples[:, 1:].copy(),
+        "coordinates": coordinates.copy() if kept else None,
+    }  # fmt: skip
 
 
 def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any], bool]:

@@ -165,7 +165,7 @@ class Response(Displayed):
     energy_residual: float
     """imbalance of the whole run's ledger relative to its largest term [-]"""
     attached_mass_fraction: float | None
-    """share of the bodies' mass that the structure feels at that frequency; None without bodies or motion [-]"""
+    """fraction of the bodies' mass that the structure feels at that frequency; None without bodies or motion [-]"""
     wall_time_s: float
     """time that the run took [s]"""
     periods: int
@@ -202,7 +202,7 @@ class Response(Displayed):
     tilt_max: tuple[float | None, ...] | None = None
     """largest tilt of each body in its cavity; None for sliders, and without bodies in the plane [rad]"""
     lift_share: tuple[float | None, ...] | None = None
-    """share of the time that each body is off its floor [-]"""
+    """fraction of the time that each body is off its floor [-]"""
     linearisation: tuple[float | None, ...] | None = None
     """what small tilts neglect over the smallest play, for each body [-]"""
     in_plane: PlanarSamples | None = None

@@ -2,7 +2,7 @@
 
 A motion without contacts is known: what is left of its transient is a bound. One that repeats itself moves on, if at
 all, by as much as its slowest decay allows. Of any other the mean is known as far as the window holds its memory often
-enough: it forgets its past at the rate at which it loses energy, loss/(2 energy) a period for amplitudes.
+enough: it forgets its past at the rate at which it loses energy, loss/(2 energy) per period for amplitudes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LONGEST = 16
 
 
 class Judgement(NamedTuple):
-    """Whether a window is steady; rate: of what decays there, a period.
+    """Whether a window is steady; rate: of what decays there, per period.
 
     confidence: half width of the 95 % confidence interval of its mean, with what remains, m; None: too few periods.
     """
@@ -88,7 +88,7 @@ def _touched(scene: Scene, records: Records, first: int, done: int) -> bool:
 
 
 def _energy_rate(transient: Transient, records: Records, first: int, done: int) -> float:
-    """Return how fast an amplitude would decay by the losses of some periods, a period."""
+    """Return how fast an amplitude would decay by the losses of some periods, per period."""
     lost = records.ledger[done] - records.ledger[first]
     parts = records.parts[first : done + 1]
     # bodies that nothing holds count from where they have least: their height is only known within the cavity
@@ -100,7 +100,7 @@ def _energy_rate(transient: Transient, records: Records, first: int, done: int) 
 
 
 def _remaining(peaks: np.ndarray, rate: float, tolerance: float) -> float:
-    """Return how far the mean of peaks that repeat, but for a decay at some rate a period, may still move, m.
+    """Return how far the mean of peaks that repeat, but for a decay at some rate per period, may still move, m.
 
     By the means of four parts of the window, or by what changes from one repetition to the next, whichever says less.
     """
@@ -116,7 +116,7 @@ def _remaining(peaks: np.ndarray, rate: float, tolerance: float) -> float:
 
 
 def _gone(decayed: float, least: float) -> float:
-    """Return the share of a decay that is over after exp(-decayed), at least a bound; tiny at none."""
+    """Return the fraction of a decay that is over after exp(-decayed), at least a bound; tiny at none."""
     return max(-np.expm1(-decayed), least, np.finfo(float).tiny)
 
 

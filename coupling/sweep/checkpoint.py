@@ -10,42 +10,30 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, width_of
-from vanedamp.files.checkpoint_file import CheckpointFile, digests
-from vanedamp.files.store import StoreError, Variable
+from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
 
 
-class Checkpoint:
-    """Finished points, in memory and in a file (path None: in memory only). A context manager."""
+class Checkpoint(SceneCheckpoint):
+    """Finished points, in memory and in a file (path None: in memory only)."""
 
     def __init__(self, path: str | Path | None, scene: Scene, size: int, provenance: Mapping[str, Any]) -> None:
         """Take up the file's points. Raises InputError for a file of another sweep, or one that cannot be read."""
         self.finished = SweepTable(size, width_of(scene))
-        belongs = {
-            "scene": ("scene", scene.to_dict()),
-            "model": ("reduced model or CSV file", digests(scene.files)),
-            "provenance": ("version of the software", provenance),
-        }
-        self._file = CheckpointFile(path, "sweep-checkpoint", belongs, self._content)
-        if (found := self._file.read()) is not None:
+        super().__init__(path, "sweep-checkpoint", scene, provenance)
+        if (found := self.read()) is not None:
             self._take(str(path), found[0])
-
-    def __enter__(self) -> Checkpoint:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # a file that could not be written will not be now
-        if kind is None or not issubclass(kind, StoreError):
-            self._file.write()
 
     def add(self, task: Task, result: TaskResult, more: bool) -> None:
         """Take over a task's points; more: whether its chain goes on. Raises StoreError, such as for a full disk."""
         self.finished.add(task, result, more)
-        self._file.changed()
+        self.changed()
 
-    def _content(self) -> tuple[dict[str, Variable], dict[str, Any], str]:
+    def content(self) -> tuple[dict[str, Variable], dict[str, Any], str]:
+        """Return variables of the file, and how many points are finished, in words."""
         finished, done = self.finished, np.flatnonzero(self.finished.done)
         states = {str(number): state.to_list() for number, state in finished.states.items()}
         texts = np.array([json.dumps(finished.texts), json.dumps(states)], object)

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Displayed
-from vanedamp.files.store import Variable, dataset, frozen, load, reader, save
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import Variable, frozen
 
-_KIND = "sweep"
 #: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
 PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
@@ -27,20 +24,20 @@ PEAKS = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(Displayed):
+class Sweep(SceneRecord, Displayed):
     """Responses over the product of the axes; every array has the shape of the grid, in the axes' order.
 
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
-                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          structure without bodies and with every body fixed in its cavity; `mean_confidence` is the
                           half width of the mean's 95 % confidence interval, nan where there are too few periods;
                           `max_dynamic` and `mean_dynamic` count from the static deflection under the bodies' loads,
                           as `undamped` and `fixed` do
-    attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
-    energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
+    attached_mass_fraction  fraction of the bodies' mass that the structure feels; nan without bodies or motion
+    energy_share          (*grid, 4) fraction of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
-    in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), share of the time off the
+    in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
                           floor, what small tilts neglect over the smallest play; nan for sliders; empty for a scene
                           of sliders
     peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
@@ -52,6 +49,7 @@ class Sweep(Displayed):
     A point of the grid is the same whoever ran it, and whenever: no time is taken.
     """
 
+    KIND: ClassVar[str] = "sweep"
     scene: Scene
     axes: Mapping[str, np.ndarray]
     amplitude_max: np.ndarray
@@ -98,15 +96,8 @@ class Sweep(Displayed):
             | {name: values.tolist() for name, values in further.items()}
         )
 
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens. Dimensions are the axes' paths with _ for dots."""
-        save(path, _KIND, *self._record())
-
-    def to_xarray(self) -> Any:
-        """Return the xarray.Dataset of the file that `save` writes."""
-        return dataset(*self._record())
-
-    def _record(self) -> tuple[dict[str, Variable], dict[str, Any]]:
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file. Dimensions are the axes' paths with _ for dots."""
         dims = tuple(_dimension(axis) for axis in self.axes)
         units = self.units()
         variables = {_dimension(axis): Variable(v, (_dimension(axis),), units[axis]) for axis, v in self.axes.items()}
@@ -119,29 +110,26 @@ class Sweep(Displayed):
         swept = resonance_axis(self.scene, self.axes)[0]
         others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
-        attributes = {
-            "axes": list(self.axes),
-            "scene": self.scene.to_dict(),
-            "provenance": dict(self.provenance),
-        }
-        return variables, attributes
+        return variables
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        return {"axes": list(self.axes), "scene": self.scene.to_dict(), "provenance": dict(self.provenance)}
 
     @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Sweep:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, _KIND)
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Sweep:
+        """Return the record in the variables and attributes of a file."""
         for name in ("amplitude_max", "amplitude_mean"):  # all that earlier files have
             values.setdefault(f"{name}_dynamic", values[name])
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
+        given = cls.common(attributes, path)
+        given |= {name: frozen(values[name]) for name in (*MEASURES, "energy_share")}
+        given |= {name: frozen(values[name], object) for name in ("status", "classification")}
         return cls(
-            scene=validate(Scene, json.loads(attributes["scene"]), str(path)),
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
-            **{name: frozen(values[name]) for name in (*MEASURES, "energy_share")},
-            **{name: frozen(values[name], object) for name in ("status", "classification")},
             in_plane={name: frozen(values[name]) for name in IN_PLANE if name in values},
             peaks={name: frozen(values[name]) for name in PEAKS if name in values},
-            provenance=json.loads(attributes["provenance"]),
+            **given,
         )
 
 

@@ -32,7 +32,7 @@ IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1"}
 #: losses of energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
-#: columns of every point: measures, then shares of the losses; behind them IN_PLANE, body by body
+#: columns of every point: measures, then fractions of the losses; behind them IN_PLANE, body by body
 COLUMNS = (*MEASURES, *LOSSES)
 #: faults of a point: what its parameters may cause; all others, such as of imports, files and memory, would meet the
 #: next point as well
@@ -169,7 +169,7 @@ def _shares(response: Response) -> np.ndarray:
 
 
 def _linear(scene: Scene) -> list[float]:
-    """Return the amplitude without bodies, and with every body glued to its cavity's floor, m; nan if unknown."""
+    """Return the amplitude without bodies, and with every body fixed in its cavity's floor, m; nan if unknown."""
     if scene.excitation.signal is not None:
         return [np.nan, np.nan]
     frequency = np.array([scene.frequency])

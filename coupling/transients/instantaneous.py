@@ -14,14 +14,69 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from vanedamp.coupling.transients.ring_down_segments import Followed
+from vanedamp.coupling.numerics.codes import CLOSED, OPEN
+from vanedamp.coupling.response.segment import Segment, beyond_line
 
-#: points a period of the fastest mode between which the sign of the speed is followed
+#: fraction of the largest speed below which a mode is not felt
+_FELT = 1e-9
+#: points per period of the fastest mode between which the sign of the speed is followed
 _LOOKS = 16
-#: share of the speed before that counts as rest, and by which that speed is forgotten from one period to the next
+#: fraction of the speed before that counts as rest, and by which that speed is forgotten from one period to the next
 _STILL, _FORGOTTEN = 1e-12, 0.01
-#: share of the swings before and after below which a swing is a rebound within a half cycle; the most in a row
+#: fraction of the swings before and after below which a swing is a rebound within a half cycle; the most in a row
 _REBOUND, _MOST_REBOUNDS = 0.1, 100
+
+
+class Energy(NamedTuple):
+    """Energies at a time, J: of structure, bodies and springs together; of the structure's modes, and kinetic of it."""
+
+    total: float
+    structure: float
+    kinetic: float
+
+
+class Followed:
+    """A segment of a free motion, with one modal coordinate followed.
+
+    start, duration: s; rate: (m,) 1/s; wave: (m,) coefficients of exp(rate t) in the coordinate; powers: (3,) value,
+    slope and second derivative of the rest.
+    """
+
+    def __init__(self, segment: Segment, mode: int) -> None:
+        self.start, self.duration = segment.start, segment.duration
+        self._segment, self.rate, self.wave = segment, segment.rate, segment.shape[mode] * segment.amplitude
+        self.powers = np.array([segment.q[mode], segment.v[mode], segment.bend[mode]])
+
+    @property
+    def fastest(self) -> float:
+        """Angular frequency of the fastest mode that the followed coordinate feels, rad/s."""
+        speed = np.abs(self.wave * self.rate)
+        felt = speed > _FELT * speed.max(initial=0.0)
+        return float(np.abs(self.rate[felt]).max(initial=0.0))
+
+    def coordinate(self, t: float) -> float:
+        """Return the followed modal coordinate after a time t, s."""
+        constant, slope, bend = self.powers
+        return float(constant + t * (slope + 0.5 * t * bend) + (self.wave @ beyond_line(self.rate * t)).real)
+
+    def speed(self, t: np.ndarray) -> np.ndarray:
+        """Return the rates (k,) of the followed modal coordinate after times t (k,), s."""
+        turned = np.expm1(np.multiply.outer(t, self.rate))
+        speed: np.ndarray = self.powers[1] + t * self.powers[2] + (turned @ (self.wave * self.rate)).real
+        return speed
+
+    def energy(self, t: float) -> Energy:
+        """Return the energies after a time t, s."""
+        system, (q, v) = self._segment.system, self._segment.at(t)
+        n, u, massive = system.modes, system.contacts, slice(len(q) - len(system.tangential))
+        kinetic = 0.5 * float(v[:n] @ v[:n])
+        total = 0.5 * float(system.mass[massive] @ v[massive] ** 2 + q @ system.stiffness @ q)
+        total -= float(system.weight[n:] @ q[n:])
+        state = self._segment.state[:u]
+        pressed = np.isfinite(system.spring[:u]) & ((state < OPEN) | (state == CLOSED))
+        gap = (system.rest[:u] + system.J[:u] @ q)[pressed]
+        total += 0.5 * float(system.spring[:u][pressed] @ gap**2 + system.tangential @ (system.elongation @ q) ** 2)
+        return Energy(total, kinetic + 0.5 * float(q[:n] @ system.stiffness[:n, :n] @ q[:n]), kinetic)
 
 
 class TurningPoint(NamedTuple):
@@ -56,7 +111,7 @@ class TurningPoints:
         if segment.fastest == 0.0:
             now = segment.energy(0.0)
             if now.kinetic > _STILL**2 * max(now.structure, self._energy):
-                # other modes move, and this one has become so small beside them that the engine leaves it out
+                # other modes move, and this one has become so small compared with them that the engine leaves it out
                 self._sign, self._stop = 0.0, None
                 return
         looks = max(int(np.ceil(segment.duration * segment.fastest * _LOOKS / (2 * np.pi))), 2)
@@ -152,9 +207,7 @@ class Cycles(NamedTuple):
 
 def half_cycles(time: np.ndarray, coordinate: np.ndarray) -> HalfCycles:
     """Return the half cycles between turning points (k,)."""
-    return HalfCycles(
-        (time[1:] + time[:-1]) / 2, np.abs(np.diff(coordinate)) / 2, 0.5 / np.diff(time)
-    )  # fmt: skip
+    return HalfCycles((time[1:] + time[:-1]) / 2, np.abs(np.diff(coordinate)) / 2, 0.5 / np.diff(time))
 
 
 def cycles(
@@ -183,7 +236,7 @@ def cycles(
 
 
 def damping_ratio(decrement: np.ndarray) -> np.ndarray:
-    """Return the damping ratio of a linear mode whose swings shrink by exp(-decrement) each half cycle."""
+    """Return the damping ratio of a linear mode whose swings shrink by exp(-decrement) per half cycle."""
     ratio: np.ndarray = decrement / np.hypot(np.pi, decrement)
     return ratio
 

@@ -44,13 +44,13 @@ from vanedamp.coupling.transients.ramp_record import WORKS, Ramp, RampRun
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: share of the gap, and of its product with the angular frequency, below which a body counts as at rest
+#: fraction of the gap, and of its product with the angular frequency, below which a body counts as at rest
 _AT_REST = 1e-9
-#: share of the largest motion of a place by a mode below which it does not feel another
+#: fraction of the largest motion of a place by a mode below which it does not feel another
 _UNSEEN = 1e-11
 #: points of the linear curves from end to end, and around their peaks, in half-power widths
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
-#: share of the range over which the detuning of a resonance is differentiated
+#: fraction of the range over which the detuning of a resonance is differentiated
 _STEP = 1e-4
 
 
@@ -80,7 +80,7 @@ def ramp(
             start, warnings = _steady(first, start)
             notes += warnings
         run = _Run(first, table, course, start)
-        for done in run:
+        for done in run.advance():
             if progress is not None:
                 progress(before + done, total)
         before += len(course.time)
@@ -120,8 +120,8 @@ def seen_only(system: System) -> System:
     return system._replace(load=load)
 
 
-class _Run(Iterator[int]):
-    """A run, an iterator over the number of periods done: it ends with the last one, or within one (`status`)."""
+class _Run:
+    """A run over the periods of a course."""
 
     def __init__(self, scene: Scene, table: Table, course: Course, start: RestartState | None) -> None:
         self.scene, self.table, self.course, self.state = scene, table, course, start
@@ -140,17 +140,17 @@ class _Run(Iterator[int]):
         # the ledger without the work of the rotation, which is counted apart
         self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
 
-    def __next__(self) -> int:
-        """Run the next period. Return the number of those done."""
-        if self.done == len(self.course.time) or self.status is not Status.OK:
-            raise StopIteration
-        run = self._begin(self.done)
-        self.status = run.advance_to(1)
-        if self.status is Status.OK:
-            self._record(self.done, run.outcome())
+    def advance(self) -> Iterator[int]:
+        """Run all periods, or until one fails (`status`). Yields the number of those done."""
+        for k in range(len(self.course.time)):
+            run = self._begin(k)
+            self.status = run.advance_to(1)
+            if self.status is not Status.OK:
+                return
+            self._record(k, run.outcome())
             self.state = final_state(self.scene, run)
-            self.done += 1
-        return self.done
+            self.done = k + 1
+            yield self.done
 
     def _begin(self, k: int) -> Run:
         """Return a run of period k that begins with the motion so far."""
@@ -248,7 +248,7 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
 
 
 def _at_one_frequency(scene: Scene, table: Table, low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return values (k,) of a speed, resonances among them, and amplitudes (k,) without bodies and with them glued."""
+    """Return values (k,) of a speed, resonances among them, and amplitudes (k,) without bodies and with them fixed."""
 
     @cache
     def responses(value: float) -> tuple[LinearResponse, LinearResponse]:

@@ -30,7 +30,7 @@ class Course(NamedTuple):
     """The p periods of a run.
 
     value: (p,) the ramp's quantity, in its unit; frequency: (p,) Hz; speed: (p,) rad/s; time: (p,) s, of the starts;
-    rate: change of the quantity in a second.
+    rate: change of the quantity per second.
     """
 
     value: np.ndarray

@@ -5,25 +5,23 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.records import ENERGIES
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import Variable, frozen, load, reader, save
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import Variable, frozen
 
 if TYPE_CHECKING:
     import xarray
 
-KIND = "ramp"
 DIRECTIONS = ("up", "down")
 #: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
-#: series of a run, an entry a period, and their units
+#: series of a run, an entry per period, and their units
 SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "amplitude_dynamic": "m", "impacts": "1"}
 #: states at both ends of every period, and their units
 STATES = {"displacement": "m", "velocity": "m/s"}
@@ -35,7 +33,7 @@ CURVES = {"frequency": "Hz", "speed": "rad/s", "undamped": "m", "fixed": "m"}
 class RampRun:
     """A run through p excitation periods with b bodies.
 
-    rate             change of the ramp's quantity in a second, below zero where it falls
+    rate             change of the ramp's quantity per second, below zero where it falls
     status           "ok", or another response.response.Status that ended the run early or spoils its figures
     time             (p,) s, at the start of each period
     frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
@@ -84,17 +82,18 @@ class RampRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Ramp:
+class Ramp(SceneRecord):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
-    linear structure in steady state without bodies and with every body glued to its cavity; tops: the largest of both
+    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the largest of both
     from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
     `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
     which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
     be read before figures are used; provenance: versions and further data of the caller (JSON-able).
     """
 
+    KIND: ClassVar[str] = "ramp"
     scene: Scene
     runs: tuple[RampRun, ...]
     curves: Mapping[str, np.ndarray]
@@ -168,25 +167,19 @@ class Ramp:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
 
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens."""
-        attributes = {
-            "scene": self.scene.to_dict(), "tops": dict(self.tops),
-            "warnings": json.dumps(list(self.warnings)), "provenance": dict(self.provenance),
-        }  # fmt: skip
-        save(path, KIND, self.variables(), attributes)
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        return super().attributes() | {"tops": dict(self.tops)}
 
     @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Ramp:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, KIND)
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ramp:
+        """Return the record in the variables and attributes of a file."""
+        given = cls.common(attributes, path)
         values.setdefault("amplitude_dynamic", values["amplitude"])  # all that earlier files have
-        scene = validate(Scene, json.loads(attributes["scene"]), str(path))
         runs = []
         for number, rate in enumerate(values["rate"]):
             inside, starts = values["run_of_period"] == number, values["run_of_start"] == number
-            stuck = values["stuck"][inside] if scene.damper else np.zeros((np.count_nonzero(inside), 0))
+            stuck = values["stuck"][inside] if given["scene"].damper else np.zeros((np.count_nonzero(inside), 0))
             runs.append(
                 RampRun(
                     rate=float(rate), status=str(values["status"][number]), stuck=frozen(stuck, bool),
@@ -197,14 +190,10 @@ class Ramp:
                 )
             )  # fmt: skip
         return cls(
-            scene=scene, runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
-            tops=json.loads(attributes["tops"]), warnings=tuple(json.loads(attributes["warnings"])),
-            provenance=json.loads(attributes["provenance"]),
+            runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
+            tops=json.loads(attributes["tops"]), **given,
         )  # fmt: skip
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the variables of the file as a data set of xarray, which must be installed."""
-        from xarray import Dataset
-
-        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
-        return Dataset(data, attrs={"quantity": self.table.quantity})
+        """Return the data set of xarray, which must be installed, that the file opens as; with the quantity."""
+        return super().to_xarray().assign_attrs(quantity=self.table.quantity)

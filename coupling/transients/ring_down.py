@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.model_order.selection import warnings_of
-from vanedamp.coupling.response.evaluation import evaluate
+from vanedamp.coupling.response.evaluation import Ended, evaluate
 from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart import start_of
@@ -27,17 +26,21 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.system import System
-from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, without_rebounds
+from vanedamp.coupling.transients.instantaneous import Followed, TurningPoint, TurningPoints, without_rebounds
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
-from vanedamp.coupling.transients.ring_down_segments import Followed
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: share of the largest motion of excitation.at by one mode below which it does not show another
+#: fraction of the largest motion of excitation.at by one mode below which it does not show another
 _UNSEEN = 1e-9
-#: share of the largest motion of a mode at the start below which another is at rest, but for round-off
+#: fraction of the largest motion of a mode at the start below which another is at rest, but for round-off
 _STILL = 1e-12
+#: the motion after a steady response that ended early
+_NO_MOTION: dict[str, Any] = {
+    **dict.fromkeys(("time", "displacement", "energy", "structure_energy"), frozen(())), "impacts": frozen((), int),
+    "rest_time": None, "energies": {}, "energy_residual": 0.0,
+}  # fmt: skip
 
 
 def ring_down(
@@ -60,21 +63,19 @@ def ring_down(
     if start is not None:
         check_impacts(free, system, start)
     mode = _followed(chosen.scene, system, table, start)
-    record = RingDown(
-        scene=scene, status=Status.OK, linear=_linear(system, mode),
-        duration=periods * system.period, time=frozen(()), displacement=frozen(()), energy=frozen(()),
-        structure_energy=frozen(()), impacts=frozen((), int), rest_time=None, energies={}, energy_residual=0.0,
-        drive=None if drive is None else _of_drive(drive), wall_time_s=0.0, estimate=chosen.estimate,
-        advice=chosen.advice, warnings=warnings_of(chosen.scene), provenance=dict(provenance or {}),
-    )  # fmt: skip
-    if drive is not None and drive.status is not Status.OK:
-        record = replace(record, status=drive.status)
+    status, motion = Status.OK if drive is None else drive.status, _NO_MOTION
     if start is not None:
         before = 0 if drive is None else drive.periods
-        record = _rung_down(
-            record, free, system, start, lambda done: progress and progress(before + done, before + periods)
+        ended, motion = _free_motion(
+            free, system, start, mode, lambda done: progress and progress(before + done, before + periods)
         )
-    return replace(record, wall_time_s=time.perf_counter() - began)
+        status = ended if status is Status.OK else status
+    return RingDown(
+        scene=scene, status=status, linear=_linear(system, mode), duration=periods * system.period, **motion,
+        drive=None if drive is None else _of_drive(drive), wall_time_s=time.perf_counter() - began,
+        estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene),
+        provenance=dict(provenance or {}),
+    )  # fmt: skip
 
 
 def _drive(chosen: Chosen, periods: int, progress: Callable[[int, int], None] | None) -> Response:
@@ -117,7 +118,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 
 
 def _linear(system: System, mode: int) -> LinearMode:
-    """Return the figures of a mode without bodies, and with all of them glued: of the mode that is most like it."""
+    """Return the figures of a mode without bodies, and with all of them fixed: of the mode that is most like it."""
     modes = system.of_structure
     squares, shapes = eigh(np.diag(modes.stiffness), glued_mass(system))
     like = int(np.argmax(np.abs(shapes[mode])))
@@ -128,11 +129,11 @@ def _linear(system: System, mode: int) -> LinearMode:
     )  # fmt: skip
 
 
-def _rung_down(
-    record: RingDown, free: Scene, system: System, start: RestartState, report: Callable[[int], Any]
-) -> RingDown:
-    """Return the record with the free motion from a state on."""
-    began, mode, periods = time.perf_counter(), record.linear.mode, free.time.simulated
+def _free_motion(
+    free: Scene, system: System, start: RestartState, mode: int, report: Callable[[int], Any]
+) -> tuple[Status, dict[str, Any]]:
+    """Return how the free motion from a state ended, and the fields of RingDown that describe it."""
+    began, periods = time.perf_counter(), free.time.simulated
     options: Any = free.solver
     records = new_records(system, periods, 0, deflected=deflects(free, system))
     begun = start_of(free, system, start)
@@ -143,17 +144,15 @@ def _rung_down(
         if segment.period > done:
             report(done := segment.period)
     outcome = run.outcome()
-    response = evaluate(free, outcome, walk.status, 0, began)
+    response = evaluate(free, outcome, Ended(walk.status, 0), began)
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
     ledger = outcome.records.ledger[: outcome.periods + 1]
     parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
-    return replace(
-        record, status=response.status if record.status is Status.OK else record.status, time=frozen(moments),
-        displacement=frozen(system.response[mode] * coordinate), energy=frozen(energy),
-        structure_energy=frozen(structure), impacts=frozen(np.diff(np.searchsorted(hit, moments)), int),
-        rest_time=None if turning.rest is None else turning.rest.time,
-        energies=dict(zip(PARTS, map(float, parts), strict=True)),
-        energy_residual=response.energy_residual,
-    )  # fmt: skip
+    return response.status, {
+        "time": frozen(moments), "displacement": frozen(system.response[mode] * coordinate), "energy": frozen(energy),
+        "structure_energy": frozen(structure), "impacts": frozen(np.diff(np.searchsorted(hit, moments)), int),
+        "rest_time": None if turning.rest is None else turning.rest.time,
+        "energies": dict(zip(PARTS, map(float, parts), strict=True)), "energy_residual": response.energy_residual,
+    }  # fmt: skip

@@ -6,22 +6,17 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
-from vanedamp.files.store import Variable, frozen, load, reader, save
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import Variable, frozen
 
-if TYPE_CHECKING:
-    import xarray
-
-KIND = "ring_down"
 #: energies of a ring-down: at its start, what it loses, and at its end
 PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 
@@ -30,7 +25,7 @@ PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 class LinearMode:
     """The followed natural mode: its number from 0, frequency (Hz, undamped) and damping ratio without bodies.
 
-    fixed_frequency, fixed_damping_ratio: with every body glued to its cavity.
+    fixed_frequency, fixed_damping_ratio: with every body fixed in its cavity.
     """
 
     mode: int
@@ -41,13 +36,13 @@ class LinearMode:
 
 
 @dataclass(frozen=True, eq=False)
-class RingDown:
+class RingDown(SceneRecord):
     """The free motion of one natural mode, by its k turning points.
 
     scene: with its [ring_down] table; linear: the mode without bodies
     duration            s, of the free motion
     time                (k,) s of the turning points, from the start of the free motion
-    displacement        (k,) m there, the mode's share of that at excitation.at
+    displacement        (k,) m there, the mode's contribution to that at excitation.at
     energy              (k,) J there, of structure, bodies and springs
     structure_energy    (k,) J there, of all modes of the structure
     impacts             (k - 1,) in each half cycle
@@ -58,6 +53,7 @@ class RingDown:
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """
 
+    KIND: ClassVar[str] = "ring_down"
     scene: Scene
     status: Status
     linear: LinearMode
@@ -163,46 +159,30 @@ class RingDown:
                     found[f"{name}_{part}"] = Variable(values, ("bin",), unit)
         return found
 
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens."""
-        attributes: dict[str, Any] = {
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        attributes = super().attributes() | {
             "status": self.status.value, "linear": asdict(self.linear), "duration": self.duration,
             "energies": self.energies, "energy_residual": self.energy_residual, "wall_time_s": self.wall_time_s,
-            "warnings": json.dumps(list(self.warnings)), "scene": self.scene.to_dict(),
-            "provenance": dict(self.provenance),
         }  # fmt: skip
-        for name in ("rest_time", "drive", "estimate", "advice"):
-            if (value := getattr(self, name)) is not None:
-                attributes[name] = value
-        save(path, KIND, self.variables(), attributes)
+        open_ = {name: getattr(self, name) for name in ("rest_time", "drive", "estimate", "advice")}
+        return attributes | {name: value for name, value in open_.items() if value is not None}
 
     @classmethod
-    @reader
-    def load(cls, path: str | Path) -> RingDown:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, KIND)
-        arrays = {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
-        data = {name: json.loads(attributes[name]) for name in ("linear", "energies", "scene", "provenance")}
-        open_ = {name: json.loads(attributes[name]) for name in ("drive", "estimate", "advice") if name in attributes}
-        energies = data["energies"]
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> RingDown:
+        """Return the record in the variables and attributes of a file."""
+        given = cls.common(attributes, path)
+        given |= {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
+        given |= {name: float(attributes[name]) for name in ("duration", "energy_residual", "wall_time_s")}
+        given |= {name: json.loads(attributes.get(name, "null")) for name in ("drive", "estimate", "advice")}
+        linear, energies = (json.loads(attributes[name]) for name in ("linear", "energies"))
         return cls(
-            scene=validate(Scene, data["scene"], str(path)), status=Status(attributes["status"]),
-            linear=LinearMode(**data["linear"]), duration=float(attributes["duration"]),
-            impacts=frozen(values["impacts"], int),
+            status=Status(attributes["status"]), linear=LinearMode(**linear), impacts=frozen(values["impacts"], int),
             rest_time=float(attributes["rest_time"]) if "rest_time" in attributes else None,
             # a file has them in the order of their names
             energies={name: energies[name] for name in PARTS if name in energies},
-            energy_residual=float(attributes["energy_residual"]), drive=open_.get("drive"),
-            wall_time_s=float(attributes["wall_time_s"]), estimate=open_.get("estimate"), advice=open_.get("advice"),
-            warnings=tuple(json.loads(attributes["warnings"])), provenance=data["provenance"], **arrays,
+            **given,
         )  # fmt: skip
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the variables of the file as a data set of xarray, which must be installed."""
-        from xarray import Dataset
-
-        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
-        return Dataset(data, attrs={"status": self.status.value})
 
 
 def _of_bins(found: Bins) -> dict[str, list[float]]:

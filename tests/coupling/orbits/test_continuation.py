@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools import closed_maps as maps
-from vanedamp.coupling.orbits.continuation import Follower
+from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.multipliers import indicators, multipliers
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, find_orbit, solve
@@ -159,13 +159,13 @@ def test_a_branch_of_one_impact_keeps_the_product_of_its_multipliers():
 def test_a_closed_branch_ends_where_it_began():
     """The orbits lie on a circle of state and parameter; the branch begins at its top."""
     table = Table(**{"from": -1.5, "to": 1.5, "max_points": 800})
-    follower = Follower(Problem(maps.smooth(maps.isola, 1), -1.5, 3.0), table)
-    start = follower.problem.pack(np.array([1.0]), 0.0)
+    problem = Problem(maps.smooth(maps.isola, 1), -1.5, 3.0)
+    start = problem.pack(np.array([1.0]), 0.0)
     row = np.array([0.0, 1.0])
-    trace = follower.begin(solve(follower.problem, start, row, np.zeros(1)), row)
-    while not trace.end:
-        follower.advance(trace)
-    branch = follower.branch(trace)
+    followed = Continuation.begin(problem, table, solve(problem, start, row, np.zeros(1)), row)
+    while not followed.end:
+        followed.advance()
+    branch = followed.branch
     assert branch.end == "closed: back at its first orbit"
     assert places(branch, "fold") == pytest.approx([1.0, -1.0], rel=CLOSE)
     assert np.abs(branch.state[:, 0] ** 2 + branch.parameter**2 - 1).max() < 1e-9

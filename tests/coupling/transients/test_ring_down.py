@@ -18,8 +18,15 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, bins, cycles, without_rebounds
-from vanedamp.coupling.transients.ring_down_segments import Energy, Followed
+from vanedamp.coupling.transients.instantaneous import (
+    Energy,
+    Followed,
+    TurningPoint,
+    TurningPoints,
+    bins,
+    cycles,
+    without_rebounds,
+)
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
