@@ -15,7 +15,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.export.options import OUTPUT, Option
+from vanedamp.studies.export.export import OUTPUT, Option
 from vanedamp.studies.export.record import Record
 
 DESCRIPTION = Option(

@@ -1,10 +1,10 @@
-"""Interactive charts of forced responses (plotly), for pages that carry plotly themselves."""
+"""Forced responses as charts (plotly): names and looks of their curves, the curves, impact mistuning, losses, tilts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -13,7 +13,6 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
-from vanedamp.studies.report.response_curves import RELATIVE, trace
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
 _SHARED = "#475569"  # linear curves of several responses
@@ -195,3 +194,36 @@ def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int)
             axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)
+
+
+#: title of an axis of amplitudes over the reference of a response
+RELATIVE = "amplitude / maximum without bodies"
+
+
+class Look(NamedTuple):
+    """Name, dashes and width (px) of a curve."""
+
+    title: str
+    dash: str
+    width: float
+
+
+#: by the names of the curves in LinearCurves and ForcedResponse, in the order in which they are drawn
+LOOKS = {
+    "undamped": Look("without bodies", "dot", 1.8),
+    "fixed": Look("bodies fixed", "dash", 1.8),
+    "damped_max": Look("damped, maximum", "solid", 0.8),
+    "damped_mean": Look("damped, mean of peaks", "solid", 2.8),
+}
+
+
+def trace(curve: str, x: Any, values: np.ndarray, colour: str, **more: Any) -> dict[str, Any]:
+    """Return a curve as plotly takes a scatter's arguments: values (k,) over x (k,), infinite ones left out.
+
+    more: further arguments, or others in place of these.
+    """
+    look = LOOKS[curve]
+    return {
+        "x": x, "y": np.where(np.isfinite(values), values, np.nan), "name": look.title, "mode": "lines",
+        "line": {"dash": look.dash, "width": look.width, "color": colour},
+    } | more  # fmt: skip

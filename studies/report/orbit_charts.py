@@ -1,4 +1,4 @@
-"""Orbits as time histories and in the phase planes of the structure and of the bodies."""
+"""Orbits as time histories and in phase planes, and the phase planes of a run with its starts of periods."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.coupling.orbits.history import OrbitHistory
+from vanedamp.coupling.orbits.history import OrbitHistory, late_history
+from vanedamp.coupling.response.response import Response
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
@@ -121,3 +122,28 @@ def orbits_rows(histories: Mapping[str, OrbitHistory]) -> Iterator[list[object]]
     for name, history in histories.items():
         columns = (history.time, history.displacement, history.velocity, history.slip, history.slip_velocity)
         yield from ([name, *values] for values in np.column_stack(columns).tolist())
+
+
+#: periods that are drawn, and starts of periods
+_PERIODS, _MOST_STARTS = 25, 2000
+
+
+def phase_figure(response: Response) -> go.Figure:
+    """Draw the phase planes of structure and bodies, with a point at the start of each of the evaluated periods.
+
+    A motion that repeats after k periods has k points, one that never does fills an area. response: with samples and
+    events.
+    """
+    history = late_history(response, _PERIODS)
+    bodies = response.slip.shape[1]
+    columns = 1 + bool(bodies)
+    figure = make_subplots(rows=1, cols=columns, horizontal_spacing=0.12)
+    add_planes(figure, history, row=1, col=1)
+    figure.update_traces(showlegend=True, opacity=0.55)
+    late = slice(max(response.transient, len(response.section) - _MOST_STARTS), None)
+    states = (response.section[late, 0], response.section[late, 1], response.slip[late], response.slip_velocity[late])
+    add_starts(figure, states, "starts of periods", row=1, col=1, size=5)
+    for col, values in enumerate(((history.displacement, states[0]), (history.slip, states[2]))[:columns], start=1):
+        reach = 1.06e6 * max(1e-12, *(np.abs(each).max(initial=0.0) for each in values))
+        figure.update_xaxes(range=[-reach, reach], row=1, col=col)
+    return dressed(figure, height=430).update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})

@@ -15,8 +15,8 @@ from matplotlib.colors import Normalize
 
 from vanedamp.files.store import load, replacing
 from vanedamp.studies.figures import GREY, draw_grid, save, subplots
+from vanedamp.studies.report.forced_response_charts import RELATIVE
 from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
-from vanedamp.studies.report.response_curves import RELATIVE
 
 if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes

@@ -10,8 +10,8 @@ from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.report.campbell_chart import campbell_figure, campbell_header, campbell_rows
 from vanedamp.studies.report.campbell_picture import campbell_picture
+from vanedamp.studies.report.sections.campbell import campbell_figure, campbell_header, campbell_rows
 
 #: the block 0.1 m out from an axis across it, halfway between its sides
 ROTATION = """

@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.files.store import Variable, write_csv
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.options import Option
+from vanedamp.studies.export.export import Option
 from vanedamp.studies.export.record import Record
 
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"

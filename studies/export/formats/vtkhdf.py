@@ -16,7 +16,7 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.studies.export.options import INPUT, Option
+from vanedamp.studies.export.export import INPUT, Option
 from vanedamp.studies.export.record import Record, read_record
 
 SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"

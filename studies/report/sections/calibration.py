@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
 from vanedamp.files.store import load as load_record
 from vanedamp.modal.frf import UNITS
-from vanedamp.studies.report.calibration_charts import (
-    frequencies_figure,
-    frequencies_header,
-    frequencies_rows,
-    frequency_errors,
-    response_figure,
-    response_header,
-    response_rows,
-)
+from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
@@ -73,3 +69,105 @@ def _calibration(file: str, record: tuple[dict[str, Any], dict[str, Any]], page:
         "cavities": cavities or {},
         "warnings": attributes.get("warnings", []),
     }
+
+
+_BEFORE, _AFTER, _MEASURED = "#64748b", COLOURS[0], COLOURS[1]
+_STEM = "#cbd5e1"
+#: responses that a chart shows; the table of its data has all
+_MOST = 4
+
+
+def frequencies_figure(record: Mapping[str, Any]) -> go.Figure:
+    """Draw the error of every target's frequency before and after tuning, %."""
+    targets = [f"{value:.6g} Hz" for value in record["target_frequency"]]
+    before, after = frequency_errors(record)
+    figure = go.Figure()
+    for target, old, new in zip(targets, before, after, strict=True):
+        figure.add_scatter(
+            x=[target, target], y=[old, new], mode="lines", line={"color": _STEM, "width": 3}, showlegend=False,
+            hoverinfo="skip",
+        )  # fmt: skip
+    for name, errors, marker in (
+        ("before", before, {"symbol": "circle-open", "size": 13, "color": _BEFORE, "line": {"width": 2.5}}),
+        ("after", after, {"symbol": "diamond", "size": 11, "color": _AFTER}),
+    ):
+        figure.add_scatter(
+            x=targets, y=errors, name=name, mode="markers", marker=marker,
+            hovertemplate=f"measured %{{x}}<br>{name} %{{y:+.4g}} %<extra></extra>",
+        )  # fmt: skip
+    dressed(figure, height=380)
+    figure.update_xaxes(title_text="measured frequency", type="category")
+    figure.update_yaxes(title_text="computed over measured, % off", zeroline=True, zerolinecolor="#334155")
+    return figure.update_layout(hovermode="closest")
+
+
+def frequency_errors(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors (n,) of the computed frequencies before and after tuning, %."""
+    target = record["target_frequency"]
+    return 100.0 * (record["frequency_before"] / target - 1.0), 100.0 * (record["frequency_after"] / target - 1.0)
+
+
+def frequencies_header() -> list[str]:
+    """Return the names of the columns of `frequencies_rows`."""
+    return ["measured, Hz", "before, Hz", "after, Hz", "MAC before", "MAC after"]
+
+
+def frequencies_rows(record: Mapping[str, Any]) -> Iterator[list[float]]:
+    """Yield a line a measured frequency."""
+    names = ("target_frequency", "frequency_before", "frequency_after", "mac_before", "mac_after")
+    yield from np.column_stack([record[name] for name in names]).tolist()
+
+
+def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit: str) -> go.Figure:
+    """Draw magnitude and phase of a measured response and of its fit, with the band and the mode."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06, row_heights=[0.62, 0.38])
+    line, labels = record["line"], record["label"]
+    for place, label in enumerate(labels[:_MOST]):
+        shown = "" if len(labels) == 1 else f" {label}"
+        measured, fitted = (_complex(record, name)[place] for name in ("response", "fitted"))
+        for values, name, look in (
+            (measured, f"measured{shown}", {"mode": "markers", "marker": {"size": 4, "color": _MEASURED}}),
+            (fitted, f"fitted{shown}", {"mode": "lines", "line": {"color": _AFTER, "width": 2.2}}),
+        ):
+            group = {"name": name, "legendgroup": name, "opacity": 1.0 - 0.2 * place}
+            magnitude, phase = np.abs(values), np.degrees(np.angle(values))
+            figure.add_scatter(
+                x=line, y=magnitude, row=1, col=1, **group, **look,
+                hovertemplate=f"{name}<br>%{{x:.6g}} Hz<br>%{{y:.4g}} {unit}<extra></extra>",
+            )  # fmt: skip
+            figure.add_scatter(
+                x=line, y=phase, row=2, col=1, showlegend=False, **group, **look,
+                hovertemplate=f"{name}<br>%{{x:.6g}} Hz<br>%{{y:.1f}} degrees<extra></extra>",
+            )  # fmt: skip
+    dressed(figure, height=560)
+    low, high = damping["band"]
+    figure.add_vrect(low, high, fillcolor="#94a3b8", opacity=0.12, line_width=0)
+    figure.add_vline(damping["frequency_hz"], line={"color": "#334155", "width": 1, "dash": "dash"})
+    figure.update_yaxes(
+        title_text=f"{damping.get('quantity', 'response')}, {unit}",
+        type="log",
+        dtick="D2",
+        exponentformat="power",
+        row=1,
+        col=1,
+    )
+    figure.update_yaxes(title_text="phase, degrees", tickvals=[-180, -90, 0, 90, 180], row=2, col=1)
+    figure.update_xaxes(title_text="frequency, Hz", row=2, col=1)
+    return figure.update_layout(hovermode="closest")
+
+
+def response_header(record: Mapping[str, Any], unit: str) -> list[str]:
+    """Return the names of the columns of `response_rows`."""
+    parts = ("measured real", "measured imaginary", "fitted real", "fitted imaginary")
+    return ["frequency, Hz", *(f"{label} {part}, {unit}" for label in record["label"] for part in parts)]
+
+
+def response_rows(record: Mapping[str, Any]) -> Iterator[list[float]]:
+    """Yield a line a frequency line; what is not fitted is nan."""
+    names = ("response_real", "response_imaginary", "fitted_real", "fitted_imaginary")
+    columns = [record[name][place] for place in range(len(record["label"])) for name in names]
+    yield from np.column_stack([record["line"], *columns]).tolist()
+
+
+def _complex(record: Mapping[str, Any], name: str) -> np.ndarray:
+    return np.asarray(record[f"{name}_real"] + 1j * record[f"{name}_imaginary"])

@@ -13,16 +13,7 @@ import numpy as np
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, is_start, steady_states
 from vanedamp.coupling.sweep.sweep import LOSSES
-from vanedamp.studies.report.body_advice import body_note
 from vanedamp.studies.report.charts import Chart
-from vanedamp.studies.report.coexistence_charts import (
-    basin_axes,
-    basin_panels,
-    basins_figure,
-    count_axes,
-    count_figure,
-    state_rows,
-)
 from vanedamp.studies.report.forced_response import (
     ForcedResponse,
     best_first,
@@ -38,8 +29,21 @@ from vanedamp.studies.report.forced_response_charts import (
     plane_figure,
     responses_figure,
 )
-from vanedamp.studies.report.map_chart import MOST_PANELS, map_axes, map_figure, map_panels, map_rows, panel_rows
-from vanedamp.studies.report.page import Page, format_setting
+from vanedamp.studies.report.map_chart import (
+    MOST_PANELS,
+    basin_axes,
+    basin_panels,
+    basins_figure,
+    count_axes,
+    count_figure,
+    map_axes,
+    map_figure,
+    map_panels,
+    map_rows,
+    panel_rows,
+    state_rows,
+)
+from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
 
 ORDER = 10
