@@ -21,6 +21,8 @@ FORMATS = ExtensionPoint(
 )  # fmt: skip
 #: the kind of a writer that takes results of every kind
 ANY = "*"
+#: roles of options that name a file
+INPUT, OUTPUT = "input", "output"
 
 
 class Format(Protocol):
@@ -84,10 +86,6 @@ def _named(kind: str) -> str:
 
 def _flag(name: str) -> str:
     return name.replace("_", "-")
-
-
-#: roles of options that name a file
-INPUT, OUTPUT = "input", "output"
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
 AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
 
 
+#: names of columns, and rows: the data of a chart
+Table = tuple[Sequence[str], Iterable[Iterable[Any]]]
+
+
 @dataclass(frozen=True)
 class Chart:
     """A figure as a piece of HTML for a page that already holds plotly's script.

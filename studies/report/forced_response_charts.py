@@ -18,6 +18,8 @@ _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626
 _SHARED = "#475569"  # linear curves of several responses
 _PANELS, _PANEL_HEIGHT = 3, 260  # energy panels side by side; height of one, px
 _TITLE_WIDTH = 110  # characters of titles side by side
+#: title of an axis of amplitudes over the reference of a response
+RELATIVE = "amplitude / maximum without bodies"
 
 
 def responses_figure(
@@ -194,10 +196,6 @@ def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int)
             axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)
-
-
-#: title of an axis of amplitudes over the reference of a response
-RELATIVE = "amplitude / maximum without bodies"
 
 
 class Look(NamedTuple):

@@ -24,6 +24,10 @@ _FEWEST = 4  # values of the second axis that make a map
 MOST_PANELS = 24
 #: panels in two columns, of more there are three; heights of a panel and of the space between two, px
 _IN_TWO, _TALL, _LOW, _BETWEEN = 6, 440, 320, 120
+#: colours that the colour-blind tell apart (Okabe and Ito 2008)
+_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
+#: colour and name of runs that are not ok
+_NOT_OK, _NO_STATE = "#9ca3af", "not ok"
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -116,12 +120,6 @@ def panels(
             setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(others, combination, strict=True)
         )
         yield name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut
-
-
-#: colours that the colour-blind tell apart (Okabe and Ito 2008)
-_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
-#: colour and name of runs that are not ok
-_NOT_OK, _NO_STATE = "#9ca3af", "not ok"
 
 
 def basin_axes(sweep: Sweep) -> tuple[str, str] | None:

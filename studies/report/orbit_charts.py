@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
@@ -10,10 +10,12 @@ from plotly.subplots import make_subplots
 
 from vanedamp.coupling.orbits.history import OrbitHistory, late_history
 from vanedamp.coupling.response.response import Response
-from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
+from vanedamp.studies.report.charts import COLOURS, DASHES, Table, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
+#: periods that are drawn, and starts of periods
+_PERIODS, _MOST_STARTS = 25, 2000
 
 
 def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
@@ -110,22 +112,15 @@ def _dash(body: int) -> str:
     return DASHES[body % len(DASHES)]
 
 
-def orbits_header(histories: Mapping[str, OrbitHistory]) -> list[str]:
-    """Return the names of the columns of `orbits_rows`."""
+def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:
+    """Return a row per sample."""
     bodies = max(history.slip.shape[1] for history in histories.values())
     kinds = [f"{kind}_{body + 1}" for kind in ("slip", "slip_velocity") for body in range(bodies)]
-    return ["orbit", "time", "displacement", "velocity", *kinds]
-
-
-def orbits_rows(histories: Mapping[str, OrbitHistory]) -> Iterator[list[object]]:
-    """Yield a line a sample."""
+    rows: list[list[object]] = []
     for name, history in histories.items():
         columns = (history.time, history.displacement, history.velocity, history.slip, history.slip_velocity)
-        yield from ([name, *values] for values in np.column_stack(columns).tolist())
-
-
-#: periods that are drawn, and starts of periods
-_PERIODS, _MOST_STARTS = 25, 2000
+        rows += ([name, *values] for values in np.column_stack(columns).tolist())
+    return ["orbit", "time", "displacement", "velocity", *kinds], rows
 
 
 def phase_figure(response: Response) -> go.Figure:

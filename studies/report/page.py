@@ -24,6 +24,10 @@ from vanedamp.studies.report.results import Results, Section, sections
 _FOLDER = Path(__file__).parent
 #: scenes that a table can have side by side; more stand below each other
 _MOST_COLUMNS = 4
+_SLIDERS = (
+    'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
+    "length and height tells whether that is enough."
+)
 
 
 @dataclass(frozen=True)
@@ -147,12 +151,6 @@ def _flat(data: Any, path: str = "") -> dict[str, str]:
 def format_setting(value: Any) -> str:
     """Return a value as text, floats in eight digits."""
     return f"{value:.8g}" if isinstance(value, float) else str(value)
-
-
-_SLIDERS = (
-    'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
-    "length and height tells whether that is enough."
-)
 
 
 def body_note(notes: Mapping[str, Any], sliders: bool) -> str | None:

@@ -21,6 +21,8 @@ _SURFACES = {
     "body": ("next body", {-1: ""}),
     "stop": ("stop", {-1: ""}),
 }
+#: share of its free travel within which a body touches
+_TOUCHES = 1e-9
 
 
 @dataclass(frozen=True)
@@ -110,10 +112,6 @@ def samples_in_plane(values: Mapping[str, Any]) -> PlanarSamples | None:
         strict=True,
     )  # fmt: skip
     return PlanarSamples(**arrays, contacts=tuple(places))
-
-
-#: share of its free travel within which a body touches
-_TOUCHES = 1e-9
 
 
 def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) -> PlanarSamples:

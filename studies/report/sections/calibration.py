@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,18 @@ from plotly.subplots import make_subplots
 
 from vanedamp.files.store import load as load_record
 from vanedamp.modal.frf import UNITS
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 40
 KIND = "calibration"
+_BEFORE, _AFTER, _MEASURED = "#64748b", COLOURS[0], COLOURS[1]
+_STEM = "#cbd5e1"
+#: names of the columns of `_frequency_rows`
+_FREQUENCIES = ("measured, Hz", "before, Hz", "after, Hz", "MAC before", "MAC after")
+#: responses that a chart shows; the table of its data has all
+_MOST = 4
 
 
 def load(path: Path) -> Result:
@@ -37,31 +43,26 @@ def _calibration(file: str, record: tuple[dict[str, Any], dict[str, Any]], page:
     values, attributes = record
     known = ("rigid", "damping", "excitation", "cavity")
     rigid, damping, excitation, cavities = (json.loads(attributes.get(name, "null")) for name in known)
-    targets, chart, response = [], None, None
+    targets: list[dict[str, Any]] = []
+    parts: list[tuple[Any, ...]] = []
+    chart, response = None, None
     if "target_frequency" in values:
+        rows, errors = _frequency_rows(values), zip(*_frequency_errors(values), strict=True)
         targets = [
-            {"row": row, "errors": errors, "sensitivity": sensitivity}
-            for row, errors, sensitivity in zip(
-                frequencies_rows(values),
-                zip(*frequency_errors(values), strict=True),
-                values["sensitivity"],
-                strict=True,
-            )
+            {"row": row, "errors": both, "sensitivity": sensitivity}
+            for row, both, sensitivity in zip(rows, errors, values["sensitivity"], strict=True)
         ]
-        chart = page.chart(
-            "calibration", frequencies_figure(values), frequencies_header(), frequencies_rows(values), [file]
-        )
+        parts = list(zip(values["part"], values["factor"], values["factor_deviation"], strict=True))
+        chart = page.chart("calibration", frequencies_figure(values), _FREQUENCIES, rows, [file])
     if "line" in values:
         unit = UNITS[damping["quantity"]]
         figure = response_figure(values, damping, unit)
-        response = page.chart("response", figure, response_header(values, unit), response_rows(values), [file])
+        response = page.chart("response", figure, *_response_table(values, unit), [file])
     return {
         "file": file,
         "targets": targets,
         "chart": chart,
-        "parts": list(zip(values["part"], values["factor"], values["factor_deviation"], strict=True))
-        if targets
-        else [],
+        "parts": parts,
         "response": response,
         "rigid": rigid,
         "damping": damping,
@@ -71,16 +72,10 @@ def _calibration(file: str, record: tuple[dict[str, Any], dict[str, Any]], page:
     }
 
 
-_BEFORE, _AFTER, _MEASURED = "#64748b", COLOURS[0], COLOURS[1]
-_STEM = "#cbd5e1"
-#: responses that a chart shows; the table of its data has all
-_MOST = 4
-
-
 def frequencies_figure(record: Mapping[str, Any]) -> go.Figure:
     """Draw the error of every target's frequency before and after tuning, %."""
     targets = [f"{value:.6g} Hz" for value in record["target_frequency"]]
-    before, after = frequency_errors(record)
+    before, after = _frequency_errors(record)
     figure = go.Figure()
     for target, old, new in zip(targets, before, after, strict=True):
         figure.add_scatter(
@@ -101,21 +96,17 @@ def frequencies_figure(record: Mapping[str, Any]) -> go.Figure:
     return figure.update_layout(hovermode="closest")
 
 
-def frequency_errors(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+def _frequency_errors(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Return the errors (n,) of the computed frequencies before and after tuning, %."""
     target = record["target_frequency"]
     return 100.0 * (record["frequency_before"] / target - 1.0), 100.0 * (record["frequency_after"] / target - 1.0)
 
 
-def frequencies_header() -> list[str]:
-    """Return the names of the columns of `frequencies_rows`."""
-    return ["measured, Hz", "before, Hz", "after, Hz", "MAC before", "MAC after"]
-
-
-def frequencies_rows(record: Mapping[str, Any]) -> Iterator[list[float]]:
-    """Yield a line a measured frequency."""
+def _frequency_rows(record: Mapping[str, Any]) -> list[list[float]]:
+    """Return a row per measured frequency."""
     names = ("target_frequency", "frequency_before", "frequency_after", "mac_before", "mac_after")
-    yield from np.column_stack([record[name] for name in names]).tolist()
+    rows: list[list[float]] = np.column_stack([record[name] for name in names]).tolist()
+    return rows
 
 
 def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit: str) -> go.Figure:
@@ -143,30 +134,23 @@ def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit:
     low, high = damping["band"]
     figure.add_vrect(low, high, fillcolor="#94a3b8", opacity=0.12, line_width=0)
     figure.add_vline(damping["frequency_hz"], line={"color": "#334155", "width": 1, "dash": "dash"})
-    figure.update_yaxes(
-        title_text=f"{damping.get('quantity', 'response')}, {unit}",
-        type="log",
-        dtick="D2",
-        exponentformat="power",
-        row=1,
-        col=1,
-    )
+    title = f"{damping.get('quantity', 'response')}, {unit}"
+    figure.update_yaxes(title_text=title, type="log", dtick="D2", exponentformat="power", row=1, col=1)
     figure.update_yaxes(title_text="phase, degrees", tickvals=[-180, -90, 0, 90, 180], row=2, col=1)
     figure.update_xaxes(title_text="frequency, Hz", row=2, col=1)
     return figure.update_layout(hovermode="closest")
 
 
-def response_header(record: Mapping[str, Any], unit: str) -> list[str]:
-    """Return the names of the columns of `response_rows`."""
-    parts = ("measured real", "measured imaginary", "fitted real", "fitted imaginary")
-    return ["frequency, Hz", *(f"{label} {part}, {unit}" for label in record["label"] for part in parts)]
-
-
-def response_rows(record: Mapping[str, Any]) -> Iterator[list[float]]:
-    """Yield a line a frequency line; what is not fitted is nan."""
-    names = ("response_real", "response_imaginary", "fitted_real", "fitted_imaginary")
-    columns = [record[name][place] for place in range(len(record["label"])) for name in names]
-    yield from np.column_stack([record["line"], *columns]).tolist()
+def _response_table(record: Mapping[str, Any], unit: str) -> Table:
+    """Return a row per frequency line; what is not fitted is nan."""
+    parts = {
+        "response_real": "measured real", "response_imaginary": "measured imaginary",
+        "fitted_real": "fitted real", "fitted_imaginary": "fitted imaginary",
+    }  # fmt: skip
+    labels = list(enumerate(record["label"]))
+    header = ["frequency, Hz", *(f"{label} {part}, {unit}" for _, label in labels for part in parts.values())]
+    columns = [record[name][index] for index, _ in labels for name in parts]
+    return header, np.column_stack([record["line"], *columns]).tolist()
 
 
 def _complex(record: Mapping[str, Any], name: str) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,15 @@ import plotly.graph_objects as go
 
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.speed_range import RPM
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 45
 KIND = "campbell"
+_ORDER, _MARK = "#64748b", "#111827"
+#: of modes beyond the colours
+_DASHES = ("solid", "dot", "dashdot")
 
 
 def load(path: Path) -> Result:
@@ -31,14 +34,9 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 
 def _diagram(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
-    chart = page.chart("campbell", campbell_figure(diagram), campbell_header(diagram), campbell_rows(diagram), [file])
+    chart = page.chart("campbell", campbell_figure(diagram), *campbell_table(diagram), [file])
     solved = ", ".join(f"{speed * RPM:.6g}" for speed in diagram.solved)
     return {"file": file, "chart": chart, "record": diagram, "solved": solved}
-
-
-_ORDER, _MARK = "#64748b", "#111827"
-#: of modes beyond the colours
-_DASHES = ("solid", "dot", "dashdot")
 
 
 def campbell_figure(diagram: Campbell) -> go.Figure:
@@ -109,11 +107,7 @@ def _add_veerings(figure: go.Figure, diagram: Campbell) -> None:
         )  # fmt: skip
 
 
-def campbell_header(diagram: Campbell) -> list[str]:
-    """Return the names of the columns of `campbell_rows`."""
-    return ["speed, rad/s", "speed, rpm", *(f"mode {mode + 1}, Hz" for mode in diagram.modes)]
-
-
-def campbell_rows(diagram: Campbell) -> Iterator[list[float]]:
-    """Yield a line a speed."""
-    yield from np.column_stack([diagram.speeds, diagram.rpm, diagram.frequencies_hz.T]).tolist()
+def campbell_table(diagram: Campbell) -> Table:
+    """Return the frequencies of the modes, a row per speed."""
+    header = ["speed, rad/s", "speed, rpm", *(f"mode {mode + 1}, Hz" for mode in diagram.modes)]
+    return header, np.column_stack([diagram.speeds, diagram.rpm, diagram.frequencies_hz.T]).tolist()

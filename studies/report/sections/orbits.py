@@ -18,12 +18,12 @@ from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
-from vanedamp.studies.report.charts import axis_title, dressed
+from vanedamp.studies.report.charts import Table, axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, quantity
-from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_header, orbits_rows
+from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_table
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.sweep_beside import points_beside, system_of
+from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
 ORDER = 15
 KIND = "orbits"
@@ -32,6 +32,16 @@ _MOST_ORBITS = 6
 _BIFURCATIONS = ("fold", "pitchfork", "period doubling", "neimark-sacker")
 #: kinds of special points in the table; branches of bodies that stick have many changes of the sequence
 _LISTED = (*_BIFURCATIONS, "grazing")
+#: colours that the colour-blind tell apart (Okabe and Ito 2008), after black
+_COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+#: symbols of special points by their kind
+_SYMBOLS = {
+    "fold": "square", "pitchfork": "diamond", "period doubling": "triangle-up", "neimark-sacker": "circle",
+    "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
+}  # fmt: skip
+_POINT = "#9ca3af"  # of a sweep
+#: sizes of multipliers that the charts show at first
+_MODULI = (1e-3, 10.0)
 
 
 def load(path: Path) -> Result:
@@ -52,23 +62,17 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     branches, files = joined(list(records.values())), list(records)
-    beside = {
-        other: points_beside(branches.scene, branches.parameter, result.record)
-        for other, result in page.results.kinds["sweep"].items()
-    }
-    beside = {other: points for other, points in beside.items() if len(points[0])}
+    beside = sweeps_beside(branches.scene, branches.parameter, page.results.kinds["sweep"])
     figure = branches_figure(branches, {page.names[other]: points for other, points in beside.items()})
     shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
-    shown["chart"] = page.chart(
-        "branches", figure, branches_header(branches), branches_rows(branches), [*files, *beside]
-    )
+    shown["chart"] = page.chart("branches", figure, *_branches_table(branches), [*files, *beside])
     shown["multipliers"] = page.chart(
-        "multipliers", multipliers_figure(branches), multipliers_header(branches), multipliers_rows(branches), files
+        "multipliers", _multipliers_figure(branches), *_multipliers_table(branches), files
     )
     named, shown["missing"] = _histories(branches)
     if named:
-        shown["orbits"] = page.chart("orbits", orbits_figure(named), orbits_header(named), orbits_rows(named), files)
+        shown["orbits"] = page.chart("orbits", orbits_figure(named), *orbits_table(named), files)
     return shown
 
 
@@ -104,18 +108,6 @@ def _chosen(branches: Branches) -> Iterator[tuple[str, int, float, np.ndarray]]:
         for kind, parameter, state in found:
             value = quantity(parameter, unit_of(branches.parameter))
             yield f"{branch_name(number, branch)}, {kind}, {value}", branch.periods, parameter, state
-
-
-#: colours that the colour-blind tell apart (Okabe and Ito 2008), after black
-_COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-#: symbols of special points by their kind
-_SYMBOLS = {
-    "fold": "square", "pitchfork": "diamond", "period doubling": "triangle-up", "neimark-sacker": "circle",
-    "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
-}  # fmt: skip
-_POINT = "#9ca3af"  # of a sweep
-#: sizes of multipliers that the charts show at first
-_MODULI = (1e-3, 10.0)
 
 
 def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> go.Figure:
@@ -201,22 +193,20 @@ def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> N
             )  # fmt: skip
 
 
-def branches_header(branches: Branches) -> list[str]:
-    """Return the names of the columns of `branches_rows`."""
+def _branches_table(branches: Branches) -> Table:
+    """Return a row per point, branches counted from 0, in SI units."""
     measures = ("amplitude_mean", "amplitude_max", "impacts_per_period", "largest_multiplier", "stable", "undetermined")
-    return ["branch", "periods", branches.parameter, *measures]
-
-
-def branches_rows(branches: Branches) -> Iterator[list[object]]:
-    """Yield a line a point, branches counted from 0, in SI units."""
+    rows = []
     for number, branch in enumerate(branches.branches):
         columns = (branch.parameter, branch.amplitude_mean, branch.amplitude_max, branch.impacts_per_period)
         largest = np.abs(branch.multipliers).max(axis=1, initial=0.0)
-        for index, values in enumerate(np.column_stack([*columns, largest]).tolist()):
-            yield [number, branch.periods, *values, bool(branch.stable[index]), bool(branch.undetermined[index])]
+        flags = zip(branch.stable.tolist(), branch.undetermined.tolist(), strict=True)
+        for values, states in zip(np.column_stack([*columns, largest]).tolist(), flags, strict=True):
+            rows.append([number, branch.periods, *values, *states])
+    return ["branch", "periods", branches.parameter, *measures], rows
 
 
-def multipliers_figure(branches: Branches) -> go.Figure:
+def _multipliers_figure(branches: Branches) -> go.Figure:
     """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter."""
     figure = make_subplots(rows=1, cols=2, column_widths=[0.46, 0.54], horizontal_spacing=0.14)
     wide, units = for_people(unit_of(branches.parameter))
@@ -252,13 +242,11 @@ def multipliers_figure(branches: Branches) -> go.Figure:
     return dressed(figure, height=560)
 
 
-def multipliers_header(branches: Branches) -> list[str]:
-    """Return the names of the columns of `multipliers_rows`."""
-    return ["branch", branches.parameter, "real", "imaginary"]
-
-
-def multipliers_rows(branches: Branches) -> Iterator[list[object]]:
-    """Yield a line a multiplier."""
-    for number, branch in enumerate(branches.branches):
-        for parameter, values in zip(branch.parameter.tolist(), branch.multipliers, strict=True):
-            yield from ([number, parameter, value.real, value.imag] for value in values.tolist())
+def _multipliers_table(branches: Branches) -> Table:
+    """Return a row per multiplier."""
+    return ["branch", branches.parameter, "real", "imaginary"], [
+        [number, parameter, value.real, value.imag]
+        for number, branch in enumerate(branches.branches)
+        for parameter, values in zip(branch.parameter.tolist(), branch.multipliers, strict=True)
+        for value in values.tolist()
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,19 @@ import plotly.graph_objects as go
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.sweep_beside import points_beside
+from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 17
 KIND = "ramp"
+_STATIONARY = "#0f172a"
+#: points of a curve that are drawn; of more periods, the largest of equally many each
+_MOST_POINTS = 2000
+#: rates of Lewis' curve, and how far it goes beyond those of the runs
+_RATES, _BEYOND = 61, 3.0
+_TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
 
 def load(path: Path) -> Result:
@@ -34,11 +40,8 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 
 def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
-    beside = {
-        other: points_beside(ramp.scene, ramp.table.path, result.record, "amplitude_mean_dynamic")
-        for other, result in page.results.kinds["sweep"].items()
-    }
-    beside = {other: points for other, points in beside.items() if len(points[0])}
+    sweeps = page.results.kinds["sweep"]
+    beside = sweeps_beside(ramp.scene, ramp.table.path, sweeps, "amplitude_mean_dynamic")
     named = {page.names[other]: points for other, points in beside.items()}
     rows = [
         {"name": run_name(ramp, run), "run": run, "share": ramp.share(run), "at": run.at_peak("frequency")}
@@ -50,17 +53,9 @@ def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
         "rows": rows,
         "beside": bool(beside),
         "passed": ramp.tops["half_power_width"] > 0.0,
-        "chart": page.chart("ramp", ramp_figure(ramp, named), ramp_header(ramp), ramp_rows(ramp), [file, *beside]),
-        "peaks": page.chart("peaks", peaks_figure(ramp), peaks_header(ramp), peaks_rows(ramp), [file]),
+        "chart": page.chart("ramp", ramp_figure(ramp, named), *_ramp_table(ramp), [file, *beside]),
+        "peaks": page.chart("peaks", peaks_figure(ramp), *_peaks_table(ramp), [file]),
     }
-
-
-_STATIONARY = "#0f172a"
-#: points of a curve that are drawn; of more periods, the largest of equally many each
-_MOST_POINTS = 2000
-#: rates of Lewis' curve, and how far it goes beyond those of the runs
-_RATES, _BEYOND = 61, 3.0
-_TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
 
 def along(ramp: Ramp) -> str:
@@ -96,10 +91,9 @@ def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]])
             },
             hovertemplate="%{x:.6g}: %{y:.5g} µm",
         )  # fmt: skip
+    path = ramp.table.path
+    unit = SPEEDS[path] if x == "speed" else hertz_of(path, ramp.scene.excitation.engine_order)
     for name, (value, amplitude) in beside.items():
-        unit = (
-            SPEEDS[ramp.table.path] if x == "speed" else hertz_of(ramp.table.path, ramp.scene.excitation.engine_order)
-        )
         figure.add_scatter(
             x=value * unit, y=1e6 * amplitude, name=f"steady state ({name})", mode="markers",
             marker={"color": _STATIONARY, "size": 5, "symbol": "circle-open"}, hovertemplate="%{x:.6g}: %{y:.5g} µm",
@@ -118,18 +112,15 @@ def _thinned(run: RampRun) -> np.ndarray:
     return np.array([begin + np.argmax(run.amplitude_dynamic[begin:end]) for begin, end in itertools.pairwise(edges)])
 
 
-def ramp_header(ramp: Ramp) -> list[str]:
-    """Return the names of the columns of `ramp_rows`."""
+def _ramp_table(ramp: Ramp) -> Table:
+    """Return the periods that are drawn, in SI units."""
     stuck = [f"stuck_{body + 1}" for body in range(len(ramp.scene.damper))]
-    return ["rate", "time", "frequency", "speed", "amplitude", "impacts", *stuck]
-
-
-def ramp_rows(ramp: Ramp) -> Iterator[list[float]]:
-    """Yield a line for each period that is drawn, in SI units."""
+    rows: list[list[float]] = []
     for run in ramp.runs:
         kept = _thinned(run)
         columns = (run.time, run.frequency, run.speed, run.amplitude_dynamic, run.impacts, *run.stuck.T.astype(float))
-        yield from ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+    return ["rate", "time", "frequency", "speed", "amplitude", "impacts", *stuck], rows
 
 
 def peaks_figure(ramp: Ramp) -> go.Figure:
@@ -156,12 +147,8 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
     return dressed(figure, height=420)
 
 
-def peaks_header(ramp: Ramp) -> list[str]:
-    """Return the names of the columns of `peaks_rows`."""
-    return ["rate", "peak", "peak_frequency", "peak_share", "lewis_rate"]
-
-
-def peaks_rows(ramp: Ramp) -> Iterator[list[float]]:
-    """Yield a line a run."""
-    for run in ramp.runs:
-        yield [run.rate, run.peak, run.at_peak("frequency"), ramp.share(run), ramp.lewis_rate(run)]
+def _peaks_table(ramp: Ramp) -> Table:
+    """Return the peaks, a row per run."""
+    return ["rate", "peak", "peak_frequency", "peak_share", "lewis_rate"], [
+        [run.rate, run.peak, run.at_peak("frequency"), ramp.share(run), ramp.lewis_rate(run)] for run in ramp.runs
+    ]

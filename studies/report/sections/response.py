@@ -19,6 +19,7 @@ from vanedamp.studies.report.time_history import History, history_figure
 
 ORDER = 20
 KIND = "response"
+HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
 
 def load(path: Path) -> Result:
@@ -56,9 +57,6 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
         for number, (tilt, lift, neglected) in enumerate(zip(*figures, strict=True), start=1)
         if np.isfinite(tilt)
     ]
-
-
-HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
 
 def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:

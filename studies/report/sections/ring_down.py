@@ -25,6 +25,15 @@ _BEGUN = {
     "impulse": "after a hammer blow of {impulse:.4g} N s",
     "displacement": "let go from a static pull",
 }
+_DARK, _PALE, _LINE = "#0f172a", "#94a3b8", "#334155"
+#: points of a curve that are drawn; the table has them all
+_MOST_POINTS = 4000
+#: half cycles whose median the axis of frequencies must hold
+_NEIGHBOURS = 7
+HEADER = [
+    "time_s", "amplitude_m", "frequency_hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
+    "damping_ratio_energy", "energy_loss_j",
+]  # fmt: skip
 
 
 def load(path: Path) -> Result:
@@ -47,18 +56,6 @@ def _shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
     names = ("frequency", "damping_ratio", "damping_ratio_energy")
     bins = list(zip(*(zip(*record.bins[name], strict=True) for name in names), strict=True)) if table.bins else []
     return {"file": file, "record": record, "begun": begun, "chart": chart, "bins": bins}
-
-
-_DARK, _PALE, _LINE = "#0f172a", "#94a3b8", "#334155"
-#: points of a curve that are drawn; the table has them all
-_MOST_POINTS = 4000
-#: half cycles whose median the axis of frequencies must hold
-_NEIGHBOURS = 7
-
-HEADER = [
-    "time_s", "amplitude_m", "frequency_hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
-    "damping_ratio_energy", "energy_loss_j",
-]  # fmt: skip
 
 
 def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
