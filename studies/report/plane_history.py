@@ -92,12 +92,13 @@ def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
     return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
 
 
-def hits_in_plane(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:
-    """Return time (s) and place, as of an event, of all impacts of bodies in the plane."""
-    if "event_corner" not in values:
+def hits_in(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:
+    """Return time (s) and place, as of an event, of all impacts; sliders have no corner (-1)."""
+    if "event_kind" not in values:
         return []
-    names = ("event_kind", "event_time", "event_damper", "event_side", "event_corner")
-    entries = zip(*(np.asarray(values[name]).tolist() for name in names), strict=True)
+    columns = [values[f"event_{name}"] for name in ("kind", "time", "damper", "side")]
+    columns.append(values.get("event_corner", np.full(len(columns[0]), -1)))
+    entries = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
     return [(time, (body, side, corner)) for kind, time, body, side, corner in entries if kind == "impact"]
 
 
