@@ -55,16 +55,11 @@ def map_figure(sweep: Sweep) -> go.Figure:
     return figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
 
 
-def map_rows(sweep: Sweep) -> Iterator[list[object]]:
-    """Yield panel, values of the two axes and the relative amplitude of every point."""
-    yield from panel_rows(map_panels(sweep))
-
-
 def map_panels(sweep: Sweep) -> list[Panel]:
     """Return the panels of a sweep's map."""
     tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
     relative = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
-    return list(panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep)))
+    return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep))
 
 
 #: name, values of the axes across and up, and those of the map (up, across)
@@ -103,13 +98,14 @@ def panel_rows(drawn: list[Panel]) -> Iterator[list[object]]:
 
 def panels(
     sweep: Sweep, axes: Mapping[str, np.ndarray], values: np.ndarray, two: tuple[str, str] | None
-) -> Iterator[Panel]:
-    """Yield values over some axes of a sweep, cut along two of them, for every combination of the others."""
+) -> list[Panel]:
+    """Return values over some axes of a sweep, cut along two of them, for every combination of the others."""
     assert two is not None
     paths, units = list(axes), sweep.units()
     across, up = (paths.index(path) for path in two)
     order = [np.argsort(axes[path], kind="stable") for path in two]
     others = [index for index in range(len(paths)) if index not in (across, up)]
+    found = []
     for combination in itertools.product(*(range(values.shape[index]) for index in others)):
         point: list[int | slice] = [slice(None)] * len(paths)
         for index, value in zip(others, combination, strict=True):
@@ -119,7 +115,8 @@ def panels(
         name = ", ".join(
             setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(others, combination, strict=True)
         )
-        yield name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut
+        found.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
+    return found
 
 
 def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -139,11 +136,15 @@ def basins_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
     """Draw in which motion the run from each start ends, by colour; a panel a combination of other axes."""
     motions = _motions(states)
     shades = [_NOT_OK, *(_COLOURS[number % len(_COLOURS)] for number in range(len(motions) - 1))]
-    drawn = [(name, x, y, _numbers(values, motions)) for name, x, y, values in basin_panels(sweep, states)]
+    named = basin_panels(sweep, states)
+    drawn = [
+        (name, x, y, np.reshape([motions.index(motion) for motion in values.flat], values.shape))
+        for name, x, y, values in named
+    ]
     figure = panels_figure(
         sweep, drawn, basin_axes(sweep), zmin=-0.5, zmax=len(motions) - 0.5, showscale=False, colorscale=_steps(shades)
     )
-    for trace, (_, _, _, values) in zip(figure.data, basin_panels(sweep, states), strict=False):
+    for trace, (_, _, _, values) in zip(figure.data, named, strict=False):
         trace.update(customdata=values, hovertemplate="%{x:.6g}, %{y:.4g}: %{customdata}<extra></extra>")
     for motion, shade in list(zip(motions, shades, strict=True))[0 if (states.label < 0).any() else 1 :]:
         figure.add_scatter(
@@ -160,7 +161,7 @@ def basin_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
     for place, found in np.ndenumerate(states.states):
         for number, name in enumerate(_names(found)):
             named[place][label[place] == number] = name
-    return list(panels(sweep, sweep.axes, names, basin_axes(sweep)))
+    return panels(sweep, sweep.axes, names, basin_axes(sweep))
 
 
 def _names(states: Sequence[SteadyState]) -> list[str]:
@@ -178,26 +179,17 @@ def _motions(states: SteadyStates) -> list[str]:
     return [_NO_STATE, *(name for name, _ in runs.most_common())]
 
 
-def _numbers(names: np.ndarray, motions: Sequence[str]) -> np.ndarray:
-    return np.reshape([motions.index(name) for name in names.flat], names.shape)
-
-
 def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
     """Draw how many steady states were found; a panel a combination of other axes."""
+    axes = {path: sweep.axes[path] for path in states.parameters}
     least, most = min(int(states.count.min()), 1), max(int(states.count.max()), 1)
     shades = [_NOT_OK, *sample_colorscale("Viridis", np.linspace(0.0, 1.0, max(most, 2))[:most].tolist())][least:]
     return panels_figure(
-        sweep, count_panels(sweep, states), count_axes(sweep), zmin=least - 0.5, zmax=most + 0.5,
-        colorscale=_steps(shades),
+        sweep, panels(sweep, axes, states.count, count_axes(sweep)), count_axes(sweep),
+        zmin=least - 0.5, zmax=most + 0.5, colorscale=_steps(shades),
         colorbar={"title": {"text": "steady<br>states"}, "tickvals": list(range(least, most + 1))},
         hovertemplate="%{x:.6g}, %{y:.4g}: %{z} steady states<extra></extra>",
     )  # fmt: skip
-
-
-def count_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
-    """Return the panels of the numbers of steady states."""
-    axes = {path: sweep.axes[path] for path in states.parameters}
-    return list(panels(sweep, axes, states.count, count_axes(sweep)))
 
 
 def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:

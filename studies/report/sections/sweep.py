@@ -39,7 +39,6 @@ from vanedamp.studies.report.map_chart import (
     map_axes,
     map_figure,
     map_panels,
-    map_rows,
     panel_rows,
     state_rows,
 )
@@ -135,9 +134,12 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     }
     charts["plane"] = _plane_chart(responses, shown, page)
     rows = [
-        _key_figures(response) | {"shown": response.name in shown, "place": places[response.name], "colour": colour}
+        {
+            "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
+            "impacts": float(np.nan_to_num(response.impacts_per_period).max()), "place": places[response.name],
+        }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
-    ]
+    ]  # fmt: skip
     return charts | {
         "axis": axis, "units": responses[0].units, "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
@@ -167,14 +169,6 @@ def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Itera
         yield from ([response.name, *line] for line in np.column_stack([response.x, *values]).tolist())
 
 
-def _key_figures(response: ForcedResponse) -> dict[str, Any]:
-    return {
-        "name": response.name,
-        "headline": response.headline,
-        "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
-    }
-
-
 def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
     """Return the charts of where the runs of a sweep over starts end, and the states in the basins' panels."""
     states = steady_states(sweep)
@@ -191,6 +185,6 @@ def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def _map(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    header, panels = ("panel", *(map_axes(sweep) or ()), "relative_amplitude"), len(map_panels(sweep))
-    chart = page.chart("map", map_figure(sweep), header, map_rows(sweep), [file])
-    return {"chart": chart, "panels": panels, "drawn": min(panels, MOST_PANELS)}
+    header, panels = ("panel", *(map_axes(sweep) or ()), "relative_amplitude"), map_panels(sweep)
+    chart = page.chart("map", map_figure(sweep), header, panel_rows(panels), [file])
+    return {"chart": chart, "panels": len(panels), "drawn": min(len(panels), MOST_PANELS)}
