@@ -7,8 +7,7 @@ from argparse import ArgumentParser, Namespace
 from vanedamp.studies.commands.support.arguments import output_file
 from vanedamp.studies.commands.support.messages import print_warnings
 from vanedamp.studies.commands.support.outputs import check_outputs
-from vanedamp.studies.export.export import FORMATS, format_of, write
-from vanedamp.studies.export.options import INPUT, OUTPUT, Option
+from vanedamp.studies.export.export import FORMATS, INPUT, OUTPUT, Option, format_of, write
 from vanedamp.studies.export.record import read_record
 
 

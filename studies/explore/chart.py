@@ -14,7 +14,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
-from vanedamp.studies.report.response_curves import LOOKS, RELATIVE, trace
+from vanedamp.studies.report.forced_response_charts import LOOKS, RELATIVE, trace
 
 _FREE, _FIXED, _MEAN, _MAXIMUM = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
 _HEIGHT = 480

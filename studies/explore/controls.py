@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -83,13 +84,15 @@ def moved(scene: Scene, controls: Sequence[Control], texts: Mapping[str, str]) -
 
 def controls_of(scene: Scene) -> list[Control]:
     """Return the controls that make sense for a scene, in the order in which they are applied."""
+    planar = any(damper.form.planar for damper in scene.damper)
+    rigid = isinstance(scene.structure, Rigid)  # a reduced model holds its own damping
     return [
         *_bodies(scene),
         *_listed("cavity", scene.cavity, (_GAP,), _gap_changes),
-        *(_listed("cavity", scene.cavity, (_PLAY,), _changes) if _extended(scene) else ()),
+        *(_listed("cavity", scene.cavity, (_PLAY,), _changes) if planar else ()),
         *_listed("damper", scene.damper, _MEASURES_OF_DAMPER, _changes),
-        *_damping(scene),
-        *_level(scene),
+        *(_given("structure", scene.structure, _DAMPINGS) if rigid else ()),
+        *_given("excitation", scene.excitation, _LEVELS),
         *_orientation(scene),
     ]
 
@@ -143,39 +146,28 @@ def _listed(table: str, entries: Sequence[Any], measures: Sequence[_Measure], ch
         values = [getattr(entry, measure.key) for entry in entries]
         if not values or None in values:
             continue
+        key, label = measure.key, measure.label
         if len(set(values)) == 1:
-            paths = (f"{table}.{measure.key}",)
-            yield _control(measure, measure.key, measure.label, values[0], _setter(changes, paths))
+            yield _control(measure, key, label, values[0], partial(changes, f"{table}.{key}"))
             continue
         for index, (entry, value) in enumerate(zip(entries, values, strict=True)):
-            title = getattr(entry, "name", index + 1)
-            paths = (f"{table}.{index}.{measure.key}",)
-            yield _control(
-                measure, f"{measure.key}-{index}", f"{measure.label} {title}", value, _setter(changes, paths)
-            )
+            title, change = getattr(entry, "name", index + 1), partial(changes, f"{table}.{index}.{key}")
+            yield _control(measure, f"{key}-{index}", f"{label} {title}", value, change)
 
 
-def _setter(changes: Any, paths: tuple[str, ...]) -> Callable[[Scene, float], dict[str, Any]]:
-    return lambda scene, number: changes(scene, paths, number)
+def _changes(path: str, scene: Scene, number: float) -> dict[str, Any]:
+    return {path: number}
 
 
-def _changes(scene: Scene, paths: tuple[str, ...], number: float) -> dict[str, Any]:
-    return dict.fromkeys(paths, number)
-
-
-def _gap_changes(scene: Scene, paths: tuple[str, ...], number: float) -> dict[str, Any]:
-    """Return the changes of a gap: bodies keep their place as a share of the free travel."""
-    values = _changes(scene, paths, number)
-    step = paths[0].split(".")[1]
+def _gap_changes(path: str, scene: Scene, number: float) -> dict[str, Any]:
+    """Return the changes of a gap: bodies keep their position as a fraction of the free travel."""
+    values = {path: number}
+    step = path.split(".")[1]
     gaps = {cavity.name: cavity.gap for k, cavity in enumerate(scene.cavity) if step in ("gap", str(k))}
     for index, damper in enumerate(scene.damper):
         if damper.cavity in gaps and damper.position:
             values[f"damper.{index}.position"] = damper.position * (number / gaps[damper.cavity])
     return values
-
-
-def _extended(scene: Scene) -> bool:
-    return any(damper.form.planar for damper in scene.damper)
 
 
 def _bodies(scene: Scene) -> Iterator[Control]:
@@ -210,27 +202,16 @@ def _body_changes(scene: Scene, number: float) -> dict[str, Any]:
     return {"damper": rows}
 
 
-def _damping(scene: Scene) -> Iterator[Control]:
-    if not isinstance(scene.structure, Rigid):
-        return  # a reduced model holds its own
-    yield from _given("structure", scene.structure, _DAMPINGS)
-
-
-def _level(scene: Scene) -> Iterator[Control]:
-    yield from _given("excitation", scene.excitation, _LEVELS)
-
-
 def _given(table: str, record: Any, measures: Sequence[_Measure]) -> Iterator[Control]:
     """Yield the control of the one of these keys that a table gives."""
     for measure in measures:
         value = getattr(record, measure.key)
         if value is not None:
-            setter = _setter(_changes, (f"{table}.{measure.key}",))
-            yield _control(measure, measure.key, measure.label, value, setter)
+            yield _control(measure, measure.key, measure.label, value, partial(_changes, f"{table}.{measure.key}"))
 
 
 def _orientation(scene: Scene) -> Iterator[Control]:
     if scene.damper and scene.gravity.acceleration > 0.0 and scene.gravity.direction is None and not scene.speed:
-        angle, setter = scene.gravity.orientation_deg, _setter(_changes, ("gravity.orientation_deg",))
+        angle, setter = scene.gravity.orientation_deg, partial(_changes, "gravity.orientation_deg")
         low, high = min(-90.0, angle), max(90.0, angle)
         yield Control("orientation", "orientation of gravity", "°", 1.0, angle, low, high, False, setter)

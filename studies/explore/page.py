@@ -19,10 +19,11 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import commented, write_commented
 from vanedamp.studies.explore import point
-from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
+from vanedamp.studies.explore.chart import key_figures, remarks, response_figure
 from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.report.charts import GRAPH
 from vanedamp.studies.report.forced_response import forced_responses
 
 #: steps of a slider, and the longest that a request waits for the next form of a curve, s
@@ -114,7 +115,7 @@ def layout(exploration: Exploration) -> html.Main:
                 [
                     html.Div(
                         dcc.Graph(
-                            id="curve", figure={"layout": {"height": 480}}, config=point.GRAPH
+                            id="curve", figure={"layout": {"height": 480}}, config=GRAPH
                         ),
                         id="frame",
                     ),
@@ -219,17 +220,13 @@ def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     notes = [*([curve.note] if curve.note else []), *remarks(sweep, response, complete)]
     figures = html.Div(
         [
-            html.Dl([part for figure in key_figures(response) for part in _term(figure)]),
+            html.Dl([part for name, value in key_figures(response) for part in (html.Dt(name), html.Dd(value))]),
             html.Ul([html.Li(note) for note in notes], className="remarks"),
         ]
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
     marks = {"version": version, "points": count, "complete": complete}
     return response_figure(sweep, response, curve.linear, marks), figures, text
-
-
-def _term(figure: Figure) -> list[Any]:
-    return [html.Dt(figure.name), html.Dd(figure.value)]
 
 
 def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:

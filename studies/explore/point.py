@@ -19,17 +19,12 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
 from vanedamp.studies.explore.curves import Submit
 from vanedamp.studies.explore.point_view import PointView, axis_of, point_view
+from vanedamp.studies.report.charts import GRAPH
 from vanedamp.studies.report.forced_response import setting
 
 #: runs that are kept for the tabs of the page, and ms between looks at them
 _MOST_RUNS, _EVERY = 32, 200
 _HIDDEN = {"display": "none"}
-#: what a chart's bar of buttons has: nothing that sends data anywhere
-GRAPH: Any = {
-    "displaylogo": False,
-    "responsive": True,
-    "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
-}
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.motion import motion_of
 from vanedamp.studies.report.motion_page import motion_page
-from vanedamp.studies.report.phase_chart import phase_figure
-from vanedamp.studies.report.slider_motion import slider_samples
+from vanedamp.studies.report.orbit_charts import phase_figure
+from vanedamp.studies.report.plane_history import slider_samples
 from vanedamp.studies.report.time_history import History, history_figure
 
 #: samples of a period at most, and samples of a run; periods of a run whose events are kept

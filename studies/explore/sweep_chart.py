@@ -23,7 +23,7 @@ from vanedamp.studies.report.forced_response import (
     response_along,
     setting,
 )
-from vanedamp.studies.report.response_curves import LOOKS, trace
+from vanedamp.studies.report.forced_response_charts import LOOKS, trace
 
 #: curves behind the chosen one at most; of more, evenly chosen ones are drawn
 _MOST_BEHIND = 60

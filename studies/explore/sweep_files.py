@@ -23,7 +23,7 @@ from vanedamp.studies.explore.sweep_chart import (
     start_places,
     status_sentence,
 )
-from vanedamp.studies.report.charts import axis_title
+from vanedamp.studies.report.charts import GRAPH, axis_title
 from vanedamp.studies.report.forced_response import quantity
 from vanedamp.studies.report.results import collect, short_names
 
@@ -55,7 +55,7 @@ def panel(sweeps: Mapping[str, Sweep]) -> html.Div:
         html.Div(id="sweep-axes"),
         html.P(id="sweep-best", role="status"),
         html.Button("Show the best design", id="sweep-to-best", type="button"),
-        dcc.Graph(id="sweep-curve", config=point.GRAPH),
+        dcc.Graph(id="sweep-curve", config=GRAPH),
         html.P(id="sweep-status"),
         point.panel("sweep-"),
         dcc.Store(id="sweep-scene"),

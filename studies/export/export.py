@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import inspect
 import os
+from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 from vanedamp.files.extensions import ExtensionPoint
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record, Saved, read_record
 
 FORMATS = ExtensionPoint(
@@ -20,6 +21,8 @@ FORMATS = ExtensionPoint(
 )  # fmt: skip
 #: the kind of a writer that takes results of every kind
 ANY = "*"
+#: roles of options that name a file
+INPUT, OUTPUT = "input", "output"
 
 
 class Format(Protocol):
@@ -83,3 +86,24 @@ def _named(kind: str) -> str:
 
 def _flag(name: str) -> str:
     return name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class Option:
+    """A keyword argument of writers, and `--name` of the command.
+
+    metavar: words for its value in --help, of a list of values one for each; type: of each value; role: INPUT or OUTPUT
+    of one that names a file; endings: that an OUTPUT may have.
+    """
+
+    name: str
+    help: str
+    metavar: str | tuple[str, ...]
+    type: Callable[[str], Any] = str
+    role: str | None = None
+    endings: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int | None:
+        """Number of values in the command line; None: one that is no list."""
+        return len(self.metavar) if isinstance(self.metavar, tuple) else None

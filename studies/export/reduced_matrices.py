@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.export.options import OUTPUT, Option
+from vanedamp.studies.export.export import OUTPUT, Option
 from vanedamp.studies.export.record import Record
 
 DESCRIPTION = Option(
@@ -27,11 +27,32 @@ COORDINATES = Option(
     "coordinates", "of a reduced model's matrices: own, the first of which are the interface's (default), or natural "
     "modes, which lose nothing to the digits of a text", "own|natural",
 )  # fmt: skip
+#: of a format: writes matrices of a model by name to a file; returns the names in the file
+Writer = Callable[[Path, ReducedModel, Mapping[str, np.ndarray]], dict[str, str]]
 #: change of natural frequencies by the digits of a text that is reported
 _NOTABLE = 1e-9
 
 
-def model_in(record: Record, coordinates: str | None) -> ReducedModel:
+def write_model(
+    record: Record, path: Path, coordinates: str | None, description: str | None, write: Writer, *, text: bool = True,
+    damping: bool = True, base_load: bool = False,
+) -> tuple[str, ...]:  # fmt: skip
+    """Write the matrices of a reduced model, and their description. Returns warnings; raises InputError.
+
+    write: writes the matrices of a model to a file; returns their names there, as `vanedamp import` takes them. text:
+    whether its digits are few; damping, base_load: whether the format holds these.
+    """
+    model = _model_in(record, coordinates)
+    matrices = plain_matrices(model)
+    with replacing(path) as temporary:
+        names = write(temporary, model, matrices)
+    if description is not None:
+        describe(model, matrices, names, path, description)
+    lost = _lost_digits(model, path, names) if text else ()
+    return _left_out(model, damping, base_load) + lost
+
+
+def _model_in(record: Record, coordinates: str | None) -> ReducedModel:
     """Return the reduced model of a record in its own coordinates or natural ones. Raises InputError."""
     if coordinates not in (None, "own", "natural"):
         raise InputError(f"--coordinates: expected own or natural, not {coordinates!r}")
@@ -42,7 +63,7 @@ def model_in(record: Record, coordinates: str | None) -> ReducedModel:
     return model.projected(model.natural[1], fixed_interface_modes=0, free_modes=0, blocks=(), **exact)
 
 
-def lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tuple[str, ...]:
+def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tuple[str, ...]:
     """Return a warning where the digits of a text file change the natural frequencies of the model in it."""
     found = read_matrices(file)
     rows = dict(zip(model.interface, plain_matrices(model)["selection"], strict=True))
@@ -56,7 +77,7 @@ def lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tu
     )
 
 
-def left_out(model: ReducedModel, damping: bool = True, base_load: bool = False) -> tuple[str, ...]:
+def _left_out(model: ReducedModel, damping: bool, base_load: bool) -> tuple[str, ...]:
     """Return what files of mass, stiffness and, perhaps, damping and base load do not say of a model."""
     lacks = []
     if not damping and model.damping_ratio is None and np.any(model.damping):

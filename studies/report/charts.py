@@ -16,7 +16,15 @@ from vanedamp.files.store import csv_text
 COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
 DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
 FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
+#: how plotly shows a chart, with no button that would send data anywhere
+GRAPH: Any = {
+    "displaylogo": False, "responsive": True, "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]]
+}  # fmt: skip
 AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
+
+
+#: names of columns, and rows: the data of a chart
+Table = tuple[Sequence[str], Iterable[Iterable[Any]]]
 
 
 @dataclass(frozen=True)
@@ -43,10 +51,9 @@ def chart(
     name: str, figure: go.Figure, header: Sequence[str], rows: Iterable[Iterable[Any]], sources: Iterable[str]
 ) -> Chart:
     """Return a figure and its table, numbers in full."""
-    buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]  # no button that would send data anywhere
-    if any(trace.type == "mesh3d" for trace in figure.data):
-        buttons = [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]]
-    configuration = {"displaylogo": False, "responsive": True, "modeBarButtons": buttons}
+    in_space = any(trace.type == "mesh3d" for trace in figure.data)
+    buttons = {"modeBarButtons": [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]]}
+    configuration = GRAPH | buttons if in_space else GRAPH
     html: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=name, config=configuration)
     return Chart(name, html, csv_text(header, rows), tuple(dict.fromkeys(sources)))
 

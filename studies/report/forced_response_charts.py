@@ -1,10 +1,10 @@
-"""Interactive charts of forced responses (plotly), for pages that carry plotly themselves."""
+"""Forced responses as charts (plotly): names and looks of their curves, the curves, impact mistuning, losses, tilts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -13,12 +13,17 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
-from vanedamp.studies.report.response_curves import RELATIVE, trace
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
 _SHARED = "#475569"  # linear curves of several responses
 _PANELS, _PANEL_HEIGHT = 3, 260  # energy panels side by side; height of one, px
+#: measures of planar bodies: name, factor, and hover text of a value
+_IN_PLANE = (
+    ("tilt_max", 1e3, "%{y:.4g} mrad"), ("lift_share", 1.0, "%{y:.3f}"), ("linearisation", 100.0, "%{y:.2g} %"),
+)  # fmt: skip
 _TITLE_WIDTH = 110  # characters of titles side by side
+#: title of an axis of amplitudes over the reference of a response
+RELATIVE = "amplitude / maximum without bodies"
 
 
 def responses_figure(
@@ -89,17 +94,25 @@ def _add(
     figure.add_scatter(meta={"curves": list(owners)}, visible=visible, row=row, col=col, **trace)
 
 
+def _add_panels(
+    figure: go.Figure, response: ForcedResponse, shown: Collection[str] | None, name: str, look: Mapping[str, Any],
+    panels: Sequence[tuple[np.ndarray, str | None]],
+) -> None:  # fmt: skip
+    """Draw values (n,) of a response, with their hover texts, into panels above each other."""
+    for row, (values, hover) in enumerate(panels, start=1):
+        _add(
+            figure, [response.name], shown, row, 1, x=response.x, y=values, name=name, mode="lines+markers",
+            marker={"size": 4}, line={**look, "width": 1.6}, legendgroup=name, hovertemplate=hover,
+            showlegend=shown is None and row == 1,
+        )  # fmt: skip
+
+
 def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
     """Draw attached mass fraction and impacts per period; shown: as of `responses_figure`."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for response, colour in zip(responses, cycle(len(responses)), strict=True):
-        curves = (response.attached_mass_fraction, response.impacts_per_period)
-        for row, values in enumerate(curves, start=1):
-            _add(
-                figure, [response.name], shown, row, 1, x=response.x, y=values, name=response.name,
-                mode="lines+markers", marker={"size": 4}, line={"color": colour, "width": 1.6},
-                legendgroup=response.name, showlegend=shown is None and row == 1,
-            )  # fmt: skip
+        panels = ((response.attached_mass_fraction, None), (response.impacts_per_period, None))
+        _add_panels(figure, response, shown, response.name, {"color": colour}, panels)
     figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     figure.update_yaxes(title_text="attached mass fraction", row=1, col=1)
     figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
@@ -154,18 +167,12 @@ def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | N
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
     for response, colour in zip(responses, cycle(len(responses)), strict=True):
         for body, name in bodies_in_plane(response):
-            dash = DASHES[body % len(DASHES)]
-            panels = (
-                (1e3 * response.in_plane["tilt_max"], "%{y:.4g} mrad"), (response.in_plane["lift_share"], "%{y:.3f}"),
-                (100 * response.in_plane["linearisation"], "%{y:.2g} %"),
-            )  # fmt: skip
-            for row, (values, figures) in enumerate(panels, start=1):
-                _add(
-                    figure, [response.name], shown, row, 1, x=response.x, y=values[:, body], name=name,
-                    mode="lines+markers", marker={"size": 4}, line={"color": colour, "width": 1.6, "dash": dash},
-                    legendgroup=name, showlegend=shown is None and row == 1,
-                    hovertemplate=f"{name}: {figures}<extra></extra>",
-                )  # fmt: skip
+            panels = [
+                (factor * response.in_plane[key][:, body], f"{name}: {value}<extra></extra>")
+                for key, factor, value in _IN_PLANE
+            ]
+            look = {"color": colour, "dash": DASHES[body % len(DASHES)]}
+            _add_panels(figure, response, shown, name, look, panels)
     figure.update_yaxes(rangemode="tozero")
     for row, title in enumerate(("largest tilt, mrad", "time off the floor", "neglected, %"), start=1):
         figure.update_yaxes(title_text=title, row=row, col=1)
@@ -195,3 +202,32 @@ def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int)
             axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)
+
+
+class Look(NamedTuple):
+    """Name, dashes and width (px) of a curve."""
+
+    title: str
+    dash: str
+    width: float
+
+
+#: by the names of the curves in LinearCurves and ForcedResponse, in the order in which they are drawn
+LOOKS = {
+    "undamped": Look("without bodies", "dot", 1.8),
+    "fixed": Look("bodies fixed", "dash", 1.8),
+    "damped_max": Look("damped, maximum", "solid", 0.8),
+    "damped_mean": Look("damped, mean of peaks", "solid", 2.8),
+}
+
+
+def trace(curve: str, x: Any, values: np.ndarray, colour: str, **more: Any) -> dict[str, Any]:
+    """Return a curve as plotly takes a scatter's arguments: values (k,) over x (k,), infinite ones left out.
+
+    more: further arguments, or others in place of these.
+    """
+    look = LOOKS[curve]
+    return {
+        "x": x, "y": np.where(np.isfinite(values), values, np.nan), "name": look.title, "mode": "lines",
+        "line": {"dash": look.dash, "width": look.width, "color": colour},
+    } | more  # fmt: skip

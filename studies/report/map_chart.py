@@ -1,18 +1,20 @@
-"""Maps: values of a sweep along two of its axes, as colours, a panel for each combination of the others."""
+"""Maps over two axes of a sweep: relative amplitudes, basins of attraction and numbers of steady states."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.steady_states import is_start
+from vanedamp.coupling.sweep.steady_states import SteadyState, SteadyStates, is_start
 from vanedamp.studies.headline import reference_of
 from vanedamp.studies.report.charts import axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, setting
@@ -22,6 +24,10 @@ _FEWEST = 4  # values of the second axis that make a map
 MOST_PANELS = 24
 #: panels in two columns, of more there are three; heights of a panel and of the space between two, px
 _IN_TWO, _TALL, _LOW, _BETWEEN = 6, 440, 320, 120
+#: colours that the colour-blind tell apart (Okabe and Ito 2008)
+_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
+#: colour and name of runs that are not ok
+_NOT_OK, _NO_STATE = "#9ca3af", "not ok"
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -49,16 +55,11 @@ def map_figure(sweep: Sweep) -> go.Figure:
     return figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
 
 
-def map_rows(sweep: Sweep) -> Iterator[list[object]]:
-    """Yield panel, values of the two axes and the relative amplitude of every point."""
-    yield from panel_rows(map_panels(sweep))
-
-
 def map_panels(sweep: Sweep) -> list[Panel]:
     """Return the panels of a sweep's map."""
     tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
     relative = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
-    return list(panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep)))
+    return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep))
 
 
 #: name, values of the axes across and up, and those of the map (up, across)
@@ -97,13 +98,14 @@ def panel_rows(drawn: list[Panel]) -> Iterator[list[object]]:
 
 def panels(
     sweep: Sweep, axes: Mapping[str, np.ndarray], values: np.ndarray, two: tuple[str, str] | None
-) -> Iterator[Panel]:
-    """Yield values over some axes of a sweep, cut along two of them, for every combination of the others."""
+) -> list[Panel]:
+    """Return values over some axes of a sweep, cut along two of them, for every combination of the others."""
     assert two is not None
     paths, units = list(axes), sweep.units()
     across, up = (paths.index(path) for path in two)
     order = [np.argsort(axes[path], kind="stable") for path in two]
     others = [index for index in range(len(paths)) if index not in (across, up)]
+    found = []
     for combination in itertools.product(*(range(values.shape[index]) for index in others)):
         point: list[int | slice] = [slice(None)] * len(paths)
         for index, value in zip(others, combination, strict=True):
@@ -113,4 +115,92 @@ def panels(
         name = ", ".join(
             setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(others, combination, strict=True)
         )
-        yield name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut
+        found.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
+    return found
+
+
+def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
+    """Return the two starts over which a sweep shows basins, a place across and a rate up; None without two."""
+    starts = sorted(filter(is_start, long_axes(sweep)), key=lambda path: -len(sweep.axes[path]))[:2]
+    starts.sort(key=lambda path: path.endswith(("velocity", "rate")))
+    return (starts[0], starts[1]) if len(starts) == 2 else None
+
+
+def count_axes(sweep: Sweep) -> tuple[str, str] | None:
+    """Return the two keys over which a sweep counts steady states; None without, or where all runs begin alike."""
+    several = any(is_start(path) and len(values) > 1 for path, values in sweep.axes.items())
+    return map_axes(sweep) if several else None
+
+
+def basins_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
+    """Draw in which motion the run from each start ends, by colour; a panel a combination of other axes."""
+    motions = _motions(states)
+    shades = [_NOT_OK, *(_COLOURS[number % len(_COLOURS)] for number in range(len(motions) - 1))]
+    named = basin_panels(sweep, states)
+    drawn = [
+        (name, x, y, np.reshape([motions.index(motion) for motion in values.flat], values.shape))
+        for name, x, y, values in named
+    ]
+    figure = panels_figure(
+        sweep, drawn, basin_axes(sweep), zmin=-0.5, zmax=len(motions) - 0.5, showscale=False, colorscale=_steps(shades)
+    )
+    for trace, (_, _, _, values) in zip(figure.data, named, strict=False):
+        trace.update(customdata=values, hovertemplate="%{x:.6g}, %{y:.4g}: %{customdata}<extra></extra>")
+    for motion, shade in list(zip(motions, shades, strict=True))[0 if (states.label < 0).any() else 1 :]:
+        figure.add_scatter(
+            x=[None], y=[None], mode="markers", name=motion, marker={"color": shade, "size": 12, "symbol": "square"}
+        )
+    return figure.update_layout(legend={"orientation": "h", "y": 1.06, "yanchor": "bottom"}, margin_t=90)
+
+
+def basin_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
+    """Return the panels of basins: names of motions."""
+    names = np.full(sweep.shape, _NO_STATE, object)
+    order = [list(sweep.axes).index(path) for path in (*states.parameters, *states.starts)]
+    label, named = np.transpose(states.label, order), np.transpose(names, order)
+    for place, found in np.ndenumerate(states.states):
+        for number, name in enumerate(_names(found)):
+            named[place][label[place] == number] = name
+    return panels(sweep, sweep.axes, names, basin_axes(sweep))
+
+
+def _names(states: Sequence[SteadyState]) -> list[str]:
+    """Return the motions of states; a second one of a kind, of larger amplitude, has its number."""
+    motions = [state.motion for state in states]
+    earlier = [motions[:place].count(motion) for place, motion in enumerate(motions)]
+    return [f"{motion} ({count + 1})" if count else motion for motion, count in zip(motions, earlier, strict=True)]
+
+
+def _motions(states: SteadyStates) -> list[str]:
+    """Return the name of runs that are not ok, then those of all motions, that in which most runs end first."""
+    runs: Counter[str] = Counter()
+    for found in states.states.flat:
+        runs.update(dict(zip(_names(found), (state.runs for state in found), strict=True)))
+    return [_NO_STATE, *(name for name, _ in runs.most_common())]
+
+
+def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
+    """Draw how many steady states were found; a panel a combination of other axes."""
+    axes = {path: sweep.axes[path] for path in states.parameters}
+    least, most = min(int(states.count.min()), 1), max(int(states.count.max()), 1)
+    shades = [_NOT_OK, *sample_colorscale("Viridis", np.linspace(0.0, 1.0, max(most, 2))[:most].tolist())][least:]
+    return panels_figure(
+        sweep, panels(sweep, axes, states.count, count_axes(sweep)), count_axes(sweep),
+        zmin=least - 0.5, zmax=most + 0.5, colorscale=_steps(shades),
+        colorbar={"title": {"text": "steady<br>states"}, "tickvals": list(range(least, most + 1))},
+        hovertemplate="%{x:.6g}, %{y:.4g}: %{z} steady states<extra></extra>",
+    )  # fmt: skip
+
+
+def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:
+    """Yield values of the parameters, number of the state from 1, and the state's figures."""
+    axes = [sweep.axes[path].tolist() for path in states.parameters]
+    for place, found in np.ndenumerate(states.states):
+        at = [values[index] for values, index in zip(axes, place, strict=True)]
+        yield from ([*at, number, *state] for number, state in enumerate(found, start=1))
+
+
+def _steps(shades: Sequence[str]) -> list[list[object]]:
+    """Return a colour scale of steps as wide as each other."""
+    edges = np.repeat(np.linspace(0.0, 1.0, len(shades) + 1), 2)[1:-1]
+    return [[edge, shade] for edge, shade in zip(edges.tolist(), np.repeat(shades, 2).tolist(), strict=True)]

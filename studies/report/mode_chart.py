@@ -38,10 +38,7 @@ def surface(cells: np.ndarray) -> np.ndarray:
 
 def sharp_edges(points: np.ndarray, triangles: np.ndarray, angle_deg: float = 30.0) -> np.ndarray:
     """Return the nodes (edges, 2) of edges of a closed surface whose two triangles differ by more than an angle."""
-    normals = np.cross(
-        points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
-    )
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit_normals(points, triangles)
     edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -49,6 +46,25 @@ def sharp_edges(points: np.ndarray, triangles: np.ndarray, angle_deg: float = 30
     pairs = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     cosine = np.einsum("ij,ij->i", normals[owner[pairs]], normals[owner[pairs + 1]])
     return edges[pairs[cosine < np.cos(np.radians(angle_deg))]]
+
+
+def unit_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the outward normals (t, 3) of triangles (t, 3) between points (n, 3)."""
+    first, second, third = (points[triangles[:, corner]] for corner in range(3))
+    normals = np.cross(second - first, third - first)
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def screen_of(view: np.ndarray) -> np.ndarray:
+    """Return the directions (3, 2) to the right and up of a screen across a view (3,), of unit length."""
+    right = np.array([-view[1], view[0], 0.0]) / np.hypot(view[0], view[1])
+    return np.column_stack([right, np.cross(view, right)])
+
+
+def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points (n, 3) moved by a shape, and their displacements (n,) over the largest."""
+    magnitude, size = np.linalg.norm(shape, axis=1), float(np.linalg.norm(np.ptp(points, axis=0)))
+    return points + shape * (_EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
 
 
 class Surface(NamedTuple):
@@ -84,8 +100,7 @@ def viewpoint(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
 
 def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
     """Return how much motion across a view is to be seen: squares over the nearest points of a coarse screen."""
-    right = np.array([-view[1], view[0], 0.0]) / np.hypot(view[0], view[1])
-    across = np.column_stack([right, np.cross(view, right)])
+    across = screen_of(view)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     cell = np.floor(points @ across * (_SCREEN / size)).astype(int)
     order = np.argsort(-(points @ view), kind="stable")
@@ -99,10 +114,9 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
     points = values["coordinates"][nodes]
     chosen = range(min(len(values["frequency"]), max(_MOST_MODES, mode + 1)))
     shapes = [values["shape"][index].reshape(-1, 3)[nodes] for index in chosen]
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
     figure = go.Figure([_at_rest(points, triangles)])
     for index, shape in zip(chosen, shapes, strict=True):
-        figure.add_trace(_deformed(points, triangles, shape, size, visible=index == mode))
+        figure.add_trace(_mesh(points, triangles, shape, visible=index == mode))
     names = [f"mode {index + 1}: {values['frequency'][index]:.2f} Hz" for index in chosen]
     menu = [
         {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
@@ -137,13 +151,12 @@ def _at_rest(points: np.ndarray, triangles: np.ndarray) -> go.Scatter3d:
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=look, name="edges at rest", showlegend=True, hoverinfo="skip")
 
 
-def _deformed(points: np.ndarray, triangles: np.ndarray, shape: np.ndarray, size: float, visible: bool) -> go.Mesh3d:
-    magnitude = np.linalg.norm(shape, axis=1)
-    moved = (points + shape * (_EXAGGERATION * size / magnitude.max())).astype(np.float32)
-    (x, y, z), (i, j, k) = moved.T, triangles.astype(np.int32).T
+def _mesh(points: np.ndarray, triangles: np.ndarray, shape: np.ndarray, visible: bool) -> go.Mesh3d:
+    moved, magnitude = deformed(points, shape)
+    (x, y, z), (i, j, k) = moved.astype(np.float32).T, triangles.astype(np.int32).T
     bar: dict[str, Any] = {"title": {"text": "displacement /<br>largest displacement"}, "len": 0.7, "thickness": 16}
     return go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, intensity=(magnitude / magnitude.max()).astype(np.float32), cmin=0, cmax=1,
+        x=x, y=y, z=z, i=i, j=j, k=k, intensity=magnitude.astype(np.float32), cmin=0, cmax=1,
         colorscale="Viridis", colorbar=bar, flatshading=False, visible=visible,
         hovertemplate="%{intensity:.3f}<extra></extra>", lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
         name="mode",

@@ -1,18 +1,22 @@
-"""Orbits as time histories and in the phase planes of the structure and of the bodies."""
+"""Orbits as time histories and in phase planes, and the phase planes of a run with its starts of periods."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.coupling.orbits.history import OrbitHistory
-from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
+from vanedamp.coupling.orbits.history import OrbitHistory, late_history
+from vanedamp.coupling.response.response import Response
+from vanedamp.studies.report.charts import COLOURS, DASHES, Table, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
+#: periods that are drawn, and starts of periods
+_PERIODS, _MOST_STARTS = 25, 2000
 
 
 def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
@@ -37,12 +41,16 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
 
 def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> None:
     """Draw the phase plane of the structure into a column of a row, and that of the bodies into the next."""
-    _add_plane(figure, "structure", _STRUCTURE, history.displacement, history.velocity, row, col)
+    states = (history.displacement, history.velocity, history.slip, history.slip_velocity)
+    for column, curve in _curves(states):
+        figure.add_scatter(
+            x=1e6 * curve.values, y=1e3 * curve.rate, name=curve.name, legendgroup=curve.name, mode="lines",
+            line={"color": curve.colour, "width": 1.4, "dash": curve.dash}, showlegend=False,
+            hovertemplate="%{x:.5g} µm, %{y:.5g} mm/s", row=row, col=col + column,
+        )  # fmt: skip
     planes = [("structure", history.displacement)]
-    for body in range(history.slip.shape[1]):
-        rate = history.slip_velocity[:, body]
-        _add_plane(figure, _named(body), _colour(body), history.slip[:, body], rate, row, col + 1, _dash(body))
-        planes = [planes[0], ("in the cavity", history.slip)]
+    if history.slip.shape[1]:
+        planes.append(("in the cavity", history.slip))
     for place, (what, values) in enumerate(planes, start=col):
         reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
         figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=place)
@@ -54,28 +62,21 @@ def add_starts(figure: go.Figure, states: Sequence[np.ndarray], name: str, row: 
 
     states: displacement and velocity (n,) of the structure, slip and its velocity (n, bodies); size: of a mark, pixels.
     """
-    displacement, velocity, slip, rate = states
-    figure.add_scatter(
-        x=1e6 * displacement, y=1e3 * velocity, name=name, mode="markers", marker={"color": _STRUCTURE, "size": size},
-        showlegend=row == 1, legendgroup="start", hoverinfo="skip", row=row, col=col,
-    )  # fmt: skip
-    for body in range(slip.shape[1]):
+    for column, curve in _curves(states):
+        legend: dict[str, Any] = {"legendgroup": curve.name, "showlegend": False}
+        if column == 0:
+            legend = {"name": name, "legendgroup": "start", "showlegend": row == 1}
         figure.add_scatter(
-            x=1e6 * slip[:, body], y=1e3 * rate[:, body], mode="markers",
-            marker={"color": _colour(body), "size": size}, showlegend=False, legendgroup=_named(body), hoverinfo="skip",
-            row=row, col=col + 1,
+            x=1e6 * curve.values, y=1e3 * curve.rate, mode="markers", marker={"color": curve.colour, "size": size},
+            hoverinfo="skip", row=row, col=col + column, **legend,
         )  # fmt: skip
 
 
 def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
-    curves = [("structure", _STRUCTURE, "solid", history.displacement)]
-    curves += [
-        (_named(body), _colour(body), _dash(body), history.slip[:, body]) for body in range(history.slip.shape[1])
-    ]
-    for name, colour, dash, values in curves:
+    for _, curve in _curves((history.displacement, history.velocity, history.slip, history.slip_velocity)):
         figure.add_scatter(
-            x=1e3 * history.time, y=1e6 * values, name=name, legendgroup=name, mode="lines",
-            line={"color": colour, "width": 1.5, "dash": dash}, showlegend=row == 1,
+            x=1e3 * history.time, y=1e6 * curve.values, name=curve.name, legendgroup=curve.name, mode="lines",
+            line={"color": curve.colour, "width": 1.5, "dash": curve.dash}, showlegend=row == 1,
             hovertemplate="%{x:.6g} ms: %{y:.5g} µm", row=row, col=1,
         )  # fmt: skip
     at = np.interp(history.impact_time, history.time, history.displacement)
@@ -86,38 +87,52 @@ def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
     )  # fmt: skip
 
 
-def _add_plane(
-    figure: go.Figure, name: str, colour: str, place: np.ndarray, rate: np.ndarray, row: int, col: int,
-    dash: str = "solid",
-) -> None:  # fmt: skip
-    figure.add_scatter(
-        x=1e6 * place, y=1e3 * rate, name=name, legendgroup=name, mode="lines",
-        line={"color": colour, "width": 1.4, "dash": dash}, showlegend=False,
-        hovertemplate="%{x:.5g} µm, %{y:.5g} mm/s", row=row, col=col,
-    )  # fmt: skip
+class _Curve(NamedTuple):
+    """Name and look of a curve, its values (n,), m, and their rates (n,), m/s."""
+
+    name: str
+    colour: str
+    dash: str
+    values: np.ndarray
+    rate: np.ndarray
 
 
-def _named(body: int) -> str:
-    return f"body {body + 1} in its cavity"
+def _curves(states: Sequence[np.ndarray]) -> Iterator[tuple[int, _Curve]]:
+    """Yield the plane, 0 or 1, and the curve of the structure and of each body; states: as of `add_starts`."""
+    displacement, velocity, slip, slip_velocity = states
+    yield 0, _Curve("structure", _STRUCTURE, "solid", displacement, velocity)
+    for body, (values, rate) in enumerate(zip(slip.T, slip_velocity.T, strict=True)):
+        colour, dash = COLOURS[body % len(COLOURS)], DASHES[body % len(DASHES)]
+        yield 1, _Curve(f"body {body + 1} in its cavity", colour, dash, values, rate)
 
 
-def _colour(body: int) -> str:
-    return COLOURS[body % len(COLOURS)]
-
-
-def _dash(body: int) -> str:
-    return DASHES[body % len(DASHES)]
-
-
-def orbits_header(histories: Mapping[str, OrbitHistory]) -> list[str]:
-    """Return the names of the columns of `orbits_rows`."""
+def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:
+    """Return a row per sample."""
     bodies = max(history.slip.shape[1] for history in histories.values())
     kinds = [f"{kind}_{body + 1}" for kind in ("slip", "slip_velocity") for body in range(bodies)]
-    return ["orbit", "time", "displacement", "velocity", *kinds]
-
-
-def orbits_rows(histories: Mapping[str, OrbitHistory]) -> Iterator[list[object]]:
-    """Yield a line a sample."""
+    rows: list[list[object]] = []
     for name, history in histories.items():
         columns = (history.time, history.displacement, history.velocity, history.slip, history.slip_velocity)
-        yield from ([name, *values] for values in np.column_stack(columns).tolist())
+        rows += ([name, *values] for values in np.column_stack(columns).tolist())
+    return ["orbit", "time", "displacement", "velocity", *kinds], rows
+
+
+def phase_figure(response: Response) -> go.Figure:
+    """Draw the phase planes of structure and bodies, with a point at the start of each of the evaluated periods.
+
+    A motion that repeats after k periods has k points, one that never does fills an area. response: with samples and
+    events.
+    """
+    history = late_history(response, _PERIODS)
+    bodies = response.slip.shape[1]
+    columns = 1 + bool(bodies)
+    figure = make_subplots(rows=1, cols=columns, horizontal_spacing=0.12)
+    add_planes(figure, history, row=1, col=1)
+    figure.update_traces(showlegend=True, opacity=0.55)
+    late = slice(max(response.transient, len(response.section) - _MOST_STARTS), None)
+    states = (response.section[late, 0], response.section[late, 1], response.slip[late], response.slip_velocity[late])
+    add_starts(figure, states, "starts of periods", row=1, col=1, size=5)
+    for col, values in enumerate(((history.displacement, states[0]), (history.slip, states[2]))[:columns], start=1):
+        reach = 1.06e6 * max(1e-12, *(np.abs(each).max(initial=0.0) for each in values))
+        figure.update_xaxes(range=[-reach, reach], row=1, col=col)
+    return dressed(figure, height=430).update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})

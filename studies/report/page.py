@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -15,7 +16,6 @@ import plotly.offline
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
-from vanedamp.studies.report.body_advice import body_note_of_run
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.motion_page import environment
@@ -24,6 +24,10 @@ from vanedamp.studies.report.results import Results, Section, sections
 _FOLDER = Path(__file__).parent
 #: scenes that a table can have side by side; more stand below each other
 _MOST_COLUMNS = 4
+_SLIDERS = (
+    'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
+    "length and height tells whether that is enough."
+)
 
 
 @dataclass(frozen=True)
@@ -147,3 +151,17 @@ def _flat(data: Any, path: str = "") -> dict[str, str]:
 def format_setting(value: Any) -> str:
     """Return a value as text, floats in eight digits."""
     return f"{value:.8g}" if isinstance(value, float) else str(value)
+
+
+def body_note(notes: Mapping[str, Any], sliders: bool) -> str | None:
+    """Return a sentence on the bodies. notes: with the advice, as data or as text; sliders: whether bodies are such."""
+    advice = notes.get("advice")
+    if advice is None:
+        return _SLIDERS if sliders else None
+    sentence: str = (json.loads(advice) if isinstance(advice, str) else advice)["sentence"]
+    return f"Bodies run as {sentence}."
+
+
+def body_note_of_run(measures: Mapping[str, Any]) -> str | None:
+    """Return the sentence on the bodies of a run with these figures."""
+    return body_note(measures, "attached_mass_fraction" in measures and "tilt_max" not in measures)

@@ -15,15 +15,13 @@ from matplotlib.colors import Normalize
 
 from vanedamp.files.store import load, replacing
 from vanedamp.studies.figures import GREY, draw_grid, save, subplots
-from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
-from vanedamp.studies.report.response_curves import RELATIVE
+from vanedamp.studies.report.forced_response_charts import RELATIVE
+from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges, surface, unit_normals, viewpoint
 
 if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes
     from vanedamp.studies.report.forced_response import ForcedResponse
 
-#: largest displacement in a picture, as a share of the structure's size
-_EXAGGERATION = 0.06
 #: names of VTK's cells: linear ones, and those of any order, as dolfinx has them
 _CELLS = {10: "tetra", 12: "hexahedron", 71: "VTK_LAGRANGE_TETRAHEDRON", 72: "VTK_LAGRANGE_HEXAHEDRON"}
 #: part of the light that comes from all sides
@@ -41,18 +39,14 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     except KeyError:
         return None
     points, shape = values["coordinates"], values["shape"][mode].reshape(-1, 3)
-    magnitude = np.linalg.norm(shape, axis=1)
-    size, away = float(np.linalg.norm(np.ptp(points, axis=0))), viewpoint(points, shape)
-    across = np.array([-away[1], away[0], 0.0]) / np.hypot(away[0], away[1])
-    screen = np.column_stack([across, np.cross(away, across)])
-    moved = points + shape * (_EXAGGERATION * size / magnitude.max())
-    triangles = moved[corners]
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    facing = normals @ away / np.linalg.norm(normals, axis=1)
+    away = viewpoint(points, shape)
+    screen = screen_of(away)
+    moved, magnitude = deformed(points, shape)
+    triangles, facing = moved[corners], unit_normals(moved, corners) @ away
     # painted from the far to the near; what looks away is hidden by what does not
     order = np.argsort(triangles.mean(axis=1) @ away, kind="stable")
     seen = order[facing[order] > 0.0]
-    colours = colormaps["viridis"]((magnitude / magnitude.max())[corners[seen]].mean(axis=1))
+    colours = colormaps["viridis"](magnitude[corners[seen]].mean(axis=1))
     colours[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing[seen])[:, None]
     figure, axes = subplots(size=(12.5, 7.5))
     edges = points[sharp_edges(points, corners)] @ screen

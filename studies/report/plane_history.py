@@ -1,4 +1,4 @@
-"""Bodies in the plane as a run's file has them: their samples, and their impacts by body, surface and corner."""
+"""Samples of bodies for a drawing in the plane: of a file, or of sliders; impacts by body, surface and corner."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble
 
 #: sides of events as a chart names them, and the corners of each in the order against the clock
 _SURFACES = {
@@ -20,6 +21,8 @@ _SURFACES = {
     "body": ("next body", {-1: ""}),
     "stop": ("stop", {-1: ""}),
 }
+#: share of its free travel within which a body touches
+_TOUCHES = 1e-9
 
 
 @dataclass(frozen=True)
@@ -89,12 +92,13 @@ def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
     return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
 
 
-def hits_in_plane(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:
-    """Return time (s) and place, as of an event, of all impacts of bodies in the plane."""
-    if "event_corner" not in values:
+def hits_in(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:
+    """Return time (s) and place, as of an event, of all impacts; sliders have no corner (-1)."""
+    if "event_kind" not in values:
         return []
-    names = ("event_kind", "event_time", "event_damper", "event_side", "event_corner")
-    entries = zip(*(np.asarray(values[name]).tolist() for name in names), strict=True)
+    columns = [values[f"event_{name}"] for name in ("kind", "time", "damper", "side")]
+    columns.append(values.get("event_corner", np.full(len(columns[0]), -1)))
+    entries = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
     return [(time, (body, side, corner)) for kind, time, body, side, corner in entries if kind == "impact"]
 
 
@@ -109,3 +113,39 @@ def samples_in_plane(values: Mapping[str, Any]) -> PlanarSamples | None:
         strict=True,
     )  # fmt: skip
     return PlanarSamples(**arrays, contacts=tuple(places))
+
+
+def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) -> PlanarSamples:
+    """Return the samples of sliders between walls that keep their places on the floor.
+
+    scene: without open choices; displacement: (n,) m at excitation.at; along: (n, b) m in the cavities. A floor that
+    is another point of a reduced model moves as in the mode nearest to the excitation.
+    """
+    unknown = np.full(along.shape, np.nan)
+    gaps, closed, contacts = [], [], []
+    for cavity in scene.cavity:
+        row = [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+        if not row:
+            continue
+        places = np.column_stack(
+            [np.full(len(along), -cavity.gap / 2), along[:, row], np.full(len(along), cavity.gap / 2)]
+        )
+        sides = [(row[0], "left", -1), *((k, "body", -1) for k in row[:-1]), (row[-1], "right", -1)]
+        gaps.append(np.diff(places, axis=1))
+        closed.append(gaps[-1] <= _TOUCHES * cavity.gap)
+        contacts += sides
+    return PlanarSamples(
+        body_lift=unknown, body_tilt=unknown, floor_along=np.multiply.outer(displacement, _floor_shares(scene)),
+        floor_across=unknown, floor_rotation=np.zeros(along.shape), contact_gap=np.hstack(gaps),
+        contact_closed=np.hstack(closed), contacts=tuple(contacts),
+    )  # fmt: skip
+
+
+def _floor_shares(scene: Scene) -> np.ndarray:
+    """Return by how much the floor under each body (b,) moves when the response moves by one."""
+    system = assemble(scene)
+    if not system.modes:  # the base moves, and all on it
+        return np.ones(system.bodies)
+    nearest = int(np.argmin(np.abs(np.sqrt(system.of_structure.stiffness) - system.omega)))
+    at = system.of_structure.response[nearest]
+    return np.asarray(system.floor[:, nearest]) / at if at else np.zeros(system.bodies)

@@ -19,15 +19,15 @@ from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
-from vanedamp.studies.report.branch_charts import branches_figure
-from vanedamp.studies.report.calibration_charts import frequencies_figure, response_figure
-from vanedamp.studies.report.campbell_chart import campbell_figure
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
-from vanedamp.studies.report.ramp_charts import ramp_figure
 from vanedamp.studies.report.results import Result, Results, collect
-from vanedamp.studies.report.ring_down_chart import ring_down_figure
+from vanedamp.studies.report.sections.calibration import frequencies_figure, response_figure
+from vanedamp.studies.report.sections.campbell import campbell_figure
+from vanedamp.studies.report.sections.orbits import branches_figure
+from vanedamp.studies.report.sections.ramp import ramp_figure
+from vanedamp.studies.report.sections.ring_down import ring_down_figure
 from vanedamp.studies.report.time_history import History, history_figure
 
 #: curves of a sweep that one figure can show, of more the best

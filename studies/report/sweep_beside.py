@@ -13,6 +13,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.report.results import Result
 
 #: tables that say how a scene is run and what of it is kept, and nothing about its steady states
 _ABOUT_RUNS = ("time", "initial", "continuation", "sweep", "orbit", "ramp", "ring_down")
@@ -40,6 +41,14 @@ def points_beside(
     shown &= sweep.status == "ok"
     along = np.meshgrid(*sweep.axes.values(), indexing="ij")[paths.index(parameter)]
     return along[shown], getattr(sweep, measure)[shown]
+
+
+def sweeps_beside(
+    scene: Scene, parameter: str, sweeps: Mapping[str, Result], measure: str = "amplitude_mean"
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return the points of `points_beside` by the files of the sweeps that have any."""
+    found = {file: points_beside(scene, parameter, result.record, measure) for file, result in sweeps.items()}
+    return {file: points for file, points in found.items() if len(points[0])}
 
 
 def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:

@@ -19,7 +19,7 @@ from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 from vanedamp.studies.report.motion import Motion, motion_of
-from vanedamp.studies.report.plane_history import ImpactsAtPlace, hits_in_plane, impacts_by_place, samples_in_plane
+from vanedamp.studies.report.plane_history import ImpactsAtPlace, hits_in, impacts_by_place, samples_in_plane
 
 _MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
@@ -31,10 +31,9 @@ class History:
 
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
     bodies        (n, dampers) m, relative to their cavities
-    impacts       (m,) s; struck: (m,) number of the body of each, -1: the structure's on a stop
     plane         samples of bodies in the plane; None for sliders and for files without them
-    hits          time (s) and place, as of an event, of the impacts of bodies in the plane
-    by_place      those of the evaluated periods by contact
+    hits          time (s) and place, as of an event, of the impacts
+    by_place      those of bodies in the plane in the evaluated periods, by contact
     measures      plain figures and energies of the run, as `vanedamp run --json` has them
     scene         what was run; None if the file does not say
     """
@@ -42,8 +41,6 @@ class History:
     time: np.ndarray
     displacement: np.ndarray
     bodies: np.ndarray
-    impacts: np.ndarray
-    struck: np.ndarray
     plane: PlanarSamples | None
     hits: list[tuple[float, tuple[int, str, int]]]
     by_place: list[ImpactsAtPlace]
@@ -57,9 +54,6 @@ class History:
         """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, "response")
         provenance = json.loads(attributes.pop("provenance", "{}"))
-        kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
-        on_body = [meets_body(str(side)) for side in np.atleast_1d(values.get("event_side", ""))]
-        struck = np.where(on_body, values.get("event_damper", -1), -1)
         energy = json.loads(attributes.pop("energy", "{}"))
         begin = attributes.get("transient", 0) / attributes["frequency"]
         scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
@@ -67,10 +61,8 @@ class History:
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
             bodies=frozen(values.get("body_displacement", np.zeros((0, 0)))),
-            impacts=frozen(np.asarray(values.get("event_time", []))[kinds]),
-            struck=frozen(np.atleast_1d(struck)[kinds] if len(kinds) else [], int),
             plane=samples_in_plane(values),
-            hits=hits_in_plane(values),
+            hits=hits_in(values),
             by_place=impacts_by_place(values, begin, scene),
             measures=attributes | {"energy": energy},
             provenance=provenance,
@@ -80,13 +72,11 @@ class History:
     @classmethod
     def of(cls, response: Response, scene: Scene | None = None) -> History:
         """Return the history of a run that kept samples and events."""
-        impacts = [event for event in response.event_list if event.kind == "impact"]
+        impacts = (event for event in response.event_list if event.kind == "impact")
         return cls(
             time=frozen(response.time),
             displacement=frozen(response.displacement),
             bodies=frozen(response.body_displacement),
-            impacts=frozen([event.time for event in impacts]),
-            struck=frozen([event.damper if meets_body(event.side) else -1 for event in impacts], int),
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
             by_place=[],
@@ -100,14 +90,24 @@ class History:
         """s"""
         return 1.0 / float(self.measures["frequency"])
 
+    @property
+    def impacts(self) -> np.ndarray:
+        """Times of the impacts (m,), s."""
+        return np.array([time for time, _ in self.hits], float)
+
+    @property
+    def struck(self) -> np.ndarray:
+        """Number of the body of each impact (m,), -1: the structure's on a stop."""
+        return np.array([body if meets_body(side) else -1 for _, (body, side, _) in self.hits], int)
+
     def late(self) -> History:
         """Return the last periods only, as many as a page carries."""
         begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
-        kept, hit = self.time >= begin, self.impacts >= begin
+        kept = self.time >= begin
         plane = None if self.plane is None else self.plane.cut(kept)
         return replace(
             self, time=self.time[kept], displacement=self.displacement[kept], bodies=self.bodies[kept],
-            impacts=self.impacts[hit], struck=self.struck[hit], plane=plane,
+            plane=plane, hits=[hit for hit in self.hits if hit[0] >= begin],
         )  # fmt: skip
 
     def header(self) -> list[str]:
@@ -137,39 +137,37 @@ def history_figure(history: History) -> go.Figure:
         x=milliseconds, y=1e6 * history.displacement, name="structure", line={"color": "#0f172a", "width": 1.4},
         hovertemplate="%{y:.4g} µm", row=1, col=1,
     )  # fmt: skip
-    at = np.interp(history.impacts, history.time, history.displacement)
-    on_stops = history.struck < 0
-    if on_stops.any():
+    impacts, struck = history.impacts, history.struck
+    at = np.interp(impacts, history.time, history.displacement)
+
+    def add_impacts(mine: np.ndarray, name: str, colour: str) -> None:
         figure.add_scatter(
-            x=1e3 * history.impacts[on_stops], y=1e6 * at[on_stops], name="impacts on stops", mode="markers",
-            marker={"color": "#7f1d1d", "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
+            x=1e3 * impacts[mine], y=1e6 * at[mine], name=name, mode="markers",
+            marker={"color": colour, "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
         )  # fmt: skip
+
+    if (struck < 0).any():
+        add_impacts(struck < 0, "impacts on stops", "#7f1d1d")
     for stop in _stops(history.scene):
         figure.add_hline(y=1e6 * stop, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     for body in range(history.bodies.shape[1]):
-        colour, dash = COLOURS[body % len(COLOURS)], DASHES[body % len(DASHES)]
-        mine = history.struck == body
-        figure.add_scatter(
-            x=1e3 * history.impacts[mine], y=1e6 * at[mine], name=f"impacts of body {body + 1}", mode="markers",
-            marker={"color": colour, "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
-        )  # fmt: skip
+        colour = COLOURS[body % len(COLOURS)]
+        line = {"color": colour, "width": 1.2, "dash": DASHES[body % len(DASHES)]}
+        add_impacts(struck == body, f"impacts of body {body + 1}", colour)
         figure.add_scatter(
             x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
-            line={"color": colour, "width": 1.2, "dash": dash}, hovertemplate="%{y:.4g} µm", row=2, col=1,
+            line=line, hovertemplate="%{y:.4g} µm", row=2, col=1,
         )  # fmt: skip
         for row, (_, values, unit) in enumerate(panels, start=3):
             if np.isfinite(values[:, body]).any():
                 figure.add_scatter(
-                    x=milliseconds, y=values[:, body], showlegend=False,
-                    line={"color": colour, "width": 1.2, "dash": dash},
+                    x=milliseconds, y=values[:, body], showlegend=False, line=line,
                     hovertemplate=f"body {body + 1}: %{{y:.4g}} {unit}<extra></extra>", row=row, col=1,
                 )  # fmt: skip
     for wall in _walls(history.scene) if rows > 1 else ():
         figure.add_hline(y=1e6 * wall, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=2, col=1)
-    figure.update_yaxes(title_text="displacement, µm", row=1, col=1)
-    if rows > 1:
-        figure.update_yaxes(title_text="relative to the cavity, µm", row=2, col=1)
-    for row, (title, _, _) in enumerate(panels, start=3):
+    titles = ["displacement, µm", "relative to the cavity, µm", *(title for title, _, _ in panels)]
+    for row, title in enumerate(titles[:rows], start=1):
         figure.update_yaxes(title_text=title, row=row, col=1)
     end = milliseconds[-1]
     begin = max(end - 1e3 * _SHOWN_PERIODS * history.period, milliseconds[0])

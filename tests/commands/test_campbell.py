@@ -10,8 +10,8 @@ from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.report.campbell_chart import campbell_figure, campbell_header, campbell_rows
 from vanedamp.studies.report.campbell_picture import campbell_picture
+from vanedamp.studies.report.sections.campbell import campbell_figure, campbell_table
 
 #: the block 0.1 m out from an axis across it, halfway between its sides
 ROTATION = """
@@ -118,8 +118,8 @@ def test_chart_has_every_mode_and_mark(diagram):
     (marks,) = [trace for trace in figure.data if trace.name == "crossings"]
     assert list(marks.x) == pytest.approx([crossing.rpm for crossing in diagram.crossings])
     assert [note.text for note in figure.layout.annotations] == ["EO 2", "EO 4", "EO 8"]
-    rows = list(campbell_rows(diagram))
-    assert len(rows) == len(diagram.speeds) and len(rows[0]) == len(campbell_header(diagram))
+    header, rows = campbell_table(diagram)
+    assert len(rows) == len(diagram.speeds) and len(rows[0]) == len(header)
 
 
 def test_picture_has_the_modes(folder, tmp_path, pictures):

@@ -7,7 +7,7 @@ A format is a module with
     WRITERS   by the kind of a result (the attribute `kind` of its file; ANY: every kind) a function
               write(record, path, **options) that writes a file, from a studies.export.record.Record, by
               files.store.replacing. It may return warnings: what the file does not hold
-    OPTIONS   the keyword arguments of its writers, as studies.export.options.Option
+    OPTIONS   the keyword arguments of its writers, as studies.export.export.Option
 
 Import what is heavy inside the writers: `vanedamp export --help` loads all formats.
 """

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from vanedamp.files.formats.matrices.abaqus import write_substructure
-from vanedamp.files.store import replacing
-from vanedamp.rom.external import plain_matrices
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.record import Record
-from vanedamp.studies.export.reduced_matrices import (
-    COORDINATES,
-    DESCRIPTION,
-    describe,
-    left_out,
-    lost_digits,
-    model_in,
-)
+from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, write_model
 
 SUMMARY = "a reduced model as a substructure (*USER ELEMENT, *MATRIX): Abaqus"
 ENDINGS = (".mtx",)
@@ -26,15 +21,14 @@ def write(
     record: Record, path: Path, description: str | None = None, coordinates: str | None = None
 ) -> tuple[str, ...]:
     """Write stiffness and mass; description: the file by which `vanedamp import` reads them back."""
-    model = model_in(record, coordinates)
-    matrices = plain_matrices(model)
-    with replacing(path) as temporary, temporary.open("w", encoding="ascii", newline="\n") as stream:
-        title = f"reduced model, interface {', '.join(model.interface)}".encode("ascii", "replace").decode()[:76]
+    return write_model(record, path, coordinates, description, _write, damping=False)
+
+
+def _write(path: Path, model: ReducedModel, matrices: Mapping[str, np.ndarray]) -> dict[str, str]:
+    title = f"reduced model, interface {', '.join(model.interface)}".encode("ascii", "replace").decode()[:76]
+    with path.open("w", encoding="ascii", newline="\n") as stream:
         write_substructure(stream, title, {name: matrices[name] for name in ("stiffness", "mass")})
-    names = {"mass": "mass", "stiffness": "stiffness"}
-    if description is not None:
-        describe(model, matrices, names, path, description)
-    return left_out(model, damping=False) + lost_digits(model, path, names)
+    return {"mass": "mass", "stiffness": "stiffness"}
 
 
 WRITERS = {"reduced-model": write}

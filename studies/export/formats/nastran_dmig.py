@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.store import replacing
-from vanedamp.rom.external import plain_matrices
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.record import Record
-from vanedamp.studies.export.reduced_matrices import (
-    COORDINATES,
-    DESCRIPTION,
-    describe,
-    left_out,
-    lost_digits,
-    model_in,
-)
+from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, write_model
 
 SUMMARY = "a reduced model's matrices MAA, KAA, BAA as DMIG entries over scalar points: Nastran"
 ENDINGS = (".pch", ".dmig")
@@ -28,25 +21,22 @@ def write(
     record: Record, path: Path, description: str | None = None, coordinates: str | None = None
 ) -> tuple[str, ...]:
     """Write mass, stiffness and damping over the scalar points 1 to n; description: as for OP4."""
+    return write_model(record, path, coordinates, description, _write)
+
+
+def _write(path: Path, model: ReducedModel, matrices: Mapping[str, np.ndarray]) -> dict[str, str]:
     from pandas import DataFrame, MultiIndex
     from pyyeti.nastran import wtdmig, wtspoints
 
-    model = model_in(record, coordinates)
-    matrices = plain_matrices(model)
     size = len(matrices["mass"])
     points = MultiIndex.from_product([range(1, size + 1), [0]], names=["id", "dof"])
-    held = {name: np.any(matrices[key]) for key, name in _NAMES.items()}
-    frames = {
-        name: DataFrame(matrices[key], index=points, columns=points) for key, name in _NAMES.items() if held[name]
-    }
-    with replacing(path) as temporary, temporary.open("w", encoding="ascii", newline="\n") as stream:
+    held = {key: name for key, name in _NAMES.items() if np.any(matrices[key])}
+    frames = {name: DataFrame(matrices[key], index=points, columns=points) for key, name in held.items()}
+    with path.open("w", encoding="ascii", newline="\n") as stream:
         stream.write("$ reduced model of vanedamp\n")
         wtspoints(stream, np.arange(1, size + 1))
         wtdmig(stream, frames)
-    names = {key: name.lower() for key, name in _NAMES.items() if held[name]}
-    if description is not None:
-        describe(model, matrices, names, path, description)
-    return left_out(model) + lost_digits(model, path, names)
+    return {key: name.lower() for key, name in held.items()}
 
 
 WRITERS = {"reduced-model": write}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from vanedamp.files.store import replacing
-from vanedamp.rom.external import plain_matrices
+import numpy as np
+
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.record import Record
-from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, describe, left_out, model_in
+from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, write_model
 
 SUMMARY = "a reduced model's matrices MAA, KAA, BAA, SELECT, BASE in binary: Nastran, pyyeti"
 ENDINGS = (".op4",)
@@ -23,21 +25,19 @@ def write(
 
     description: the file by which `vanedamp import` reads them back.
     """
+    return write_model(record, path, coordinates, description, _write, text=False, base_load=True)
+
+
+def _write(path: Path, model: ReducedModel, matrices: Mapping[str, np.ndarray]) -> dict[str, str]:
     from pyyeti.nastran import op4
 
-    model = model_in(record, coordinates)
-    matrices = plain_matrices(model)
     square, rectangular = 6, 2  # forms: symmetric, and any other
     entries = {
         name: (matrices[key], square if key in ("mass", "stiffness", "damping") else rectangular)
         for key, name in _NAMES.items()
     }
-    with replacing(path) as temporary:
-        op4.write(str(temporary), entries, sparse="dense")
-    if description is not None:
-        names = {key: _NAMES[key].lower() for key in ("mass", "stiffness", "damping", "base_load")}
-        describe(model, matrices, names, path, description)
-    return left_out(model, base_load=True)
+    op4.write(str(path), entries, sparse="dense")
+    return {key: name.lower() for key, name in _NAMES.items() if key != "selection"}
 
 
 WRITERS = {"reduced-model": write}

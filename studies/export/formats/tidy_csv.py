@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.files.store import Variable, write_csv
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.options import Option
+from vanedamp.studies.export.export import Option
 from vanedamp.studies.export.record import Record
 
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
@@ -45,17 +45,9 @@ def sweep(record: Record, path: Path) -> None:
     names = [*texts, *(name for name in on_grid if name not in texts)]
     columns = [column for name in names for column in _columns(record, name, len(dims))]
     given = [record.variables[name] for name in dims]
-    shape = tuple(len(axis.values) for axis in given)
-    header = [*(_headed(axis, item.units) for axis, item in zip(axes, given, strict=True)), *(n for n, _ in columns)]
-
-    def rows() -> Iterator[Sequence[Any]]:
-        for start in range(0, math.prod(shape), _CHUNK):
-            points = np.arange(start, min(start + _CHUNK, math.prod(shape)))
-            places = np.unravel_index(points, shape)
-            at = [np.asarray(item.values)[place] for item, place in zip(given, places, strict=True)]
-            yield from _rows([*at, *(values[points] for _, values in columns)])
-
-    write_csv(path, header, rows())
+    points = np.meshgrid(*(np.asarray(item.values) for item in given), indexing="ij")
+    names = [_headed(axis, item.units) for axis, item in zip(axes, given, strict=True)]
+    _write(path, [*zip(names, (values.ravel() for values in points), strict=True), *columns])
 
 
 def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ...]:
@@ -71,12 +63,7 @@ def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ..
     own.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
     fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
     columns = [column for name in own if name not in fields for column in _columns(record, name, 1)]
-
-    def rows() -> Iterator[Sequence[Any]]:
-        for start in range(0, known[dimension], _CHUNK):
-            yield from _rows([values[start : start + _CHUNK] for _, values in columns])
-
-    write_csv(path, [name for name, _ in columns], rows())
+    _write(path, columns)
     return tuple(f"left out: {name}, a field; .mat or .vtkhdf hold it" for name in fields)
 
 
@@ -121,7 +108,12 @@ def _headed(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} [{unit}]"
 
 
-def _rows(columns: Sequence[np.ndarray]) -> Iterator[list[Any]]:
-    """Yield rows of plain values; nan is an empty field."""
-    for row in zip(*(column.tolist() for column in columns), strict=True):
-        yield ["" if isinstance(value, float) and math.isnan(value) else value for value in row]
+def _write(path: Path, columns: Sequence[Column]) -> None:
+    """Write columns as rows of plain values; nan is an empty field."""
+
+    def rows() -> Iterator[list[Any]]:
+        for start in range(0, max((len(values) for _, values in columns), default=0), _CHUNK):
+            for row in zip(*(values[start : start + _CHUNK].tolist() for _, values in columns), strict=True):
+                yield ["" if isinstance(value, float) and math.isnan(value) else value for value in row]
+
+    write_csv(path, [name for name, _ in columns], rows())

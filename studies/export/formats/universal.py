@@ -28,8 +28,8 @@ from vanedamp.files.formats.universal_datasets import (
     write_universal,
 )
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.export.export import Option
 from vanedamp.studies.export.formats.vtkhdf import shapes_of
-from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
 
 SUMMARY = "modes, receptances, curves and histories: Simcenter Testlab, MATLAB toolboxes, pyuff"

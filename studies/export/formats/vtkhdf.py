@@ -1,6 +1,7 @@
 """VTKHDF, the file format of VTK for fields on meshes that move: modes, a mode over its phase, responses over time.
 
-Written after VTK's specification (VTKHDF 2.0, UnstructuredGrid with Steps): mesh and cells once, fields a step.
+Written after VTK's specification (VTKHDF 2.0, UnstructuredGrid with Steps), which meshio does not write: mesh and cells
+once, fields per step.
 """
 
 from __future__ import annotations
@@ -8,6 +9,8 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +19,7 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.studies.export.options import INPUT, Option
+from vanedamp.studies.export.export import INPUT, Option
 from vanedamp.studies.export.record import Record, read_record
 
 SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"
@@ -143,8 +146,6 @@ def shapes_of(record: Record) -> tuple[np.ndarray, list[np.ndarray], str]:
 
 def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
     """Return the structure with the number of modes that the run chose, if it was open."""
-    from dataclasses import replace
-
     if structure.modes != "auto" or estimate is None:
         return structure
     return replace(structure, modes=int(estimate["modes"]), natural=True, attached=bool(estimate["attached"]))
@@ -162,12 +163,10 @@ def _mesh(record: Record) -> Mesh:
 
 
 def _write(path: Path, mesh: Mesh, fields: Mapping[str, np.ndarray]) -> None:
-    image = io.BytesIO()  # a write that fails within HDF5 ends the whole process
-    with h5py.File(image, "w") as file:
-        point_data = _grid(file, mesh).create_group("PointData")
+    with _file(path, mesh) as root:
+        point_data = root.create_group("PointData")
         for name, field in fields.items():
             _dataset(point_data, name, field)
-    _put(path, image)
 
 
 def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fields: Iterator[np.ndarray]) -> None:
@@ -178,9 +177,7 @@ def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fi
             f"{steps} steps of {count} nodes take {24e-9 * steps * count:.3g} GB; at most {_MOST_BYTES / 1e9:.0f} GB: "
             "take fewer periods, samples or frames"
         )
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        root = _grid(file, mesh)
+    with _file(path, mesh) as root:
         field = root.create_group("PointData").create_dataset(
             "displacement", shape=(steps * count, 3), dtype=float, chunks=(min(count, 65536), 3), compression="gzip",
             compression_opts=1, shuffle=True,
@@ -195,18 +192,22 @@ def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fi
         group["NumberOfParts"] = np.ones(steps, np.int64)
         group["CellOffsets"], group["ConnectivityIdOffsets"] = still[:, None], still[:, None]
         group.create_group("PointDataOffsets")["displacement"] = np.arange(steps, dtype=np.int64) * count
-    _put(path, image)
 
 
-def _put(path: Path, image: io.BytesIO) -> None:
+@contextmanager
+def _file(path: Path, mesh: Mesh) -> Iterator[Any]:
+    """Give the group of a new file that has the mesh as one part; the file is written at the end."""
+    image = io.BytesIO()  # a write that fails within HDF5 ends the whole process
+    with h5py.File(image, "w") as file:
+        root = file.create_group("VTKHDF")
+        _add_mesh(root, mesh)
+        yield root
     with replacing(path) as temporary:
         temporary.write_bytes(image.getbuffer())
 
 
-def _grid(file: h5py.File, mesh: Mesh) -> Any:
-    """Write the mesh as one part; return its group."""
+def _add_mesh(root: Any, mesh: Mesh) -> None:
     cells, nodes = mesh.cells.shape
-    root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0])
     root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
     for name, length in (("Points", len(mesh.points)), ("Cells", cells), ("ConnectivityIds", mesh.cells.size)):
@@ -215,7 +216,6 @@ def _grid(file: h5py.File, mesh: Mesh) -> Any:
     _dataset(root, "Connectivity", mesh.cells.astype(np.int64).ravel())
     _dataset(root, "Offsets", nodes * np.arange(cells + 1, dtype=np.int64))
     _dataset(root, "Types", np.full(cells, mesh.cell_type, np.uint8))
-    return root
 
 
 def _dataset(group: Any, name: str, values: np.ndarray) -> None:

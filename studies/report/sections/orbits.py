@@ -4,33 +4,26 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
 
-from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.orbits.branch import Branch, Branches, SpecialPoint
 from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
-from vanedamp.studies.report.branch_charts import (
-    amplitude_at,
-    branch_name,
-    branches_figure,
-    branches_header,
-    branches_rows,
-    joined,
-    multipliers_figure,
-    multipliers_header,
-    multipliers_rows,
-)
-from vanedamp.studies.report.forced_response import quantity
-from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_header, orbits_rows
+from vanedamp.studies.report.charts import Table, axis_title, dressed
+from vanedamp.studies.report.forced_response import for_people, quantity
+from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_table
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.sweep_beside import points_beside, system_of
+from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
 ORDER = 15
 KIND = "orbits"
@@ -39,6 +32,16 @@ _MOST_ORBITS = 6
 _BIFURCATIONS = ("fold", "pitchfork", "period doubling", "neimark-sacker")
 #: kinds of special points in the table; branches of bodies that stick have many changes of the sequence
 _LISTED = (*_BIFURCATIONS, "grazing")
+#: colours that the colour-blind tell apart (Okabe and Ito 2008), after black
+_COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+#: symbols of special points by their kind
+_SYMBOLS = {
+    "fold": "square", "pitchfork": "diamond", "period doubling": "triangle-up", "neimark-sacker": "circle",
+    "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
+}  # fmt: skip
+_POINT = "#9ca3af"  # of a sweep
+#: sizes of multipliers that the charts show at first
+_MODULI = (1e-3, 10.0)
 
 
 def load(path: Path) -> Result:
@@ -59,23 +62,17 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     branches, files = joined(list(records.values())), list(records)
-    beside = {
-        other: points_beside(branches.scene, branches.parameter, result.record)
-        for other, result in page.results.kinds["sweep"].items()
-    }
-    beside = {other: points for other, points in beside.items() if len(points[0])}
+    beside = sweeps_beside(branches.scene, branches.parameter, page.results.kinds["sweep"])
     figure = branches_figure(branches, {page.names[other]: points for other, points in beside.items()})
     shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
-    shown["chart"] = page.chart(
-        "branches", figure, branches_header(branches), branches_rows(branches), [*files, *beside]
-    )
+    shown["chart"] = page.chart("branches", figure, *_branches_table(branches), [*files, *beside])
     shown["multipliers"] = page.chart(
-        "multipliers", multipliers_figure(branches), multipliers_header(branches), multipliers_rows(branches), files
+        "multipliers", _multipliers_figure(branches), *_multipliers_table(branches), files
     )
     named, shown["missing"] = _histories(branches)
     if named:
-        shown["orbits"] = page.chart("orbits", orbits_figure(named), orbits_header(named), orbits_rows(named), files)
+        shown["orbits"] = page.chart("orbits", orbits_figure(named), *orbits_table(named), files)
     return shown
 
 
@@ -111,3 +108,145 @@ def _chosen(branches: Branches) -> Iterator[tuple[str, int, float, np.ndarray]]:
         for kind, parameter, state in found:
             value = quantity(parameter, unit_of(branches.parameter))
             yield f"{branch_name(number, branch)}, {kind}, {value}", branch.periods, parameter, state
+
+
+def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> go.Figure:
+    """Draw amplitudes and impacts along the branches over points of sweeps, by name: parameter and mean amplitude."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.72, 0.28])
+    wide, units = for_people(unit_of(branches.parameter))
+    for name, (x, amplitude) in sweeps.items():
+        figure.add_scatter(
+            x=wide * x, y=1e6 * amplitude, name=f"runs of {name}", mode="markers", row=1, col=1,
+            marker={"color": _POINT, "size": 6, "symbol": "circle-open"},
+            hovertemplate="run, %{x:.8g}: %{y:.5g} µm<extra></extra>",
+        )  # fmt: skip
+    for number, branch in enumerate(branches.branches):
+        name, look = branch_name(number, branch), {"color": _COLOURS[number % len(_COLOURS)]}
+        unstable = ~(branch.stable | branch.undetermined)
+        for own, kind, dash, width in (
+            (branch.stable, "stable", "solid", 2.2), (unstable, "unstable", "dash", 1.6),
+            (branch.undetermined, "stability undetermined", "dot", 1.6),
+        ):  # fmt: skip
+            kept = _drawn(own)
+            if not own.any():
+                continue
+            measures = ((1e6 * branch.amplitude_mean, "%{y:.6g} µm"), (branch.impacts_per_period, "%{y:.4g} impacts"))
+            for row, (values, shown) in enumerate(measures, start=1):
+                figure.add_scatter(
+                    x=np.where(kept, wide * branch.parameter, np.nan), y=np.where(kept, values, np.nan), mode="lines",
+                    name=f"{name}, {kind}", legendgroup=name, showlegend=row == 1, row=row, col=1,
+                    line=look | {"dash": dash, "width": width},
+                    hovertemplate=f"{name}, {kind}, %{{x:.10g}}: {shown}<extra></extra>",
+                )  # fmt: skip
+    _add_special_points(figure, branches, wide)
+    figure.update_yaxes(title_text="mean of peaks, µm", row=1, col=1)
+    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
+    figure.update_xaxes(title_text=axis_title(branches.parameter, units), row=2, col=1)
+    return dressed(figure, height=720)
+
+
+def joined(records: Sequence[Branches]) -> Branches:
+    """Return the branches of several files of one scene and parameter as one record, numbered through."""
+    branches: list[Branch] = []
+    for record in records:
+        first = len(branches)
+        for branch in record.branches:
+            source = None if branch.source is None else (branch.source[0] + first, branch.source[1])
+            branches.append(replace(branch, source=source))
+    warnings = dict.fromkeys(warning for record in records for warning in record.warnings)
+    return replace(records[0], branches=tuple(branches), warnings=tuple(warnings))
+
+
+def branch_name(number: int, branch: Branch) -> str:
+    """Return the name of a branch, counted from 0, with the periods that its orbits take."""
+    return f"branch {number}" if branch.periods == 1 else f"branch {number}, {branch.periods} periods"
+
+
+def _drawn(own: np.ndarray) -> np.ndarray:
+    """Return own points and those just after them: lines of one kind go on to the first point of the other."""
+    return own | np.concatenate([[False], own[:-1]])
+
+
+def amplitude_at(branches: Branches, branch: Branch, point: SpecialPoint) -> float:
+    """Return the mean amplitude at a special point, m: between its neighbours, by the distances of their states."""
+    near = [index for index in (point.index, point.index + 1) if index < len(branch.parameter)]
+    distance = np.linalg.norm((branch.state[near] - point.state) / branches.scale, axis=1)
+    weight = distance[::-1] if distance.sum() > 0 else np.ones(len(near))
+    return float(np.average(branch.amplitude_mean[near], weights=weight))
+
+
+def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> None:
+    for kind, symbol in _SYMBOLS.items():
+        found = [
+            (point, amplitude_at(branches, branch, point), f"{kind} on {branch_name(number, branch)}")
+            for number, branch in enumerate(branches.branches)
+            for point in branch.special
+            if point.kind == kind
+        ]
+        if found:
+            figure.add_scatter(
+                x=[wide * point.parameter for point, _, _ in found], y=[1e6 * amplitude for _, amplitude, _ in found],
+                name=kind, mode="markers", row=1, col=1, visible=True if kind != "sequence" else "legendonly",
+                customdata=[f"{name}: {point.note}".removesuffix(": ") for point, _, name in found],
+                marker={"symbol": symbol, "size": 11, "color": "#ffffff", "line": {"color": "#000000", "width": 2}},
+                hovertemplate="%{customdata}<br>%{x:.12g}: %{y:.6g} µm<extra></extra>",
+            )  # fmt: skip
+
+
+def _branches_table(branches: Branches) -> Table:
+    """Return a row per point, branches counted from 0, in SI units."""
+    measures = ("amplitude_mean", "amplitude_max", "impacts_per_period", "largest_multiplier", "stable", "undetermined")
+    rows = []
+    for number, branch in enumerate(branches.branches):
+        columns = (branch.parameter, branch.amplitude_mean, branch.amplitude_max, branch.impacts_per_period)
+        largest = np.abs(branch.multipliers).max(axis=1, initial=0.0)
+        flags = zip(branch.stable.tolist(), branch.undetermined.tolist(), strict=True)
+        for values, states in zip(np.column_stack([*columns, largest]).tolist(), flags, strict=True):
+            rows.append([number, branch.periods, *values, *states])
+    return ["branch", "periods", branches.parameter, *measures], rows
+
+
+def _multipliers_figure(branches: Branches) -> go.Figure:
+    """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter."""
+    figure = make_subplots(rows=1, cols=2, column_widths=[0.46, 0.54], horizontal_spacing=0.14)
+    wide, units = for_people(unit_of(branches.parameter))
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    figure.add_scatter(
+        x=np.cos(angle), y=np.sin(angle), mode="lines", line={"color": "#334155", "width": 1}, hoverinfo="skip",
+        showlegend=False, row=1, col=1,
+    )  # fmt: skip
+    figure.add_hline(y=1.0, line={"color": "#334155", "width": 1}, row=1, col=2)
+    for number, branch in enumerate(branches.branches):
+        name, look = branch_name(number, branch), {"color": _COLOURS[number % len(_COLOURS)]}
+        parameter = np.repeat(wide * branch.parameter, branch.multipliers.shape[1])
+        values = branch.multipliers.ravel()
+        shared: dict[str, Any] = {"mode": "markers", "name": name, "legendgroup": name}
+        shared["visible"] = True if number == 0 else "legendonly"
+        figure.add_scatter(
+            x=values.real, y=values.imag, customdata=parameter, row=1, col=1, showlegend=False,
+            marker={"size": 5, "color": parameter, "coloraxis": "coloraxis", "symbol": number}, **shared,
+            hovertemplate=f"{name}, %{{customdata:.8g}}: %{{x:.5g}} + %{{y:.5g}} i<extra></extra>",
+        )  # fmt: skip
+        figure.add_scatter(
+            x=parameter, y=np.maximum(np.abs(values), 1e-16), row=1, col=2, marker=look | {"size": 4}, **shared,
+            hovertemplate=f"{name}, %{{x:.8g}}: %{{y:.6g}}<extra></extra>",
+        )  # fmt: skip
+    figure.update_xaxes(title_text="real part", range=[-1.6, 1.6], row=1, col=1)
+    figure.update_yaxes(title_text="imaginary part", scaleanchor="x", range=[-1.6, 1.6], row=1, col=1)
+    figure.update_xaxes(title_text=axis_title(branches.parameter, units), row=1, col=2)
+    figure.update_yaxes(title_text="modulus", type="log", range=np.log10(_MODULI).tolist(), row=1, col=2)
+    bar = {"title": {"text": axis_title(branches.parameter, units), "side": "top"}, "orientation": "h", "y": -0.2}
+    figure.update_layout(
+        coloraxis={"colorscale": "Viridis", "colorbar": bar | {"x": 0.2, "len": 0.4, "yanchor": "top"}}
+    )
+    return dressed(figure, height=560)
+
+
+def _multipliers_table(branches: Branches) -> Table:
+    """Return a row per multiplier."""
+    return ["branch", branches.parameter, "real", "imaginary"], [
+        [number, parameter, value.real, value.imag]
+        for number, branch in enumerate(branches.branches)
+        for parameter, values in zip(branch.parameter.tolist(), branch.multipliers, strict=True)
+        for value in values.tolist()
+    ]

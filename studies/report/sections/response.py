@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
 
-from vanedamp.studies.report.impact_chart import HEADER, impacts_figure, impacts_rows
+from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.time_history import History, history_figure
 
 ORDER = 20
 KIND = "response"
+HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
 
 def load(path: Path) -> Result:
@@ -52,3 +57,38 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
         for number, (tilt, lift, neglected) in enumerate(zip(*figures, strict=True), start=1)
         if np.isfinite(tilt)
     ]
+
+
+def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
+    """Draw impacts per period, mean normal and tangential impulse, and energy taken a period, a bar a contact."""
+    known = bool(np.isfinite([each.loss for each in impacts]).all())
+    figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for body in dict.fromkeys(each.body for each in impacts):
+        mine = [each for each in impacts if each.body == body]
+        places, count = [each.place for each in mine], np.array([each.impacts for each in mine])
+        colour, name = COLOURS[body % len(COLOURS)], f"body {body + 1}"
+        normal = 1e3 * np.array([each.normal_impulse for each in mine]) / count
+        tangential = 1e3 * np.array([each.tangential_impulse for each in mine]) / count
+        bars = [(1, count / periods, "impacts per period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
+        bars += [(2, tangential, "tangential impulse", " mN s", 0.4)]
+        if known:
+            loss = 1e6 * np.array([each.loss for each in mine]) / periods
+            bars += [(3, loss, "energy per period", " µJ", 1.0)]
+        for row, values, title, unit, opacity in bars:
+            figure.add_bar(
+                x=places, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
+                name=name, legendgroup=name, offsetgroup=f"{body}{opacity}" if row == 2 else f"{body}",
+                hovertemplate=f"{name}, {title}: %{{y:.4g}}{unit}<extra></extra>", row=row, col=1,
+            )  # fmt: skip
+    figure.update_xaxes(categoryorder="array", categoryarray=places_in_order(impacts))
+    figure.update_yaxes(title_text="impacts per period", row=1, col=1)
+    figure.update_yaxes(title_text="mean impulse, mN s", row=2, col=1)
+    if known:
+        figure.update_yaxes(title_text="energy per period, µJ", row=3, col=1)
+    dressed(figure, height=240 * (2 + known))
+    return figure.update_layout(barmode="group", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
+
+
+def impacts_rows(impacts: Sequence[ImpactsAtPlace]) -> Iterator[tuple[object, ...]]:
+    """Yield a line a contact, bodies counted from 1, sums over the evaluated periods in SI units."""
+    yield from ((each.body + 1, *astuple(each)[1:]) for each in impacts)

@@ -13,16 +13,7 @@ import numpy as np
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, is_start, steady_states
 from vanedamp.coupling.sweep.sweep import LOSSES
-from vanedamp.studies.report.body_advice import body_note
 from vanedamp.studies.report.charts import Chart
-from vanedamp.studies.report.coexistence_charts import (
-    basin_axes,
-    basin_panels,
-    basins_figure,
-    count_axes,
-    count_figure,
-    state_rows,
-)
 from vanedamp.studies.report.forced_response import (
     ForcedResponse,
     best_first,
@@ -38,8 +29,20 @@ from vanedamp.studies.report.forced_response_charts import (
     plane_figure,
     responses_figure,
 )
-from vanedamp.studies.report.map_chart import MOST_PANELS, map_axes, map_figure, map_panels, map_rows, panel_rows
-from vanedamp.studies.report.page import Page, format_setting
+from vanedamp.studies.report.map_chart import (
+    MOST_PANELS,
+    basin_axes,
+    basin_panels,
+    basins_figure,
+    count_axes,
+    count_figure,
+    map_axes,
+    map_figure,
+    map_panels,
+    panel_rows,
+    state_rows,
+)
+from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
 
 ORDER = 10
@@ -131,9 +134,12 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     }
     charts["plane"] = _plane_chart(responses, shown, page)
     rows = [
-        _key_figures(response) | {"shown": response.name in shown, "place": places[response.name], "colour": colour}
+        {
+            "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
+            "impacts": float(np.nan_to_num(response.impacts_per_period).max()), "place": places[response.name],
+        }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
-    ]
+    ]  # fmt: skip
     return charts | {
         "axis": axis, "units": responses[0].units, "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
@@ -163,14 +169,6 @@ def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Itera
         yield from ([response.name, *line] for line in np.column_stack([response.x, *values]).tolist())
 
 
-def _key_figures(response: ForcedResponse) -> dict[str, Any]:
-    return {
-        "name": response.name,
-        "headline": response.headline,
-        "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
-    }
-
-
 def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
     """Return the charts of where the runs of a sweep over starts end, and the states in the basins' panels."""
     states = steady_states(sweep)
@@ -187,6 +185,6 @@ def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def _map(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    header, panels = ("panel", *(map_axes(sweep) or ()), "relative_amplitude"), len(map_panels(sweep))
-    chart = page.chart("map", map_figure(sweep), header, map_rows(sweep), [file])
-    return {"chart": chart, "panels": panels, "drawn": min(panels, MOST_PANELS)}
+    header, panels = ("panel", *(map_axes(sweep) or ()), "relative_amplitude"), map_panels(sweep)
+    chart = page.chart("map", map_figure(sweep), header, panel_rows(panels), [file])
+    return {"chart": chart, "panels": len(panels), "drawn": min(len(panels), MOST_PANELS)}

@@ -41,8 +41,7 @@ from vanedamp.studies.explore.curves import (
 from vanedamp.studies.explore.sweep_chart import curve_figure
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.forced_response import forced_responses, linear_between
-from vanedamp.studies.report.forced_response_charts import responses_figure
-from vanedamp.studies.report.response_curves import LOOKS
+from vanedamp.studies.report.forced_response_charts import LOOKS, responses_figure
 
 TABLES = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},

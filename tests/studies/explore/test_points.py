@@ -30,7 +30,7 @@ from vanedamp.studies.explore.sweep_chart import (
 from vanedamp.studies.explore.sweep_files import open_sweeps, places_of
 from vanedamp.studies.report.motion import HIT, motion_of
 from vanedamp.studies.report.motion_page import script_source
-from vanedamp.studies.report.slider_motion import slider_samples
+from vanedamp.studies.report.plane_history import slider_samples
 
 BODY = {"mass": 0.003, "friction": 0.4, "restitution": 0.7}
 SCENE = {

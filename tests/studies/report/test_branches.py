@@ -15,9 +15,9 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
-from vanedamp.studies.report.branch_charts import joined
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
+from vanedamp.studies.report.sections.orbits import joined
 from vanedamp.studies.report.sweep_beside import points_beside
 
 #: beside the resonance, where the motion with two impacts per period is symmetric
