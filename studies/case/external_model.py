@@ -74,11 +74,6 @@ class External:
     """name of the model (default: that of this file)"""
 
     @classmethod
-    def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
-        """Return the checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
-        return cls.read(path).model(path)
-
-    @classmethod
     def read(cls, path: str | Path) -> External:
         """Return the tables of a TOML file. Raises InputError."""
         return validate(cls, read_toml(path), str(path))

@@ -343,15 +343,10 @@ def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> t
     )
 
 
-def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
-    """Return the index of the first bending: most like the case's shape, or of most effective mass along it."""
-    if case.modes.shape is not None:
-        return mode_like(modes, matrices, read_shapes(case.modes.shape))
-    return first_bending(modes, matrices, case.modes.direction)
-
-
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
     """Return the first bending among the modes that strain the structure, or None and why there is none.
+
+    It is the mode most like the case's shape, or the one of most effective mass along its direction.
 
     Raises ParticipationError for a held structure whose lowest modes lack it.
     """
@@ -361,7 +356,11 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
     if elastic.size:
         chosen = Modes(modes.frequencies_hz[elastic], modes.shapes[elastic], modes.residuals[elastic])
         try:
-            return int(elastic[bending_mode(case, chosen, matrices)]), ()
+            if case.modes.shape is None:
+                bending = first_bending(chosen, matrices, case.modes.direction)
+            else:
+                bending = mode_like(chosen, matrices, read_shapes(case.modes.shape))
+            return int(elastic[bending]), ()
         except ParticipationError as error:
             if not rigid and not case.modes.min_frequency:
                 raise
