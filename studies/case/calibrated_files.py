@@ -35,7 +35,7 @@ def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Pa
 def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep.
 
-    The schema of scenes is written beside it, for editors.
+    The schema of scenes is written into its folder, for editors.
     """
     head = {"": f"The rigid model of {Path(source).name}, by vanedamp calibrate."}
     write_commented(path, rigid_scene(calibration), KINDS["scene"], head | _scene_notes(calibration))

@@ -38,7 +38,7 @@ class MatricesTable:
     base_load: Name | None = None
     """(n, 3) matrix T^T M r of the loads by an acceleration of the base"""
     mass_scale: Annotated[Real, Field(gt=0)] = 1.0
-    """kilograms a unit of mass, with seconds: 1e3 for matrices in t, N and mm; multiplies stiffness and damping too
+    """kilograms per unit of mass, with seconds: 1e3 for matrices in t, N and mm; multiplies stiffness and damping too
     [kg]"""
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
-"""Bodies glued into their cavities: meshed as a part of the cluster, against masses added to a reduced model.
+"""Bodies fixed in their cavities: meshed as a part of the cluster, against masses added to a reduced model.
 
 The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor only; the meshed
-body also moves radially and turns, and stiffens the shroud that it is glued to. The record separates the two.
+body also moves radially and turns, and stiffens the shroud that it is bonded to. The record separates the two.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class TiedComparison:
 
 
 def compare_tied(case: Case, modes: int = 12) -> TiedComparison:
-    """Compare the two models of glued bodies for a case whose generated cluster has them (`damper_width` and so on).
+    """Compare the two models of fixed bodies for a case whose generated cluster has them (`damper_width` and so on).
 
     modes  fixed-interface modes of the reduced model. Raises InputError for a case without such bodies.
     """

@@ -51,7 +51,7 @@ class MeshFile:
     degree: Degree = 2
     """polynomial degree of the displacements"""
     scale: Positive = 1.0
-    """metres a unit of length of the file: 1e-3 for millimetres [m]"""
+    """metres per unit of length of the file: 1e-3 for millimetres [m]"""
 
     @property
     def foreign(self) -> bool:
@@ -67,7 +67,7 @@ class MeshFile:
 
 
 class _Generated:
-    """Base of meshes by a generator, whose parameters are keys of [mesh] beside its own."""
+    """Base of meshes by a generator, whose parameters are keys of [mesh], as its own are."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -205,11 +205,11 @@ class ElasticTable:
     """Springs spread over a facet group."""
 
     stiffness: Annotated[_Axes, BeforeValidator(_axes, json_schema_input_type=NonNegative | _Axes)] = (0.0, 0.0, 0.0)
-    """stiffness a unit of area, in all directions or [x, y, z] [N/m^3]"""
+    """stiffness per unit of area, in all directions or [x, y, z] [N/m^3]"""
     normal: NonNegative = 0.0
-    """stiffness a unit of area across the facets [N/m^3]"""
+    """stiffness per unit of area, normal to the facets [N/m^3]"""
     tangential: NonNegative = 0.0
-    """stiffness a unit of area along the facets [N/m^3]"""
+    """stiffness per unit of area along the facets [N/m^3]"""
 
     def __post_init__(self) -> None:
         if not any((*self.stiffness, self.normal, self.tangential)):

@@ -1,4 +1,4 @@
-"""`vanedamp new`: a short commented file to start from, which works as it is, with its schema for editors beside it."""
+"""`vanedamp new`: a short commented file to start from, which works as it is, and its schema for editors."""
 
 from __future__ import annotations
 

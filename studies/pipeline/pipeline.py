@@ -148,7 +148,7 @@ def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -
 def _check(
     listed: Sequence[Stage], files: Iterable[str | Path], source: Path, check_scene: Callable[[Scene, bool], None]
 ) -> None:
-    """Refuse bad input before anything runs, and results that would take the place of an input."""
+    """Reject bad input before anything runs, and results that would take the place of an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
     made: dict[Path, str] = {}
     for stage in listed:
