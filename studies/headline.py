@@ -15,7 +15,7 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: a damped response within this share of the undamped one has not been touched by the bodies
+#: a damped response within this fraction of the one without bodies has not been touched by the bodies
 UNTOUCHED = 0.01
 
 

@@ -13,9 +13,9 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
 
-#: share of the structure's mass that the body has, and of the amplitude without bodies that its gap has
+#: mass of the body over that of the structure, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
-#: share of the natural frequency at which a run shows the body at work, and the ends of a sweep and of a study's band
+#: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
 _SCENE_NOTE = """\

@@ -17,7 +17,7 @@ from vanedamp.studies.file_kinds import KINDS
 
 #: digits of a tuned number: the frequencies are those of the calibration to 1e-11
 _DIGITS = 12
-#: shares of the fatigue amplitude as gaps, share of the rigid model's mass as body, and range of the frequencies: a
+#: gaps over the fatigue amplitude, mass of the body over the rigid model's, and range of the frequencies: a
 #: start that shows impact mistuning
 _GAPS, _BODY, _RANGE = (1.0, 0.5, 0.1), 0.02, (0.95, 1.03)
 _SCHEMA = "#:schema "

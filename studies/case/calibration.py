@@ -22,7 +22,7 @@ from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTa
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
 
-# a pole farther from the computed mode than this share of its frequency belongs to another one
+# a pole farther from the computed mode than this fraction of its frequency belongs to another one
 _NEAR = 0.1
 # from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
 _OFF, _MISSED = 0.02, 0.1

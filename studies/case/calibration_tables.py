@@ -57,7 +57,7 @@ class CalibrationTable:
     """The data of `vanedamp calibrate`, besides the case itself."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
-    """share of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
+    """fraction of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
     hot_spot: list[str] | None = None
     """volume groups in which the largest stress is sought (default: all)"""
     damping: DampingTable | None = None

@@ -34,7 +34,7 @@ class MatricesTable:
     damping: Name | None = None
     """damping matrix; or give `damping_ratio`"""
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    """modal damping of every mode, as a share of critical damping [-]"""
+    """modal damping of every mode, as a fraction of critical damping [-]"""
     base_load: Name | None = None
     """(n, 3) matrix T^T M r of the loads by an acceleration of the base"""
     mass_scale: Annotated[Real, Field(gt=0)] = 1.0

@@ -159,7 +159,7 @@ class MaterialTable:
     density: Positive
     """density [kg/m^3]"""
     damping_ratio: Ratio | None = None
-    """modal damping of every mode, as a share of critical damping; overridden by that of [modes] [-]"""
+    """modal damping of every mode, as a fraction of critical damping; overridden by that of [modes] [-]"""
     fatigue_strength: Positive | None = None
     """fatigue strength, by which `vanedamp calibrate` sets the excitation [Pa]"""
     expansion: Annotated[Real, Field(gt=-_EXPANSION, lt=_EXPANSION)] = 0.0
@@ -250,7 +250,7 @@ class ModesTable:
     direction: Direction = (0.0, 1.0, 0.0)
     """direction of the first bending, which is the mode with most effective mass along it [-]"""
     damping_ratio: Ratio | None = None
-    """modal damping of every mode, as a share of critical damping (default: the materials') [-]"""
+    """modal damping of every mode, as a fraction of critical damping (default: the materials') [-]"""
     at: str | None = None
     """interface coordinate of the rigid model (default: the only one, or "shroud")"""
     shape: str | None = None

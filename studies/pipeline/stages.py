@@ -288,7 +288,7 @@ class Sweep(Stage):
         return tables
 
     def _model(self) -> tuple[dict[str, Any], float | None]:
-        """Return the rigid model (nothing before it is made) and the amplitude at the share of the fatigue strength."""
+        """Return the rigid model (nothing before it is made) and the amplitude at the fatigue level."""
         source = self.products.get("rigid")
         if source is None or not source.exists() or (self.table.structure != "rigid" and self.table.level is None):
             return {}, None
