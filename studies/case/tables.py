@@ -497,7 +497,7 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Check mesh tables beyond their union's one-line errors, and find the file."""
+    """Reject mesh tables in words that their union of records does not have."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
