@@ -29,7 +29,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.studies.demo import demo
-from vanedamp.studies.demo.curve import curves
+from vanedamp.studies.demo.curve import Curve, curves
 from vanedamp.studies.demo.figure_file import FigureScenes
 from vanedamp.studies.demo.figure_study import FigureStudy, Read, Session, print_claims, write_scene, written
 from vanedamp.studies.demo.figure_study import study as figure_study
@@ -68,9 +68,17 @@ def _figure(
     name: str, claims: Callable[[Read], list[Claim]], picture: Callable[[Read, Path], None] | None = None
 ) -> Callable[[Session], Study]:
     """Return what runs the study of a file in scenes/."""
-    others = {scene_file(other): wanted for other, wanted in claims_blocks.SLIDERS.get(name, {}).items()}
-    made = FigureStudy(FOLDER / f"{name}.toml", claims, others=others)
+    made = FigureStudy(FOLDER / f"{name}.toml", claims)
     return partial(figure_study, made if picture is None else made._replace(picture=picture))
+
+
+def others(read: Read) -> dict[str, dict[str, list[Curve]]]:
+    """Return the curves of other figures that a figure is compared with, by figure and curve."""
+    session, found = read.session, {}
+    for name, wanted in claims_blocks.SLIDERS[read.figure.name].items():
+        figure = session.figure(scene_file(name))
+        found[name] = {curve: curves(session.swept(figure, curve), curve or name) for curve in wanted}
+    return found
 
 
 def _bar(figure: FigureScenes) -> tuple[Bar, float]:
@@ -102,13 +110,13 @@ def _draw_masses(read: Read, path: Path) -> None:
 
 def _judge_fit(read: Read) -> list[Claim]:
     _, play, friction, _ = read.figure.scenes["map"].sweep_points()[0].values()
-    return claims_blocks.fit(read.curves, play, friction, read.others["fig9"][""][1])
+    return claims_blocks.fit(read.curves, play, friction, others(read)["fig9"][""][1])
 
 
 def _draw_fit(read: Read, path: Path) -> None:
     _, play, friction, _ = read.figure.scenes["map"].sweep_points()[0].values()
     tops = claims_blocks.highest_means(read.curves["map"], (2, len(play), len(friction)))
-    plots.fit_picture(tops, play, friction, read.others["fig9"][""][1], read.figure.title, path)
+    plots.fit_picture(tops, play, friction, others(read)["fig9"][""][1], read.figure.title, path)
 
 
 def _history(session: Session) -> Study:
@@ -157,8 +165,8 @@ STUDIES: dict[str, Callable[[Session], Study]] = {
     ),
     "blocks": _figure(
         "blocks",
-        lambda read: claims_blocks.blocks(read.curves, read.others, *_bar(read.figure)),
-        lambda read, path: plots.blocks_picture(read.curves, read.others, read.figure.title, path),
+        lambda read: claims_blocks.blocks(read.curves, others(read), *_bar(read.figure)),
+        lambda read, path: plots.blocks_picture(read.curves, others(read), read.figure.title, path),
     ),
     "fit": _figure("fit", _judge_fit, _draw_fit),
     "campbell": _blade,

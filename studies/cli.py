@@ -116,18 +116,15 @@ def _message(error: Exception, file: str | None) -> str | None:
         package = (error.name or "").split(".")[0]
         remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
         return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
-    # bad input has error classes of our own; any other ValueError is a fault of the program
-    return _located(str(error), file) if isinstance(error, VanedampError) else None
+    if not isinstance(error, VanedampError):  # bad input has error classes of our own
+        return None
+    message = str(error)
+    return message if file is None or message.startswith(f"{file}:") else f"{file}: {message}"
 
 
 def _refuse(message: str) -> int:
     print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
     return BAD_INPUT
-
-
-def _located(message: str, file: str | None) -> str:
-    """Return the message with the input file in front, unless it says so itself."""
-    return message if file is None or message.startswith(f"{file}:") else f"{file}: {message}"
 
 
 def _under_mpi() -> bool:

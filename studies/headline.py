@@ -1,4 +1,4 @@
-"""The key figures of a damped curve, like beside like: its top over that of the curve without bodies in the same range.
+"""The key results of a damped curve: its peak over that of the curve without bodies, in the same range.
 
 The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
 many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
@@ -15,7 +15,7 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: a damped response within this share of the undamped one has not been touched by the bodies
+#: a damped response within this fraction of the one without bodies has not been touched by the bodies
 UNTOUCHED = 0.01
 
 
@@ -33,11 +33,11 @@ class Headline:
 
     damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
     damped_peak_at               its place on the axis
-    undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all glued over the same range
+    undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
     onset                        first place where the bodies change the mean by more than 1 %
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a top lies at an edge of the frequencies: no resonance's
-    spacing, half_power_width    Hz, or units of a speed along an engine order: widest step beside the tops that are
+    spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
                                  resonances, and width of the undamped one
     points, points_left_out      of the curve, and how many of them are not ok
     """
@@ -70,7 +70,7 @@ class Headline:
 
     @property
     def too_coarse(self) -> bool:
-        """Say whether a step beside a resonance is wider than the resonance: a top may hide there."""
+        """Say whether a step next to a resonance is wider than the resonance: a peak may hide there."""
         return self.spacing > self.half_power_width > 0.0
 
     @property
@@ -143,23 +143,23 @@ def headline(
     """
     ok = np.isfinite(damped_mean)
     free = _linear_top("undamped", x, undamped, peaks, along_frequency)
-    glued = _linear_top("fixed", x, fixed, peaks, along_frequency)
+    held = _linear_top("fixed", x, fixed, peaks, along_frequency)
     top = _top(x[ok], damped_mean[ok], along_frequency)
     touched = np.flatnonzero(np.abs(damped_mean - undamped) > UNTOUCHED * undamped)
-    resonances = [item.at for item in (free, glued, top) if along_frequency and ok.any() and not item.at_edge]
+    resonances = [item.at for item in (free, held, top) if along_frequency and ok.any() and not item.at_edge]
     return Headline(
         damped_peak=top.height,
         damped_peak_at=top.at,
         damped_maximum=_top(x[ok], damped_max[ok], along_frequency).height,
         undamped_peak=free.height,
         undamped_peak_at=free.at,
-        fixed_peak=glued.height,
-        fixed_peak_at=glued.at,
+        fixed_peak=held.height,
+        fixed_peak_at=held.at,
         attached_mass_fraction=float(attached[ok][np.argmax(damped_mean[ok])]) if ok.any() else math.nan,
         onset=plain(x[touched[0]]) if touched.size else None,
         peak_at_edge=top.at_edge,
         undamped_at_edge=free.at_edge,
-        fixed_at_edge=glued.at_edge,
+        fixed_at_edge=held.at_edge,
         spacing=max((_step(x[ok], place) for place in resonances), default=math.nan),
         half_power_width=float(peaks.get("half_power_width", math.nan)),
         points=len(x),

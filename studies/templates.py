@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
 
-#: share of the structure's mass that the body has, and of the amplitude without bodies that its gap has
+#: mass of the body over that of the structure, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
-#: share of the natural frequency at which a run shows the body at work, and the ends of a sweep and of a study's band
+#: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
 _SCENE_NOTE = """\
@@ -41,23 +41,24 @@ wall to the right one. For planar bodies: facets = ["c1_left", "c1_right", "c1_f
 direction = "c1_left", normal = "c1_floor"."""
 
 
-class Template(NamedTuple):
-    """Tables of a file, and further comments by tables, as files.toml_output takes them."""
-
-    data: dict[str, Any]
-    notes: dict[str, str]
+#: tables of a file, and further comments by tables, as files.toml_output takes them
+Template = tuple[dict[str, Any], dict[str, str]]
 
 
-def scene_template(file: Path, rom: Path | None = None) -> Template:
-    """Return a scene for a file: of the shipped rigid model, or of a reduced model. Raises InputError for its file."""
+def template(kind: str, file: Path, rom: Path | None = None) -> Template:
+    """Return what a file of a kind (scene, study or case) begins with, with its comments.
+
+    A scene is of the shipped rigid model, or of a reduced model (rom), a study is on the same scene. Raises InputError
+    for the reduced model's file, and for one with a case.
+    """
+    if kind == "case":
+        if rom is not None:
+            raise InputError("--rom: is for a scene or a study; a case is what a reduced model is made from")
+        return _case(file)
     data = _scene(file, rom)
-    notes = {"": _SCENE_NOTE.format(file=file.name)} | ({"structure": _STRUCTURE_NOTE} if rom is None else {})
-    return Template(data, notes)
-
-
-def study_template(file: Path, rom: Path | None = None) -> Template:
-    """Return a study for a file, on the same scene. Raises InputError for the file of a reduced model."""
-    data = _scene(file, rom)
+    if kind == "scene":
+        notes = {"": _SCENE_NOTE.format(file=file.name)} | ({"structure": _STRUCTURE_NOTE} if rom is None else {})
+        return data, notes
     del data["sweep"]
     low, high = (_rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
     data["time"] = {"periods": 500, "transient": 400}
@@ -66,11 +67,11 @@ def study_template(file: Path, rom: Path | None = None) -> Template:
         "variables": {"mass_ratio": [0.005, 0.05], "gap_ratio": [0.1, 2.0], "bodies": [1, 2]},
         "tolerances": {"gap": 0.1, "excitation": 0.2}, "map": {"mass_ratio": 4, "gap_ratio": 5},
     }  # fmt: skip
-    return Template(data, {"": _STUDY_NOTE.format(file=file.name)})
+    return data, {"": _STUDY_NOTE.format(file=file.name)}
 
 
-def case_template(file: Path) -> Template:
-    """Return a case for a file: the parametric cluster with one cavity."""
+def _case(file: Path) -> Template:
+    """Return a case: the parametric cluster with one cavity."""
     tangential = [0, 1, 0]
     data = {
         "mesh": {"generator": "vane_cluster", "airfoils": 4, "cavities": 1, "element_size": 2.6e-3, "degree": 2},
@@ -87,7 +88,7 @@ def case_template(file: Path) -> Template:
         },
     }  # fmt: skip
     notes = {"": _CASE_NOTE.format(file=file.name), "mesh": _MESH_NOTE, "interface.shroud": _INTERFACE_NOTE}
-    return Template(data, notes | {"interface.c1_floor": _CAVITY_NOTE})
+    return data, notes | {"interface.c1_floor": _CAVITY_NOTE}
 
 
 def _scene(file: Path, rom: Path | None) -> dict[str, Any]:

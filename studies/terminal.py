@@ -32,7 +32,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 class _Lines:
-    """Lines in a log: how much is done, at which rate, and the time left."""
+    """Lines in a log: how much is done, at which rate, and the time left. tqdm rewrites a single line."""
 
     def __init__(self, title: str) -> None:
         self.title, self.started, self.said = title, time.monotonic(), time.monotonic()

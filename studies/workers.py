@@ -66,7 +66,7 @@ def _context() -> BaseContext:
     """Return how workers begin: not as a fork of this process, which may hold MPI or threads.
 
     On Linux they are forks of a server that holds neither, and that has the engine in its memory, which they share.
-    Elsewhere the system's libraries may have threads of their own, and each worker begins anew.
+    Elsewhere the system's libraries may have threads of their own, and each worker starts afresh.
     """
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
@@ -76,7 +76,7 @@ def _context() -> BaseContext:
     context.set_forkserver_preload([_PRELOADED])
     before = {name: os.environ.pop(name) for name in _THREADS if name in os.environ}
     try:
-        # every worker has a core of its own, and a library that is told so starts no thread in the server
+        # every worker has a core of its own, and a library that is told this starts no thread in the server
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         forkserver.ensure_running()
     finally:

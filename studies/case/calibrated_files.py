@@ -17,7 +17,7 @@ from vanedamp.studies.file_kinds import KINDS
 
 #: digits of a tuned number: the frequencies are those of the calibration to 1e-11
 _DIGITS = 12
-#: shares of the fatigue amplitude as gaps, share of the rigid model's mass as body, and range of the frequencies: a
+#: gaps over the fatigue amplitude, mass of the body over the rigid model's, and range of the frequencies: a
 #: start that shows impact mistuning
 _GAPS, _BODY, _RANGE = (1.0, 0.5, 0.1), 0.02, (0.95, 1.03)
 _SCHEMA = "#:schema "
@@ -35,7 +35,7 @@ def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Pa
 def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep.
 
-    The schema of scenes is written beside it, for editors.
+    The schema of scenes is written into its folder, for editors.
     """
     head = {"": f"The rigid model of {Path(source).name}, by vanedamp calibrate."}
     write_commented(path, rigid_scene(calibration), KINDS["scene"], head | _scene_notes(calibration))

@@ -22,10 +22,15 @@ from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTa
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
 
-# a pole farther from the computed mode than this share of its frequency belongs to another one
+# a pole farther from the computed mode than this fraction of its frequency belongs to another one
 _NEAR = 0.1
 # from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
 _OFF, _MISSED = 0.02, 0.1
+#: arrays of a tuning, by their keys in the results for machines
+_TUNING = {
+    "target_hz": "target_hz", "before_hz": "before_hz", "after_hz": "after_hz", "mode_before": "modes_before",
+    "mode_after": "modes_after", "mac_before": "mac_before", "mac_after": "mac_after", "sensitivity": "sensitivities",
+}  # fmt: skip
 # around the computed mode, relative: where a larger peak outside the band may be its own
 _AROUND = 0.25
 
@@ -229,8 +234,15 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
 
 
 def _tuned(structure: Structure, table: TuneTable) -> Tuning:
+    """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
     known = parts_by_name(structure.case, structure.solid.domain.volumes)
-    check_vary(table, known)
+    seen: set[str] = set()
+    for name in table.vary:
+        if name not in known:
+            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
+        if seen & set(known[name]):
+            raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
+        seen |= set(known[name])
     parts = structure.solid.stiffness_parts()
     varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
     measured = None if table.shapes is None else read_shapes(table.shapes)
@@ -244,7 +256,11 @@ def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, li
     poles = _poles(frf, band, table.modes, frequency)
     around = frf.band(low - (high - low) / 2.0, high + (high - low) / 2.0)
     damping = MeasuredDamping(table.frf, around, band, poles, poles.nearest(frequency))
-    _check_near(damping.frequency_hz, frequency)
+    if abs(damping.frequency_hz / frequency - 1.0) > _NEAR:
+        raise InputError(
+            f"calibration.damping: the nearest pole of the response lies at {damping.frequency_hz:.6g} Hz, the first "
+            f"bending at {frequency:.6g} Hz; check the band, or tune the frequencies first"
+        )
     return damping, list(_doubts(frf, band, poles.misfit, damping.frequency_hz, frequency))
 
 
@@ -284,28 +300,13 @@ def _doubts(frf: Frf, band: tuple[float, float], misfit: float, measured: float,
         )
 
 
-def _check_near(measured: float, computed: float) -> None:
-    if abs(measured / computed - 1.0) > _NEAR:
-        raise InputError(
-            f"calibration.damping: the nearest pole of the response lies at {measured:.6g} Hz, the first bending at "
-            f"{computed:.6g} Hz; check the band, or tune the frequencies first"
-        )
-
-
 def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:
     return {
         "factor": dict(zip(tuning.names, tuning.factors.tolist(), strict=True)),
         "deviation": dict(zip(tuning.names, tuning.deviations.tolist(), strict=True)),
         "young": {name: table.young for name, table in case.material.items()},
         "support": {name: asdict(table) for name, table in case.support.elastic.items()},
-        "target_hz": tuning.target_hz.tolist(),
-        "before_hz": tuning.before_hz.tolist(),
-        "after_hz": tuning.after_hz.tolist(),
-        "mode_before": tuning.modes_before.tolist(),
-        "mode_after": tuning.modes_after.tolist(),
-        "mac_before": tuning.mac_before.tolist(),
-        "mac_after": tuning.mac_after.tolist(),
-        "sensitivity": tuning.sensitivities.tolist(),
+        **{key: getattr(tuning, name).tolist() for key, name in _TUNING.items()},
         "evaluations": tuning.evaluations,
     }
 
@@ -318,14 +319,3 @@ def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
     if "default" in case.material and rest:
         names["material.default"] = rest
     return names | {f"support.{group}": [f"support.{group}"] for group in case.support.elastic}
-
-
-def check_vary(table: TuneTable, known: dict[str, list[str]]) -> None:
-    """Raise InputError for a name in `vary` that is no part, or parts that overlap."""
-    seen: set[str] = set()
-    for name in table.vary:
-        if name not in known:
-            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
-        if seen & set(known[name]):
-            raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
-        seen |= set(known[name])

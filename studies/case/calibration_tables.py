@@ -15,7 +15,7 @@ class DampingTable:
     """A measured frequency response, which gives the damping ratio of the first bending."""
 
     frf: str
-    """file with the response, relative to the case's: CSV with Hz and two columns a response, or UFF 58"""
+    """file with the response, relative to the case's: CSV with Hz and two columns per response, or UFF 58"""
     quantity: Literal["receptance", "mobility", "accelerance"] = "receptance"
     """what a CSV's columns are, per force: displacement, velocity or acceleration"""
     columns: Literal["real-imaginary", "magnitude-degrees", "magnitude-radians"] | None = None
@@ -54,10 +54,10 @@ class TuneTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CalibrationTable:
-    """The data of `vanedamp calibrate` beside the case itself."""
+    """The data of `vanedamp calibrate`, besides the case itself."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
-    """share of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
+    """fraction of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
     hot_spot: list[str] | None = None
     """volume groups in which the largest stress is sought (default: all)"""
     damping: DampingTable | None = None

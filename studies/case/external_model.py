@@ -34,11 +34,11 @@ class MatricesTable:
     damping: Name | None = None
     """damping matrix; or give `damping_ratio`"""
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    """modal damping of every mode, as a share of critical damping [-]"""
+    """modal damping of every mode, as a fraction of critical damping [-]"""
     base_load: Name | None = None
     """(n, 3) matrix T^T M r of the loads by an acceleration of the base"""
     mass_scale: Annotated[Real, Field(gt=0)] = 1.0
-    """kilograms a unit of mass, with seconds: 1e3 for matrices in t, N and mm; multiplies stiffness and damping too
+    """kilograms per unit of mass, with seconds: 1e3 for matrices in t, N and mm; multiplies stiffness and damping too
     [kg]"""
 
     def __post_init__(self) -> None:
@@ -72,11 +72,6 @@ class External:
     """interface coordinates, by their labels"""
     name: str = field(default="")
     """name of the model (default: that of this file)"""
-
-    @classmethod
-    def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
-        """Return the checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
-        return cls.read(path).model(path)
 
     @classmethod
     def read(cls, path: str | Path) -> External:

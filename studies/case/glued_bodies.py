@@ -1,7 +1,7 @@
-"""Bodies glued into their cavities: meshed as a part of the cluster, against masses added to a reduced model.
+"""Bodies fixed in their cavities: meshed as a part of the cluster, against masses added to a reduced model.
 
 The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor only; the meshed
-body also moves radially and turns, and stiffens the shroud that it is glued to. The record separates the two.
+body also moves radially and turns, and stiffens the shroud that it is bonded to. The record separates the two.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.participation import first_bending
 from vanedamp.studies.case.stages import assemble, reduction
-from vanedamp.studies.case.tables import Case, InterfaceTable, MaterialTable, VaneClusterMesh
+from vanedamp.studies.case.tables import Case, InterfaceTable, VaneClusterMesh
 
 SOFTENED = 1e-2
 WEIGHTLESS = 1e-6
@@ -51,7 +51,7 @@ class TiedComparison:
 
 
 def compare_tied(case: Case, modes: int = 12) -> TiedComparison:
-    """Compare the two models of glued bodies for a case whose generated cluster has them (`damper_width` and so on).
+    """Compare the two models of fixed bodies for a case whose generated cluster has them (`damper_width` and so on).
 
     modes  fixed-interface modes of the reduced model. Raises InputError for a case without such bodies.
     """
@@ -64,18 +64,17 @@ def compare_tied(case: Case, modes: int = 12) -> TiedComparison:
     if material is None:
         raise InputError(f"material.{_GROUP}: missing; the bodies need a material")
     mass = material.density * mesh.parameters.damper_volume
-    floors = _floors(mesh)
-    reduced = reduction(assemble(_without_bodies(case, mesh, floors)), modes)
-    loaded = reduced.with_masses((floor, mass / len(floors)) for floor in floors)
+    free = reduction(assemble(_without_bodies(case, mesh)), modes)
+    loaded = free.with_masses((floor, mass / len(free.interface)) for floor in free.interface)
+    soft = replace(material, young=SOFTENED * material.young)
+    weightless = replace(material, density=WEIGHTLESS * material.density)
     return TiedComparison(
         mass=mass,
-        free_hz=float(reduced.natural_frequencies_hz[0]),
+        free_hz=float(free.natural_frequencies_hz[0]),
         added_mass_hz=float(loaded.natural_frequencies_hz[0]),
         tied_hz=_first_bending_hz(case),
-        soft_hz=_first_bending_hz(_with_bodies_of(case, replace(material, young=SOFTENED * material.young))),
-        weightless_hz=_first_bending_hz(
-            _with_bodies_of(case, replace(material, density=WEIGHTLESS * material.density))
-        ),
+        soft_hz=_first_bending_hz(replace(case, material=dict(case.material) | {_GROUP: soft})),
+        weightless_hz=_first_bending_hz(replace(case, material=dict(case.material) | {_GROUP: weightless})),
     )
 
 
@@ -85,24 +84,13 @@ def _first_bending_hz(case: Case) -> float:
     return float(modes.frequencies_hz[first_bending(modes, matrices, case.modes.direction)])
 
 
-def _with_bodies_of(case: Case, material: MaterialTable) -> Case:
-    return replace(case, material=dict(case.material) | {_GROUP: material})
-
-
-def _without_bodies(case: Case, mesh: VaneClusterMesh, floors: dict[str, InterfaceTable]) -> Case:
+def _without_bodies(case: Case, mesh: VaneClusterMesh) -> Case:
     """Return the case with empty cavities, its interface the tangential motion of their floors."""
     bare = replace(mesh.parameters, damper_width=0.0, damper_height=0.0, damper_depth=0.0)
     materials = {group: table for group, table in case.material.items() if group != _GROUP}
-    return replace(
-        case,
-        mesh=replace(mesh, parameters=bare),
-        material=materials,
-        interface=floors,
-        modes=replace(case.modes, at=None),
-    )
-
-
-def _floors(mesh: VaneClusterMesh) -> dict[str, InterfaceTable]:
-    angles = enumerate(mesh.parameters.cavity_angles(), start=1)
-    tangents = {number: (0.0, math.cos(angle), -math.sin(angle)) for number, angle in angles}
-    return {f"c{number}_floor": InterfaceTable(f"c{number}_floor", tangent) for number, tangent in tangents.items()}
+    floors = {}
+    for number, angle in enumerate(mesh.parameters.cavity_angles(), start=1):
+        floor = f"c{number}_floor"
+        floors[floor] = InterfaceTable(floor, (0.0, math.cos(angle), -math.sin(angle)))
+    mesh, table = replace(mesh, parameters=bare), replace(case.modes, at=None)
+    return replace(case, mesh=mesh, material=materials, interface=floors, modes=table)

@@ -28,11 +28,11 @@ class RotationTable:
     speed: NonNegative | None = None
     """speed; or give `rpm` (default: standstill) [rad/s]"""
     rpm: NonNegative | None = None
-    """speed in revolutions a minute [rpm]"""
+    """speed in revolutions per minute [rpm]"""
     max_speed: Positive | None = None
-    """greatest speed that a reduced model is for (default: the speed) [rad/s]"""
+    """maximum speed that a reduced model is for (default: the speed) [rad/s]"""
     max_rpm: Positive | None = None
-    """the same in revolutions a minute [rpm]"""
+    """the same in revolutions per minute [rpm]"""
     gyroscopic: bool = False
     """give modes the gyroscopic coupling, which makes them complex"""
 
@@ -80,7 +80,7 @@ class CampbellTable:
     speed: Speeds | None = None
     """speeds, an ascending list or a range {start, stop, num}; or give `rpm` [rad/s]"""
     rpm: Speeds | None = None
-    """speeds in revolutions a minute [rpm]"""
+    """speeds in revolutions per minute [rpm]"""
     engine_orders: tuple[Positive, ...] = ()
     """excitation frequencies over the frequency of rotation [-]"""
     modes: Annotated[Whole, Field(ge=1)] = 6

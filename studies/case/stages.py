@@ -51,7 +51,7 @@ from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
-# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is reported
+# a mode so near the first bending, relative, that moves its point with such a fraction of its compliance, is reported
 _NEAR, _NOTABLE = 0.02, 0.01
 #: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
 _MODES, _REACH = 10, 1.5
@@ -173,8 +173,12 @@ def _direction(
 
 @dataclass(frozen=True)
 class Fatigue:
-    """Where the first bending's stress reaches a share of the fatigue strength (spot), and the displacement (amplitude,
-    m) of the response coordinate at which it does."""
+    """The level at which the first bending's stress reaches a fraction of the fatigue strength.
+
+    share      of the strength
+    amplitude  m, displacement of the response coordinate
+    spot       where the stress does
+    """
 
     share: float
     amplitude: float
@@ -343,15 +347,10 @@ def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> t
     )
 
 
-def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
-    """Return the index of the first bending: most like the case's shape, or of most effective mass along it."""
-    if case.modes.shape is not None:
-        return mode_like(modes, matrices, read_shapes(case.modes.shape))
-    return first_bending(modes, matrices, case.modes.direction)
-
-
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
     """Return the first bending among the modes that strain the structure, or None and why there is none.
+
+    It is the mode most like the case's shape, or the one of most effective mass along its direction.
 
     Raises ParticipationError for a held structure whose lowest modes lack it.
     """
@@ -361,7 +360,11 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
     if elastic.size:
         chosen = Modes(modes.frequencies_hz[elastic], modes.shapes[elastic], modes.residuals[elastic])
         try:
-            return int(elastic[bending_mode(case, chosen, matrices)]), ()
+            if case.modes.shape is None:
+                bending = first_bending(chosen, matrices, case.modes.direction)
+            else:
+                bending = mode_like(chosen, matrices, read_shapes(case.modes.shape))
+            return int(elastic[bending]), ()
         except ParticipationError as error:
             if not rigid and not case.modes.min_frequency:
                 raise
@@ -440,10 +443,10 @@ def reduction(
 
     The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
     max_frequency, by default 1.5 times the first bending (of most effective mass along the case's direction; of a free
-    structure its first elastic mode). Craig-Bampton models have a block of quasi-static
-    modes. A structure that rotates is reduced for all speeds up to the greatest of its case, and the number of modes
-    suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the tolerance, and
-    InputError for a structure that rotates with another basis, or up to no speed.
+    structure its first elastic mode). Craig-Bampton models have a block of quasi-static modes. A rotating structure is
+    reduced for all speeds up to the maximum of its case, and the number of modes suits standstill and that speed.
+    Raises LadderError when no model of up to _MOST modes meets the tolerance, and InputError for a structure that
+    rotates with another basis, or up to no speed.
     """
     rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
     recovery = keep_recovery or bool(spots)

@@ -51,7 +51,7 @@ class MeshFile:
     degree: Degree = 2
     """polynomial degree of the displacements"""
     scale: Positive = 1.0
-    """metres a unit of length of the file: 1e-3 for millimetres [m]"""
+    """metres per unit of length of the file: 1e-3 for millimetres [m]"""
 
     @property
     def foreign(self) -> bool:
@@ -67,7 +67,7 @@ class MeshFile:
 
 
 class _Generated:
-    """Base of meshes by a generator, whose parameters are keys of [mesh] beside its own."""
+    """Base of meshes by a generator, whose parameters are keys of [mesh], as its own are."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -159,7 +159,7 @@ class MaterialTable:
     density: Positive
     """density [kg/m^3]"""
     damping_ratio: Ratio | None = None
-    """modal damping of every mode, as a share of critical damping; overridden by that of [modes] [-]"""
+    """modal damping of every mode, as a fraction of critical damping; overridden by that of [modes] [-]"""
     fatigue_strength: Positive | None = None
     """fatigue strength, by which `vanedamp calibrate` sets the excitation [Pa]"""
     expansion: Annotated[Real, Field(gt=-_EXPANSION, lt=_EXPANSION)] = 0.0
@@ -205,11 +205,11 @@ class ElasticTable:
     """Springs spread over a facet group."""
 
     stiffness: Annotated[_Axes, BeforeValidator(_axes, json_schema_input_type=NonNegative | _Axes)] = (0.0, 0.0, 0.0)
-    """stiffness a unit of area, in all directions or [x, y, z] [N/m^3]"""
+    """stiffness per unit of area, in all directions or [x, y, z] [N/m^3]"""
     normal: NonNegative = 0.0
-    """stiffness a unit of area across the facets [N/m^3]"""
+    """stiffness per unit of area, normal to the facets [N/m^3]"""
     tangential: NonNegative = 0.0
-    """stiffness a unit of area along the facets [N/m^3]"""
+    """stiffness per unit of area along the facets [N/m^3]"""
 
     def __post_init__(self) -> None:
         if not any((*self.stiffness, self.normal, self.tangential)):
@@ -250,7 +250,7 @@ class ModesTable:
     direction: Direction = (0.0, 1.0, 0.0)
     """direction of the first bending, which is the mode with most effective mass along it [-]"""
     damping_ratio: Ratio | None = None
-    """modal damping of every mode, as a share of critical damping (default: the materials') [-]"""
+    """modal damping of every mode, as a fraction of critical damping (default: the materials') [-]"""
     at: str | None = None
     """interface coordinate of the rigid model (default: the only one, or "shroud")"""
     shape: str | None = None
@@ -497,7 +497,7 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Check mesh tables beyond their union's one-line errors, and find the file."""
+    """Reject mesh tables in words that their union of records does not have."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")

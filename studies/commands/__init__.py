@@ -4,7 +4,7 @@ A command is a module, or an object, with
 
     SUMMARY                 what it does, in a line of --help without a full stop
     add_arguments(parser)   declare its arguments (an argparse.ArgumentParser)
-    run(arguments)          do it; raise InputError for bad input
+    run(arguments)          check, compute, write, print; raise InputError for bad input
     NAME                    if it is not the file's
     ORDER                   place in --help: the steps of the pipeline count up
 
@@ -14,23 +14,7 @@ has a file of its own here, which is imported when the command runs. What severa
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
-from typing import Protocol
-
 from vanedamp.files.extensions import ExtensionPoint
-
-
-class Command(Protocol):
-    """The contract of a command."""
-
-    SUMMARY: str
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Declare the arguments."""
-
-    def run(self, arguments: Namespace) -> None:
-        """Check, compute, write, print. Raises InputError."""
-
 
 COMMANDS = ExtensionPoint(
     "command", "vanedamp.studies.commands.declarations", "vanedamp.commands", ("SUMMARY", "add_arguments", "run")

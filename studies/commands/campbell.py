@@ -1,4 +1,4 @@
-"""`vanedamp campbell`: natural frequencies over the speed of rotation, and their crossings with engine orders."""
+"""`vanedamp campbell`: natural frequencies versus the speed of rotation, and their crossings with engine orders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.terminal import progress
 
-#: columns of modes beside each other, and speeds below each other
+#: columns (modes) and rows (speeds) that are printed at most
 _MOST_COLUMNS, _MOST_ROWS = 12, 25
 
 
@@ -39,7 +39,7 @@ def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:
     """Yield modes versus speed, crossings with engine orders, and veerings."""
     shown = diagram.modes[:_MOST_COLUMNS]
     kind = ", with gyroscopic coupling" if diagram.gyroscopic else ""
-    yield f"natural frequencies in Hz over the speed{kind}"
+    yield f"natural frequencies in Hz versus speed{kind}"
     yield "       rpm     rad/s" + "".join(f"    mode {mode + 1:2}" for mode in shown)
     rows = diagram.asked.nonzero()[0]
     for row in rows[:: -(-len(rows) // _MOST_ROWS)]:

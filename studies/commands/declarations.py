@@ -56,7 +56,7 @@ COMMANDS = (
         writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE,
     ),
     Command(
-        "campbell", "natural frequencies over the speed of rotation, and where engine orders meet them", 25,
+        "campbell", "natural frequencies versus the speed of rotation, and their crossings with engine orders", 25,
         (
             input_file("CASE.toml"), output_file("CAMPBELL.h5"), json_file,
             argument("--picture", metavar="FILE.png", help="the diagram as a picture"),
@@ -163,7 +163,7 @@ COMMANDS = (
     ),
     Command(
         "ringdown",
-        "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping over the amplitude", 88,
+        "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping versus amplitude", 88,
         (input_file("SCENE.toml"), output_file("RINGDOWN.h5"), json_file),
         writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"),
     ),

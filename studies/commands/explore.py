@@ -5,7 +5,6 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import print_note
 from vanedamp.studies.commands.support.outputs import Outputs
@@ -23,7 +22,10 @@ def run(arguments: Namespace) -> None:
     scenes = [source for source in sources if source.suffix == ".toml"]
     if scenes and len(sources) > 1:
         raise InputError(f"{scenes[0]}: a scene is explored on a page of its own; name nothing beside it")
-    sweeps = _sweeps(sources) if sources and not scenes else {}
+    sweeps = open_sweeps(sources) if sources and not scenes else {}
+    if sources and not (scenes or sweeps):
+        named = ", ".join(map(str, sources))
+        raise InputError(f"{named}: holds no sweep; `vanedamp sweep SCENE.toml -o SWEEP.h5` writes one")
     exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments.output, arguments.outputs)
     if sweeps and arguments.output:
         raise InputError("--output: a scene is written from the page of a scene; leave it out, or name a scene")
@@ -42,12 +44,3 @@ def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> E
         outputs.keep(scene.files)
         check_moved(scene)
     return Exploration.of(scene, name, None if output is None else Path(output))
-
-
-def _sweeps(sources: list[Path]) -> dict[str, Sweep]:
-    """Return the sweeps in files and folders, by their short names. Raises InputError where there is none."""
-    sweeps = open_sweeps(sources)
-    if not sweeps:
-        named = ", ".join(map(str, sources))
-        raise InputError(f"{named}: holds no sweep; `vanedamp sweep SCENE.toml -o SWEEP.h5` writes one")
-    return sweeps

@@ -1,4 +1,4 @@
-"""`vanedamp new`: a short commented file to start from, which works as it is, with its schema for editors beside it."""
+"""`vanedamp new`: a short commented file to start from, which works as it is, and its schema for editors."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 from vanedamp.files.toml_input import InputError
 from vanedamp.files.toml_output import schema_name, write_commented
-from vanedamp.studies import templates
 from vanedamp.studies.commands.support.outputs import check_outputs
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.templates import template
 
 
 def run(arguments: Namespace) -> None:
@@ -20,12 +20,6 @@ def run(arguments: Namespace) -> None:
     check_outputs(arguments, beside=path.with_name(schema_name(kind)))
     if path.exists():
         raise InputError(f"--output {path}: exists already, and may be yours; name another file")
-    if kind == "case":
-        if arguments.rom is not None:
-            raise InputError("--rom: is for a scene or a study; a case is what a reduced model is made from")
-        made = templates.case_template(path)
-    else:
-        template = templates.scene_template if kind == "scene" else templates.study_template
-        made = template(path, None if arguments.rom is None else Path(arguments.rom))
-    write_commented(path, made.data, KINDS[kind], made.notes)
+    data, notes = template(kind, path, None if arguments.rom is None else Path(arguments.rom))
+    write_commented(path, data, KINDS[kind], notes)
     print(f"{path}: a {kind} to start from; its keys complete in editors by {path.with_name(schema_name(kind))}")

@@ -1,4 +1,4 @@
-"""`vanedamp sweep`: a run at every point of a grid; finished points are kept beside the result and survive a kill."""
+"""`vanedamp sweep`: a run at every point of a grid; finished points are kept in a file and survive a kill."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Curve:
                                intervals (0 where there are too few periods)
     harmonic                   amplitudes at the excitation's frequency, without the offset by a body that leans on a
                                wall
-    undamped, fixed            linear curves without bodies and with all glued
+    undamped, fixed            linear curves without bodies and with all fixed
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
     """

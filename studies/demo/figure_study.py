@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -70,11 +70,11 @@ class Session:
 
 @dataclass(frozen=True)
 class Read:
-    """A figure's scenes and curves; others: curves of other figures, by the stems of their files."""
+    """A figure's scenes and curves, and the session in which they were computed."""
 
     figure: FigureScenes
     curves: dict[str, list[Curve]]
-    others: dict[str, dict[str, list[Curve]]]
+    session: Session
 
     @property
     def labels(self) -> dict[str, list[Curve]]:
@@ -88,12 +88,11 @@ def draw_first(read: Read, path: Path) -> None:
 
 
 class FigureStudy(NamedTuple):
-    """How a figure is judged and drawn. file: of its scenes; others: curves of other figures' files that it needs."""
+    """How a figure is judged and drawn. file: of its scenes."""
 
     file: Path
     claims: Callable[[Read], list[Claim]]
     picture: Callable[[Read, Path], None] = draw_first
-    others: Mapping[Path, tuple[str, ...]] = {}
 
 
 def study(of: FigureStudy, session: Session) -> Study:
@@ -101,11 +100,7 @@ def study(of: FigureStudy, session: Session) -> Study:
     figure = session.figure(of.file)
     sweeps = {curve: session.swept(figure, curve) for curve in figure.scenes}
     mine = {curve: curves(sweep, curve.replace("_", " ") or figure.name) for curve, sweep in sweeps.items()}
-    others = {}
-    for file, names in of.others.items():
-        other = session.figure(file)
-        others[file.stem] = {name: curves(session.swept(other, name), name or other.name) for name in names}
-    read = Read(figure, mine, others)
+    read = Read(figure, mine, session)
     claims = of.claims(read)
     of.picture(read, session.folder / f"{figure.name}.png")
     trouble = [text for curve, sweep in sweeps.items() for text in _trouble(curve, sweep)]

@@ -17,6 +17,7 @@ _KIND = "optimisation"
 _PLAIN = (
     "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
 )  # fmt: skip
+_TABLES = ("study", "headlines", "provenance")
 _ARRAYS = {
     "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
     "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
@@ -116,7 +117,7 @@ class Optimisation:
         """Write HDF5 that xarray opens. Raises files.store.StoreError."""
         variables = {name: Variable(getattr(self, name), dims, unit) for name, (dims, unit) in _ARRAYS.items()}
         variables["variable"] = Variable(np.array(Design._fields, object), ("variable",))
-        tables = {name: dict(getattr(self, name)) for name in ("study", "headlines", "provenance")}
+        tables = {name: dict(getattr(self, name)) for name in _TABLES}
         save(path, _KIND, variables, self._plain() | tables)
 
     @classmethod
@@ -130,7 +131,5 @@ class Optimisation:
             **arrays,
             nominal=Optimum.of(json.loads(attributes["nominal"])),
             robust=Optimum.of(json.loads(attributes["robust"])),
-            study=json.loads(attributes["study"]),
-            headlines=json.loads(attributes["headlines"]),
-            provenance=json.loads(attributes["provenance"]),
+            **{name: json.loads(attributes[name]) for name in _TABLES},
         )

@@ -104,7 +104,7 @@ class Optimise:
     speeds: _Values | None = None
     """speeds in place of the band, along an engine order [rad/s]"""
     rpm: _Values | None = None
-    """speeds in revolutions a minute in place of the band, along an engine order [rpm]"""
+    """speeds in revolutions per minute in place of the band, along an engine order [rpm]"""
     variables: Variables = field(default_factory=Variables)
     """what may be chosen"""
     tolerances: Tolerances = field(default_factory=Tolerances)

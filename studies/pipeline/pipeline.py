@@ -119,7 +119,7 @@ def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callab
     say(f"{stage.name}: runs, {'; '.join(reasons)}")
     same = record.begin(stage.name, inputs)
     started = time.perf_counter()
-    found = stage.work(Tools(say, pool, fresh=not same))
+    found = stage.work(Tools(lambda line: say(f"{stage.name}: {line}"), pool, fresh=not same))
     seconds = time.perf_counter() - started
     record.end(stage.name, inputs, stage.outputs)
     say(f"{stage.name}: {found} ({seconds:.1f} s)")
@@ -148,7 +148,7 @@ def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -
 def _check(
     listed: Sequence[Stage], files: Iterable[str | Path], source: Path, check_scene: Callable[[Scene, bool], None]
 ) -> None:
-    """Refuse bad input before anything runs, and results that would take the place of an input."""
+    """Reject bad input before anything runs, and results that would take the place of an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
     made: dict[Path, str] = {}
     for stage in listed:

@@ -1,4 +1,4 @@
-"""What was done, in a file beside the results: from what each stage made which files, and what has changed since."""
+"""What was done, in a file in their folder: from what each stage made which files, and what has changed since."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vanedamp.files.store import digest, write_json
 from vanedamp.files.toml_input import InputError
 
 _KIND = "vanedamp pipeline"
-#: changes of one file that are told, and entries of a list
+#: changes of one file that are reported, and entries of a list
 _MOST, _ENTRIES = 3, 4
 
 #: what decides about doing a stage again: by subject ("case case.toml", "file cluster.msh"), nested data or a digest
@@ -90,9 +90,9 @@ def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
             continue
         one, other = leaves(before), leaves(after)
         paths = [path for path in dict.fromkeys([*other, *one]) if one.get(path) != other.get(path)]
-        told = [f"{path} {_pair(one.get(path), other.get(path))}" for path in paths[:_MOST]]
+        reported = [f"{path} {_pair(one.get(path), other.get(path))}" for path in paths[:_MOST]]
         more = f" and {len(paths) - _MOST} more" if len(paths) > _MOST else ""
-        yield f"{subject} changed: {', '.join(told)}{more}"
+        yield f"{subject} changed: {', '.join(reported)}{more}"
 
 
 def leaves(data: Any, path: str = "") -> dict[str, Any]:

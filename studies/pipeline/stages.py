@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -48,15 +48,20 @@ _DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
 
 @dataclass(frozen=True)
 class Tools:
-    """What stages work with.
+    """What a stage works with.
 
-    note: takes a line for the user; pool: returns the worker processes, started when first asked for; fresh: what an
-    earlier start left is of other inputs.
+    note: takes a line for the user, to which it adds the stage's name; pool: returns the worker processes, started when
+    first asked for; fresh: what an earlier start left is of other inputs.
     """
 
     note: Callable[[str], None]
     pool: Callable[[], Executor | None]
     fresh: bool = False
+
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Pass warnings to the user."""
+        for warning in warnings:
+            self.note(f"warning: {warning}")
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ class Calibrate(CaseStage):
         found.save(record)
         save_tuned_case(self.file, found, tuned)
         save_rigid_scene(self.file, found, scene)
-        _warn(tools, self.name, found.warnings)
+        tools.warn(found.warnings)
         rigid, factors = found.rigid, ""
         if found.tuning is not None:
             pairs = zip(found.tuning.names, found.tuning.factors.tolist(), strict=True)
@@ -153,7 +158,7 @@ class Modal(CaseStage):
 
         analysis = modal_analysis(assemble(Case.load(self.file)))
         analysis.save(self.outputs[0])
-        _warn(tools, self.name, analysis.warnings)
+        tools.warn(analysis.warnings)
         first = "" if analysis.rigid is None else f", first bending {analysis.rigid.frequency_hz:.6g} Hz"
         return f"{len(analysis.modes)} modes{first}"
 
@@ -171,8 +176,7 @@ class Reduce(CaseStage):
 
     def inputs(self) -> dict[str, Any]:
         """Return those of the case, and the options."""
-        keys = ("modes", "basis", "tolerance", "max_frequency", "hot_spots")
-        return super().inputs() | {"option": {key: getattr(self.table, key) for key in keys}}
+        return super().inputs() | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
@@ -182,7 +186,7 @@ class Reduce(CaseStage):
         modes = None if table.modes == "auto" else table.modes
         model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
         model.save(self.outputs[0])
-        _warn(tools, self.name, unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
+        tools.warn(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
         return str(model.provenance["estimate"]["sentence"])
 
 
@@ -233,15 +237,13 @@ class Sweep(Stage):
         if tools.fresh:
             clear(checkpoint)
         prepared = prepare(scene, checkpoint, self.table.peak)
-        _warn(tools, self.name, prepared.points.warnings)
+        tools.warn(prepared.points.warnings)
         if prepared.resumed:
-            tools.note(f"{self.name}: {prepared.resumed} of {prepared.points.size} points are done, the rest follows")
+            tools.note(f"{prepared.resumed} of {prepared.points.size} points are done, the rest follows")
         result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
         if self.table.peak:
             peak = self.outputs[1]
-            run_peak(
-                prepared, result, peak, lambda text: tools.note(f"{self.name}: {text.replace(str(peak), peak.name)}")
-            )
+            run_peak(prepared, result, peak, lambda text: tools.note(text.replace(str(peak), peak.name)))
         finish(prepared, self.outputs[0])
         bad = int((result.status != "ok").sum())
         told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
@@ -286,7 +288,7 @@ class Sweep(Stage):
         return tables
 
     def _model(self) -> tuple[dict[str, Any], float | None]:
-        """Return the rigid model (nothing before it is made) and the amplitude at the share of the fatigue strength."""
+        """Return the rigid model (nothing before it is made) and the amplitude at the fatigue level."""
         source = self.products.get("rigid")
         if source is None or not source.exists() or (self.table.structure != "rigid" and self.table.level is None):
             return {}, None
@@ -385,8 +387,3 @@ def _software(*packages: str) -> dict[str, Any]:
         with suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
     return {"version": found}
-
-
-def _warn(tools: Tools, name: str, warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        tools.note(f"{name}: warning: {warning}")

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Real, Whole, read_toml, validate
 from vanedamp.rom.basis import basis_named
 
-#: what the stages write into the folder of the results, beside a file for every sweep
+#: what the stages write into the folder of the results, with a file for every sweep
 CALIBRATION, TUNED_CASE, RIGID_SCENE = "calibration.h5", "tuned.toml", "rigid.toml"
 MODES, REDUCED = "modes.h5", "rom.h5"
 
@@ -54,8 +54,8 @@ class SweepStage:
     structure: Literal["rigid", "reduced"] | None = None
     """structure in place of the scene's own: "rigid", that of calibrate (or modal), or "reduced", that of reduce"""
     level: Literal["fatigue"] | None = None
-    """"fatigue" in place of the scene's own level: the resonance without bodies reaches the case's share of the fatigue
-    strength"""
+    """"fatigue" in place of the scene's own level: the resonance without bodies reaches the case's fraction of the
+    fatigue strength"""
     name: str | None = None
     """name of the stage and of its result NAME.h5; left out: that of the scene file"""
     peak: bool = False

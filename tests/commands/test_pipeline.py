@@ -249,6 +249,18 @@ def test_a_dry_run_writes_nothing(tmp_path, monkeypatch, capsys):
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
+def test_a_peak_on_a_model_that_is_not_made_yet_is_no_bad_input(tmp_path, monkeypatch):
+    """Of all its modes, whose number only the model's file will tell."""
+    monkeypatch.chdir(write_inputs(tmp_path))
+    replace_in(tmp_path / "reduced.toml", "modes = 1\n", "")
+    replace_in(
+        tmp_path / "pipeline.toml",
+        'scene = "reduced.toml"',
+        'scene = "reduced.toml"\nstructure = "reduced"\npeak = true',
+    )
+    assert main(["pipeline", "pipeline.toml", "--dry-run"]) == 0
+
+
 def test_check_says_what_would_run(folder, capsys):
     replace_in(folder / "gaps.toml", "gap = 2e-4", "gap = 3e-4")
     assert main(["check", "pipeline.toml", "--json", "-"]) == 0

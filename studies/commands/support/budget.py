@@ -1,4 +1,4 @@
-"""The cost of a command, estimated before the work: what nobody would wait for, or has memory for, is refused.
+"""The cost of a command, estimated before the work: what nobody would wait for, or has memory for, is rejected.
 
 Known costs are those of one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
 generous: whoever meets one has most likely slipped by some powers of ten.
@@ -18,7 +18,7 @@ from vanedamp.studies.terminal import duration
 if TYPE_CHECKING:
     from vanedamp.studies.optimisation.study import Study
 
-#: s of a run, beside its periods
+#: s of a run, in addition to its periods
 _RUN = 2.5e-3
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
@@ -29,7 +29,7 @@ MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
 
 
 def check_run(scene: Scene, samples: int = 0) -> None:
-    """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
+    """Reject a run whose records fill the memory, or that takes a month. Raises InputError."""
     periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
     channels += _IN_PLANE * len(scene.damper) if scene.planar else 0
     channels += _modes(scene) if samples else 0
@@ -44,7 +44,7 @@ def check_run(scene: Scene, samples: int = 0) -> None:
 
 
 def check_sweep(scene: Scene, workers: int) -> None:
-    """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
+    """Reject a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
     points, seconds = scene.points, sweep_seconds(scene, workers)
     if points > MOST_POINTS:
         raise InputError(
@@ -56,7 +56,7 @@ def check_sweep(scene: Scene, workers: int) -> None:
 
 
 def check_optimise(study: Study, workers: int) -> None:
-    """Refuse an optimisation that takes a month. Raises InputError."""
+    """Reject an optimisation that takes a month. Raises InputError."""
     scenes = scenes_of(study)
     check_run(study.scene)
     _check_time("optimise", f"{scenes:.3g} scenes on {workers} workers", scenes * run_seconds(study.scene) / workers)

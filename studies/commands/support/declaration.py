@@ -45,7 +45,7 @@ class Command:
     arguments             in the order of --help
     writes                files of options, each with the endings that they may have: checked before anything is read;
                           None: the work checks
-    checkpoint            whether the result has a checkpoint beside it, by which `--resume` goes on
+    checkpoint            whether the result has a checkpoint, from which `--resume` continues
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
     module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
     """

@@ -21,7 +21,7 @@ class Outputs(NamedTuple):
     files: tuple[tuple[str, Path], ...]
 
     def keep(self, inputs: Iterable[str | Path]) -> None:
-        """Refuse outputs that would take the place of an input. Raises InputError."""
+        """Reject outputs that would take the place of an input. Raises InputError."""
         for (option, path), file in itertools.product(self.files, inputs):
             if path.exists() and os.path.exists(file) and _same(path, Path(file)):
                 raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
@@ -30,8 +30,8 @@ class Outputs(NamedTuple):
 def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkpoint: bool) -> None:
     """Check the files of a command, and keep them as `outputs`, `folder` and `checkpoint` of the arguments.
 
-    endings: of the options that name files, "/" of a folder; checkpoint: whether one lies beside the result. Raises
-    InputError.
+    endings: of the options that name files, "/" of a folder; checkpoint: whether the result has one (FILE.partial).
+    Raises InputError.
     """
     if endings.get("output") == ("/",):
         arguments.folder, arguments.outputs = output_folder(arguments), Outputs(())
@@ -48,10 +48,10 @@ def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkp
 
 
 def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
-    """Refuse files that could not be written, before the work. Raises InputError.
+    """Reject files that could not be written, before the work. Raises InputError.
 
     The files are those of `--output`, of `--json` (standard output becomes `-` and is none), of the options that
-    suffixes names with the endings that they may have, and one beside the result that the user did not name.
+    suffixes names with the endings that they may have, and one that the user did not name (beside).
     """
     if _is_stdout(getattr(arguments, "json", None) or "-"):
         arguments.json = "-"
@@ -85,7 +85,7 @@ def output_folder(arguments: Namespace) -> Path:
 
 
 def _checkpoint_file(output: str | None) -> Path | None:
-    """Return where a command keeps what is finished: beside its result, if that is a file."""
+    """Return where a command keeps what is finished, if its result is a file."""
     return None if output is None or destination(output) is None else Path(f"{output}.partial")
 
 
