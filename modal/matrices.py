@@ -122,6 +122,10 @@ class SystemMatrices(Displayed):
         mask[self.fixed] = False
         return np.flatnonzero(mask)
 
+    def of_free(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """Return the rows and columns of a matrix (N, N) that belong to the free DOFs."""
+        return matrix[self.free][:, self.free]
+
     def rigid_translations(self) -> np.ndarray:
         """Return unit translations (N, 3) of every DOF along x, y and z."""
         return np.tile(np.eye(3), (len(self.coordinates), 1))

@@ -60,7 +60,7 @@ class SpeedRange:
         self._solved_count = min(count + 2 * spare, self._free.size)
         named = [standing.stiffness, rotating.centrifugal_stiffness, standing.mass]
         named += [rotating.gyroscopic] if gyroscopic else []
-        self._operators = [sparse.csr_array(matrix[self._free][:, self._free]) for matrix in named]
+        self._operators = [standing.of_free(matrix) for matrix in named]
         self._basis = np.empty((self._free.size, 0))
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
