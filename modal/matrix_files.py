@@ -62,8 +62,8 @@ def read_matrices(
         if name not in patches:
             raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
         held += [3 * patches[name].nodes + _component(sets, component) for component in components]
-    system = _system(stiffness, mass, coordinates, np.concatenate(held), patches, damping_ratio)
-    return _scaled(system, scale, mass_scale)
+    fixed_dofs = np.concatenate(held)
+    return _system(stiffness, mass, coordinates, fixed_dofs, patches, damping_ratio, scale, mass_scale)
 
 
 def read_folder(
@@ -82,22 +82,8 @@ def read_folder(
             for component in components.strip()
         ]
         fixed = np.array(held, dtype=int)
-    found = {name: _either(home, name) for name in ("stiffness", "mass")}
-    return _scaled(
-        _system(found["stiffness"], found["mass"], coordinates, fixed, patches, damping_ratio), scale, mass_scale
-    )
-
-
-def _scaled(system: SystemMatrices, scale: float, mass_scale: float) -> SystemMatrices:
-    for name, value in (("scale", scale), ("mass_scale", mass_scale)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise MatricesError(f"{name}: expected a positive number, not {value}")
-    return replace(
-        system,
-        stiffness=mass_scale * system.stiffness,
-        mass=mass_scale * system.mass,
-        coordinates=scale * system.coordinates,
-    )
+    stiffness, mass = (_either(home, name) for name in ("stiffness", "mass"))
+    return _system(stiffness, mass, coordinates, fixed, patches, damping_ratio, scale, mass_scale)
 
 
 def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:
@@ -130,7 +116,10 @@ def _system(
     fixed: np.ndarray,
     patches: dict[str, Patch],
     damping_ratio: float,
+    scale: float,
+    mass_scale: float,
 ) -> SystemMatrices:
+    """Return the checked system in SI units."""
     provenance = {"stiffness": os.path.basename(stiffness), "mass": os.path.basename(mass)}
     loaded = {}
     for name, path in (("stiffness", stiffness), ("mass", mass)):
@@ -146,10 +135,23 @@ def _system(
             raise MatricesError(
                 f"{path}: degree of freedom {place} has {diagonal[place]:.3g} on the diagonal; check its sign"
             )
-    return SystemMatrices(
-        stiffness=loaded["stiffness"], mass=loaded["mass"], coordinates=coordinates, fixed=fixed, patches=patches,
-        damping_ratio=damping_ratio, provenance=provenance,
-    )  # fmt: skip
+    system = SystemMatrices(
+        **loaded,
+        coordinates=coordinates,
+        fixed=fixed,
+        patches=patches,
+        damping_ratio=damping_ratio,
+        provenance=provenance,
+    )
+    for name, value in (("scale", scale), ("mass_scale", mass_scale)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise MatricesError(f"{name}: expected a positive number, not {value}")
+    return replace(
+        system,
+        stiffness=mass_scale * system.stiffness,
+        mass=mass_scale * system.mass,
+        coordinates=scale * system.coordinates,
+    )
 
 
 def _matrix(path: Path, name: str) -> sparse.csr_array:
