@@ -81,7 +81,7 @@ class SpeedBases:
         """
         standing, interface = self.rotating.standing, self.interface
         joined = self._joined(speeds, modes)
-        basis = interface.motions @ np.hstack([joined.constraint, *joined.blocks, joined.fixed])
+        basis = interface.motions @ joined.fields
         model = replace(
             craig_bampton.reduced_model(standing, interface, joined, origin, keep_recovery),
             centrifugal_stiffness=symmetric_part(basis.T @ (self.rotating.centrifugal_stiffness @ basis)),
