@@ -70,7 +70,7 @@ def krylov(
 
 
 def ritz_values(stiffness: Any, mass: Any, fields: np.ndarray) -> np.ndarray:
-    """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one a dimension of it."""
+    """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one per dimension of it."""
     left, singular, _ = np.linalg.svd(fields, full_matrices=False)
     basis = orthonormal(left[:, singular > 1e-8 * singular[0]], mass)
     return np.linalg.eigvalsh(symmetric_part(basis.T @ (stiffness @ basis)))

@@ -33,7 +33,7 @@ class Crossing:
     """A natural frequency met by an engine order.
 
     mode          counted from 0
-    order         periods a revolution
+    order         periods per revolution
     speed         rad/s
     frequency_hz  of both
     """

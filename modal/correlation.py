@@ -34,7 +34,7 @@ class CorrelationError(VanedampError):
 class MeasuredShapes:
     """Mode shapes at measured degrees of freedom: displacements at points along directions.
 
-    points          (p, 3) m, one row a measured displacement; three rows of one point for a triaxial sensor
+    points          (p, 3) m, one row per measured displacement; three rows of one point for a triaxial sensor
     directions      (p, 3), scaled to length one
     shapes          (m, p), real or complex, of any scale
     frequencies_hz  (m,), nan where not known

@@ -115,7 +115,7 @@ class Solid:
     materials    volume group -> Material; the key "default" serves every group that is not named
     degree       of the displacements, 1 to 3; 2 is right for bending
     elastic      facet group -> ElasticSupport
-    scale        metres a unit of length of the file
+    scale        metres per unit of length of the file
     temperature  of the structure: it changes the moduli, and what cannot expand is under stress
 
     Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh, TemperatureError for the

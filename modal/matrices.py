@@ -55,11 +55,10 @@ class Patch:
             raise MatricesError("patch: a node occurs twice; list every node once and add up its weights")
         if not np.all(np.isfinite(weights)) or weights.sum() <= 0.0:
             raise MatricesError(f"patch: weights must be finite with a positive sum (an area), not {weights.sum()}")
-        object.__setattr__(self, "nodes", nodes)
         if normal.shape != (3,) or not np.all(np.isfinite(normal)):
             raise MatricesError(f"patch: normal must be three numbers, not {self.normal}")
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "normal", normal)
+        for name, value in (("nodes", nodes), ("weights", weights), ("normal", normal)):
+            object.__setattr__(self, name, value)
 
     @property
     def area(self) -> float:
@@ -192,13 +191,12 @@ class SystemMatrices(Displayed):
             for label, start, stop, normal in zip(values["patch"], offsets[:-1], offsets[1:], normals, strict=True)
         }
         size = values["coordinates"].size
-        stiffness, mass = (
-            sparse.csr_array((values[name], values[f"{name}_column"], values[f"{name}_row_start"]), shape=(size, size))
+        found = {
+            name: sparse.csr_array((values[name], values[f"{name}_column"], values[f"{name}_row_start"]), (size, size))
             for name in ("stiffness", "mass")
-        )
+        }
         return cls(
-            stiffness=stiffness,
-            mass=mass,
+            **found,
             coordinates=values["coordinates"],
             fixed=values["fixed"],
             patches=patches,

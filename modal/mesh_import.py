@@ -9,7 +9,7 @@ edges and of points.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -31,8 +31,8 @@ class _Shape(NamedTuple):
 
     corners: int
     facet_corners: int
-    facets: list[tuple[int, ...]]
-    edges: list[tuple[int, ...]]
+    facets: Sequence[tuple[int, ...]]
+    edges: Sequence[tuple[int, ...]]
     elements: tuple[int, int, int, int]
     order: list[int]
 
@@ -81,7 +81,7 @@ def convert(
     volumes  sets of volume elements that become volume groups; left out: all
     facets   sets of nodes, of shells, lines and points, and surfaces, that become groups of facets, or else of edges
              and points; left out: all
-    scale    metres a unit of length of the file: 1e-3 for millimetres
+    scale    metres per unit of length of the file: 1e-3 for millimetres
 
     Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
     with straight edges (the displacements have a degree of their own). Raises MeshError.

@@ -32,7 +32,7 @@ class RotatingMatrices:
     standing               at standstill, with the stiffness of a thermal prestress if there is one
     centrifugal_stiffness  (N, N) symmetric CSR, kg: K1
     gyroscopic             (N, N) skew CSR, kg: G
-    load                   (N,) kg m: centrifugal load a squared speed
+    load                   (N,) kg m: centrifugal load per squared speed
     axis, point            (3,) unit vector, and (3,) m, a point of the axis
     """
 

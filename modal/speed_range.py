@@ -18,7 +18,7 @@ from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-#: 1/min in a rad/s
+#: 1/min per rad/s
 RPM = 30.0 / np.pi
 # of the unit length of a shape: what the basis lacks of it for a field more
 _LACKING = 1e-10

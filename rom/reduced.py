@@ -333,8 +333,9 @@ class ReducedModel(Displayed):
                 raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
             if not np.all(np.isfinite(values[name])):
                 raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
+        arrays: dict[str, Any] = {name: values[name] if name in _REQUIRED else values.get(name) for name in _ARRAYS}
         return cls(
-            **{name: values[name] if name in _REQUIRED else values.get(name) for name in _ARRAYS},
+            **arrays,
             interface=tuple(values["interface"]),
             outputs=tuple(values.get("output", ())),
             blocks=tuple(values.get("blocks", ())),
