@@ -51,7 +51,7 @@ def read_matrices(
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
     scale            metres per unit of length of the nodes: 1e-3 for mm
-    mass_scale       kg per unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness, too
+    mass_scale       kg per unit of mass, with seconds: 1e3 for matrices in t, N and mm; it multiplies both
 
     Raises MatricesError, with the file, for shapes that do not fit, one triangle only, unknown nodes or sets.
     """

@@ -12,7 +12,6 @@ import vanedamp.modal.stack  # noqa: F401
 # isort: split
 import contextlib
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -88,9 +87,7 @@ class Factorization:
     def __enter__(self) -> Factorization:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.destroy()
 
     def _check(self, matrix: sparse.csr_array, status: int) -> None:

@@ -7,7 +7,6 @@ the shapes, and the error is estimated from the residual with the full matrices.
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -78,9 +77,7 @@ class SpeedRange:
     def __enter__(self) -> SpeedRange:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._factor.destroy()
 
     @property
