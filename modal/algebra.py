@@ -9,7 +9,7 @@ import numpy as np
 
 Matrix = TypeVar("Matrix")
 
-# share of a field (in its squared norm) that the others and the blocks must not determine
+# fraction of a field (in its squared norm) that the others and the blocks must not determine
 _OWN_SHARE = 1e-10
 
 

@@ -1,6 +1,6 @@
 """Campbell diagram: natural frequencies of a rotating structure over its speed, and where engine orders meet them.
 
-All in the frame that turns with the structure, where an excitation at rest has the frequencies k * speed / (2 pi).
+All in the rotating frame, where an excitation at rest has the frequencies k * speed / (2 pi).
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
 _SLICE = 50
-# of a share of stiffness that is stable
+# relative, of a fraction of a stiffness that is stable
 _SHARE_DIGITS = 1e-3
 
 
@@ -134,7 +134,7 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
 
 
 def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
-    """Return the largest share (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
+    """Return the largest fraction (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
 
     Stable: the free stiffness is positive definite, as it is without the addition. To three digits below 1.
     """

@@ -224,7 +224,7 @@ class Solid:
         self._check_size(displacement)
         deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
+        return np.array(fenicsx.evaluator(equivalent, fenicsx.discontinuous_space(self.domain, 1))().x.array)
 
     def stress_components(self, displacements: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
         """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,), where `von_mises` has its values.

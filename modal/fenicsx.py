@@ -238,15 +238,11 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     return found
 
 
-def evaluate(expression: Any, space: Any) -> Any:
-    """Return the function of a space that takes the values of a UFL expression at the space's own points."""
-    return evaluator(expression, space)()
-
-
 def evaluator(expression: Any, space: Any, cells: np.ndarray | None = None) -> Callable[[], Any]:
-    """Return what `evaluate` is of an expression whose functions change: called, it takes their values as they are.
+    """Return a call that gives the function of a space with the values of a UFL expression at the space's own points.
 
-    cells: those in which the values are wanted; default: all.
+    It takes the functions in the expression as they are when it is called. cells: those in which the values are
+    wanted; default: all.
     """
     points = space.element.interpolation_points
     function = fem.Function(space)
@@ -288,7 +284,7 @@ def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _prepare_groups() -> None:
-    """Refuse faults that dolfinx's reader does not report, and bring the model to a form that every version reads."""
+    """Reject faults that dolfinx's reader does not report, and bring the model to a form that every version reads."""
     _check_kinds()
     grouped = {
         entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()

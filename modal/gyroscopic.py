@@ -1,6 +1,6 @@
 """Complex modes of a structure that rotates, with the gyroscopic coupling.
 
-Motions Re(x exp(i omega t)) in the frame that turns with the structure solve the Hermitian problem
+Motions Re(x exp(i omega t)) in the rotating frame solve the Hermitian problem
 
     Q(omega) x = (K + i omega W G - omega^2 M) x = 0,    K = K0 + W^2 K1.
 

@@ -26,7 +26,7 @@ Solve = Callable[[np.ndarray], np.ndarray]
 _RESTARTS = 100
 # residuals below this, relative to the largest eigenvalue of the shifted inverse, are the round-off of its solves
 _ROUND_OFF = 5e-14
-# directions are dropped below this share of their block, and made orthogonal once more below the other
+# directions are dropped below this fraction of their block, and made orthogonal once more below the other
 _DEPENDENT, _LOSING = 1e-14, 1e-6
 
 

@@ -31,7 +31,7 @@ class MatricesError(VanedampError):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A group of nodes and their shares of the patch.
+    """A group of nodes and their weights in the patch.
 
     nodes    (k,) node indices, each once
     weights  (k,) m^2, integral of the node's shape function over the facet group; ones for nodes of edges and points
@@ -145,7 +145,7 @@ class SystemMatrices(Displayed):
     def movable_mass(self) -> np.ndarray:
         """Mass (3,) along x, y and z, kg: r^T M r of the free DOFs, the sum of the effective masses of all modes.
 
-        Less than the total mass by the share of the elements at the supports that their fixed nodes carry.
+        Less than the total mass by the part of the elements at the supports that their fixed nodes carry.
         """
         translations = self.movable_translations()
         return np.einsum("ij,ij->j", translations, self.mass @ translations)

@@ -65,7 +65,7 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
     """Write shapes as `read_shapes` reads them; the suffix chooses (.csv, .uff, .unv).
 
     A universal file holds points with displacements along x, y and z, so shapes measured along other directions are
-    refused there, as are two values for one point and axis.
+    rejected there, as are two values for one point and axis.
     """
     target = Path(path)
     if target.suffix.lower() in _UNIVERSAL:
@@ -87,7 +87,7 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
 
     columns  one of COLUMNS; left out: as the header line says (real, imag; magnitude, phase in deg or
              rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
-             says so, are refused
+             says so, are rejected
 
     Raises MeasurementError.
     """

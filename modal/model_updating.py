@@ -53,7 +53,7 @@ class Tuning:
     before_hz, after_hz   (n,) those of their partners among the computed modes
     modes_before, modes_after  (n,) indices of these partners
     mac_before, mac_after      (n,) MAC with the measured shapes, or with the untuned modes where none were given
-    sensitivities  (n, p) d log f / d log factor, after tuning: the share of strain energy of a part, halved
+    sensitivities  (n, p) d log f / d log factor, after tuning: half the fraction of the strain energy in a part
     evaluations    eigenvalue problems solved
     matrices       the tuned system
     warnings       what to look at: frequencies that are missed, another pairing with less change

@@ -1,4 +1,4 @@
-"""A structure that rotates: K(speed) = K0 + speed^2 K1, as matrices in the frame that turns with it.
+"""A structure that rotates: K(speed) = K0 + speed^2 K1, as matrices in the rotating frame.
 
 About its centrifugal equilibrium at a constant speed W (rad/s) the structure moves by
 

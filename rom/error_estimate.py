@@ -41,7 +41,7 @@ class LadderError(VanedampError):
 class Rung:
     """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
-    above: share of a collision's energy that modes beyond the model's would take, which need not be an error;
+    above: fraction of a collision's energy that modes beyond the model's would take, which need not be an error;
     attached: whether the modes come with residual attachment modes (ReducedModel.attached).
     """
 

@@ -19,7 +19,7 @@ KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
-# the same of the constraints between rigid patches: an edge that is straight within that share of its length is a hinge
+# the same of the constraints between rigid patches: an edge, straight within that fraction of its length, is a hinge
 _STRAIGHT = 1e-5
 # a mean normal shorter than this is that of a surface which faces everywhere, or that of several which face apart
 _FLAT, _ONE_WAY = 0.5, 0.9

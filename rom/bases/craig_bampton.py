@@ -35,7 +35,7 @@ from vanedamp.rom.reduced import ReducedModel
 _ROUND_TRIP = 1e-2
 # the same for a structure that its supports hold
 _EXACT = 1e-6
-# share of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
+# fraction of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
 # lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
 _SMALLEST = 1e-14
@@ -170,7 +170,7 @@ def _held(
 class _Supported:
     """A structure that its supports hold: from the factors of its own stiffness; constraint: (n, k) constraint modes.
 
-    The response with the interface held is the one without, less the constraint modes' share in it. That cancels digits
+    The response with the interface held is the one without, less the constraint modes' part of it. That cancels digits
     where the supports are much softer than the structure; `error` says how exact it is, relative to 1.
     """
 

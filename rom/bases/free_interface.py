@@ -35,7 +35,7 @@ from vanedamp.rom.reduced import ReducedModel
 _SHIFT = 1e-4
 _ROUNDS = 200
 _CONVERGED = 1e-12
-# share of the static response that the modes have left, below which an attachment mode is round-off
+# fraction of the static response that the modes have left, below which an attachment mode is round-off
 _LEFT = 1e-9
 
 
