@@ -31,10 +31,10 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
     if Path(path).suffix != ".msh":
         raise ParameterError(f"path: expected a file name ending in .msh, not {path}")
     with msh.session("vane_cluster"):
-        volumes = _solids(parameters)
+        volumes = solids(parameters)
         for name, tags in volumes.items():
             gmsh.model.addPhysicalGroup(3, tags, name=name)
-        for name, tags in _facets(parameters).items():
+        for name, tags in facets(parameters).items():
             gmsh.model.addPhysicalGroup(2, tags, name=name)
         for option in ("Mesh.MeshSizeMin", "Mesh.MeshSizeMax"):
             gmsh.option.setNumber(option, parameters.element_size)
@@ -49,7 +49,7 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
         return msh.write(path)
 
 
-def _solids(parameters: VaneCluster) -> dict[str, list[int]]:
+def solids(parameters: VaneCluster) -> dict[str, list[int]]:
     """Make the volumes: shrouds with pockets, the airfoils between them and the bodies in them, with shared faces."""
     occ = gmsh.model.occ
     inner = _annular_sector(parameters, parameters.inner_radius, parameters.platform_radius)
@@ -136,7 +136,7 @@ def _box(parameters: VaneCluster, angle: float, back: float, size: tuple[float, 
     return int(box)
 
 
-def _facets(parameters: VaneCluster) -> dict[str, list[int]]:
+def facets(parameters: VaneCluster) -> dict[str, list[int]]:
     """Return the facet groups, found by the position of their surfaces."""
     surfaces = [tag for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)]
     found = {
