@@ -6,7 +6,6 @@ components); the degrees of freedom are x, y, z of the nodes in the order of nod
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -16,7 +15,8 @@ from typing import Any
 import numpy as np
 from scipy import io, sparse
 
-from vanedamp.files.foreign import existing, reading
+from vanedamp.files.csv_input import csv_table
+from vanedamp.files.foreign import existing
 from vanedamp.files.formats.matrices.matlab import read_mat
 from vanedamp.files.formats.matrices.numpy_files import read_npz
 from vanedamp.files.formats.matrices.table import read_table
@@ -231,9 +231,8 @@ def _component(path: str | os.PathLike[str] | None, component: str) -> int:
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
     """Return the lines of a CSV, without its header."""
-    existing(path, MatricesError, f"file; expected the columns {', '.join(columns)}")
-    with reading(path, MatricesError, "not a CSV table"), path.open(newline="", encoding="utf-8-sig") as stream:
-        rows = [[word.strip() for word in row] for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    kind = f"file; expected the columns {', '.join(columns)}"
+    rows = [words for _, words in csv_table(path, MatricesError, kind)]
     if rows and rows[0][0].lower() == columns[0]:
         rows = rows[1:]
     for number, row in enumerate(rows, start=1):

@@ -9,7 +9,6 @@ optional dependency.
 from __future__ import annotations
 
 import contextlib
-import csv
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -17,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.csv_input import content_lines
+from vanedamp.files.csv_input import csv_table
 from vanedamp.files.foreign import existing, reading
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
@@ -177,9 +176,9 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
-    rows = _table(file)
+    rows = csv_table(file, MeasurementError)
     header = rows[0][1] if rows else []
-    if [word.strip() for word in header[:6]] != list(_PLACE) or len(header) < 7:
+    if header[:6] != list(_PLACE) or len(header) < 7:
         raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
     names, body = header[6:], rows[1:]
     values = np.empty((len(body), len(header)), dtype=complex)
@@ -202,9 +201,9 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
-    rows, header = [words for _, words in _table(file)], []
+    rows, header = [words for _, words in csv_table(file, MeasurementError)], []
     if rows and np.isnan(_number(rows[0][0])):
-        header, rows = [word.strip() for word in rows[0]], rows[1:]
+        header, rows = rows[0], rows[1:]
     try:
         values = np.array([[float(word) for word in row] for row in rows])
     except ValueError as error:
@@ -212,15 +211,6 @@ def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     if values.ndim != 2:
         raise MeasurementError(f"{file}: holds no rows of numbers")
     return header, values
-
-
-def _table(file: Path) -> list[tuple[int, list[str]]]:
-    """Return number and words of the lines of a CSV file."""
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MeasurementError(f"{file}: not a text file ({error})") from error
-    return [(number, next(csv.reader([line]))) for number, line in content_lines(text)]
 
 
 def _number(word: str) -> float:
