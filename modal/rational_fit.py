@@ -45,10 +45,6 @@ class Rational:
     values: np.ndarray
     power: int
 
-    def best(self, count: int) -> Fit:
-        """Return the fit with `count` poles, from wherever vector fitting finds them."""
-        return self.fit(self.relocated(count))
-
     def fit(self, start: np.ndarray) -> Fit:
         """Return the fit next to the poles (m,) of a start.
 

@@ -226,15 +226,13 @@ class Interface(Displayed):
 
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
         """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
-        if self.motions.nnz == self.motions.shape[1]:  # no rigid patch: free DOFs only
-            free = self.motions.nonzero()[0]
-            stiffness, mass = (matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass))
-        else:
-            stiffness, mass = (
-                sparse.csr_array(self.motions.T @ matrix @ self.motions)
-                for matrix in (matrices.stiffness, matrices.mass)
-            )
-        return stiffness, mass, self.motions.T @ self.vectors
+
+        def restricted(matrix: sparse.csr_array) -> sparse.csr_array:
+            if self.motions.nnz == self.motions.shape[1]:  # no rigid patch: free DOFs only
+                return matrices.of_free(matrix)
+            return sparse.csr_array(self.motions.T @ matrix @ self.motions)
+
+        return restricted(matrices.stiffness), restricted(matrices.mass), self.motions.T @ self.vectors
 
 
 def _resolved(matrices: SystemMatrices, item: InterfaceCoordinate) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
