@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from vanedamp.files.foreign import existing
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing, reading
 from vanedamp.files.toml_input import LARGEST, InputError
 
 
@@ -32,10 +33,17 @@ class CsvRow(NamedTuple):
         return value
 
 
-def content_lines(text: str) -> list[tuple[int, str]]:
-    """Return number, from 1, and text of the lines that are neither blank nor comments, which begin with #."""
-    lines = enumerate(text.splitlines(), 1)
-    return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
+def csv_table(path: str | Path, error: type[VanedampError], kind: str = "file") -> list[tuple[int, list[str]]]:
+    """Return number, from 1, and words of the lines that are neither blank nor comments, which begin with #.
+
+    kind: what messages call the file. Raises `error`.
+    """
+    file = existing(path, error, kind)
+    with reading(file, error, "not a CSV table"):
+        lines = enumerate(file.read_text(encoding="utf-8-sig").splitlines(), 1)
+        content = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
+        # line by line, so that no quotation mark joins two of them
+        return [(number, [word.strip() for word in next(csv.reader([line]))]) for number, line in content]
 
 
 def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[CsvRow]:
@@ -43,25 +51,16 @@ def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[C
 
     The first line names the columns, in any order. Raises InputError.
     """
-    file = existing(path, InputError)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from None
-    lines = content_lines(text)
-    try:  # line by line, so that no quotation mark joins two of them
-        table = [[word.strip() for word in next(csv.reader([line]))] for _, line in lines]
-    except csv.Error as error:
-        raise InputError(f"{path}: is no CSV table ({error})") from None
+    table = csv_table(path, InputError)
     if not table:
         raise InputError(f"{path}: is empty; expected the header {','.join(columns)}, then rows")
-    header, *body = table
+    (first, header), *body = table
     if sorted(header) != sorted(columns):
-        raise InputError(f"{path}: line {lines[0][0]}: expected the header {','.join(columns)}, not {','.join(header)}")
+        raise InputError(f"{path}: line {first}: expected the header {','.join(columns)}, not {','.join(header)}")
     if len(body) < least:
         raise InputError(f"{path}: expected at least {least} row{'s' * (least > 1)} below the header, not {len(body)}")
     rows = []
-    for (number, _), words in zip(lines[1:], body, strict=True):
+    for number, words in body:
         if len(words) != len(header):
             raise InputError(f"{path}: line {number}: expected {len(header)} values, not {len(words)}")
         rows.append(CsvRow(f"{path}: line {number}", dict(zip(header, words, strict=True))))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
 Matrix = TypeVar("Matrix")
 
-# share of a field (in its squared norm) that the others and the blocks must not determine
+# fraction of a field (in its squared norm) that the others and the blocks must not determine
 _OWN_SHARE = 1e-10
 
 
@@ -40,8 +40,37 @@ def orthonormal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray] = ())
     return np.asarray(rest @ (turns[:, own] / np.sqrt(values[own])))
 
 
+def krylov(
+    start: np.ndarray,
+    solve: Callable[[np.ndarray], np.ndarray],
+    mass: Any,
+    count: int,
+    select: Callable[[np.ndarray, list[np.ndarray]], np.ndarray] = lambda block, before: block,
+) -> list[np.ndarray]:
+    """Return up to `count` blocks (n, j <= m) of the Krylov space of K^-1 M, M-orthonormal: quasi-static modes.
+
+    start   (n, m) fields that span the first block
+    solve   K^-1 applied to loads (n, m)
+    select  the part of a block to keep, from the block and those before; left out: all of it
+
+    Each block is the static response to the inertia of the one before: it says how the structure lags behind that, to
+    the next order in omega^2 (Craig and Hale 1988, J. Guidance 11(6), block-Krylov component synthesis). It has no
+    combinations that the blocks before have; there are fewer blocks where nothing is left.
+    """
+    blocks: list[np.ndarray] = []
+    for _ in range(count):
+        fields = solve(mass @ blocks[-1]) if blocks else start
+        block = orthonormal(fields, mass, blocks)
+        if block.shape[1]:
+            block = select(block, blocks)
+        if not block.shape[1]:
+            break
+        blocks.append(block)
+    return blocks
+
+
 def ritz_values(stiffness: Any, mass: Any, fields: np.ndarray) -> np.ndarray:
-    """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one a dimension of it."""
+    """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one per dimension of it."""
     left, singular, _ = np.linalg.svd(fields, full_matrices=False)
     basis = orthonormal(left[:, singular > 1e-8 * singular[0]], mass)
     return np.linalg.eigvalsh(symmetric_part(basis.T @ (stiffness @ basis)))

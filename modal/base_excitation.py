@@ -69,8 +69,5 @@ def base_response(
         residual = observed.T @ static_shape(matrices, load) - (factors / own**2) @ seen
         relative = relative - residual[:, None]
     rigid = observed.T @ translation
-    return BaseResponse(frozen(omega / (2.0 * np.pi)), frozen(relative, complex), _absolute(rigid, omega, relative))
-
-
-def _absolute(rigid: np.ndarray, omega: np.ndarray, relative: np.ndarray) -> np.ndarray:
-    return frozen(rigid[:, None] - omega**2 * relative, complex)
+    absolute = rigid[:, None] - omega**2 * relative
+    return BaseResponse(frozen(omega / (2.0 * np.pi)), frozen(relative, complex), frozen(absolute, complex))

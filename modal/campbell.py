@@ -1,13 +1,13 @@
 """Campbell diagram: natural frequencies of a rotating structure over its speed, and where engine orders meet them.
 
-All in the frame that turns with the structure, where an excitation at rest has the frequencies k * speed / (2 pi).
+All in the rotating frame, where an excitation at rest has the frequencies k * speed / (2 pi).
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -33,7 +33,7 @@ class Crossing:
     """A natural frequency met by an engine order.
 
     mode          counted from 0
-    order         periods a revolution
+    order         periods per revolution
     speed         rad/s
     frequency_hz  of both
     """
@@ -81,10 +81,8 @@ class Campbell:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, dtype in (("asked", bool), ("modes", np.int64)):
+        for name, (_, _, _, dtype) in _ARRAYS.items():
             object.__setattr__(self, name, store.frozen(getattr(self, name), dtype))
-        for name in ("speeds", "frequencies_hz", "errors", "solved"):
-            object.__setattr__(self, name, store.frozen(getattr(self, name)))
         object.__setattr__(self, "provenance", dict(self.provenance))
 
     @property
@@ -122,21 +120,15 @@ class Campbell:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an HDF5 record."""
         variables = {
-            "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
-            "asked": store.Variable(self.asked.astype(np.int8), ("speed",)),
-            "mode": store.Variable(self.modes, ("mode",)),
-            "frequency": store.Variable(self.frequencies_hz, ("mode", "speed"), "Hz"),
-            "error": store.Variable(self.errors, ("speed",)),
-            "solved_speed": store.Variable(self.solved, ("solution",), "rad/s"),
-            "engine_order": store.Variable(np.array(self.orders, dtype=float), ("engine_order",)),
+            name: store.Variable(getattr(self, own).astype(np.int8 if dtype is bool else dtype), dims, units)
+            for own, (name, dims, units, dtype) in _ARRAYS.items()
         }
-        for prefix, dimension, rows, names in (
-            ("crossing", "crossing", self.crossings, _CROSSING),
-            ("approach", "approach", self.approaches, _APPROACH),
-        ):
-            for name, (dtype, units) in names.items():
+        variables["engine_order"] = store.Variable(np.array(self.orders, dtype=float), ("engine_order",))
+        for kind, (_, columns) in _TABLES.items():
+            rows = self.crossings if kind == "crossing" else self.approaches
+            for name, (dtype, units) in columns.items():
                 values = np.array([getattr(row, name) for row in rows], dtype=dtype)
-                variables[f"{prefix}_{name}"] = store.Variable(values, (dimension,), units)
+                variables[f"{kind}_{name}"] = store.Variable(values, (kind,), units)
         attributes = {
             "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance)
         }  # fmt: skip
@@ -147,30 +139,39 @@ class Campbell:
     def load(cls, path: str | os.PathLike[str]) -> Campbell:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)
-
-        def rows(prefix: str, names: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-            columns = [
-                [str(v) if d is object else v.item() for v in values[f"{prefix}_{n}"]] for n, (d, _) in names.items()
-            ]
-            return (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
-
+        crossings, approaches = (
+            tuple(made(*row) for row in zip(*(values[f"{kind}_{name}"].tolist() for name in columns), strict=True))
+            for kind, (made, columns) in _TABLES.items()
+        )
         return cls(
-            values["speed"], values["asked"], values["mode"], values["frequency"], values["error"],
-            values["solved_speed"], tuple(values["engine_order"].tolist()),
-            tuple(Crossing(**row) for row in rows("crossing", _CROSSING)),
-            tuple(Approach(**row) for row in rows("approach", _APPROACH)),
-            bool(attributes["gyroscopic"]), tuple(json.loads(attributes["warnings"])),
-            json.loads(attributes["provenance"]),
-        )  # fmt: skip
+            **{own: values[name] for own, (name, *_) in _ARRAYS.items()},
+            orders=tuple(values["engine_order"].tolist()),
+            crossings=crossings,
+            approaches=approaches,
+            gyroscopic=bool(attributes["gyroscopic"]),
+            warnings=tuple(json.loads(attributes["warnings"])),
+            provenance=json.loads(attributes["provenance"]),
+        )
 
 
-#: columns of the tables by their fields: type and unit
-_CROSSING: dict[str, tuple[Any, str]] = {
-    "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
-}  # fmt: skip
-_APPROACH: dict[str, tuple[Any, str]] = {
-    "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
-    "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),
+#: arrays by their fields: name, dimensions and unit in the record, and type
+_ARRAYS: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
+    "speeds": ("speed", ("speed",), "rad/s", float),
+    "asked": ("asked", ("speed",), "1", bool),
+    "modes": ("mode", ("mode",), "1", np.int64),
+    "frequencies_hz": ("frequency", ("mode", "speed"), "Hz", float),
+    "errors": ("error", ("speed",), "1", float),
+    "solved": ("solved_speed", ("solution",), "rad/s", float),
+}
+#: crossings and approaches: columns by their fields, in order, with type and unit
+_TABLES: dict[str, tuple[Callable[..., Any], dict[str, tuple[Any, str]]]] = {
+    "crossing": (Crossing, {
+        "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
+    }),
+    "approach": (Approach, {
+        "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
+        "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),
+    }),
 }  # fmt: skip
 
 

@@ -34,7 +34,7 @@ class CorrelationError(VanedampError):
 class MeasuredShapes:
     """Mode shapes at measured degrees of freedom: displacements at points along directions.
 
-    points          (p, 3) m, one row a measured displacement; three rows of one point for a triaxial sensor
+    points          (p, 3) m, one row per measured displacement; three rows of one point for a triaxial sensor
     directions      (p, 3), scaled to length one
     shapes          (m, p), real or complex, of any scale
     frequencies_hz  (m,), nan where not known
@@ -131,7 +131,10 @@ def interpolation(coordinates: np.ndarray, points: np.ndarray, directions: np.nd
     it needs no elements, so that shapes of other meshes and codes can be compared.
     """
     nodes, weights = _affine_weights(coordinates, points)
-    return _functionals(nodes, weights, directions, len(coordinates))
+    rows = np.repeat(np.arange(len(nodes)), 3 * nodes.shape[1])
+    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
+    values = (weights[:, :, None] * directions[:, None, :]).ravel()
+    return sparse.csr_array((values, (rows, columns)), shape=(len(nodes), coordinates.size))
 
 
 def observed_shapes(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes) -> np.ndarray:
@@ -209,11 +212,3 @@ def _affine_weights(coordinates: np.ndarray, points: np.ndarray) -> tuple[np.nda
     at_node = distances[:, 0] <= 1e-9 * reach[:, 0]
     fitted[at_node] = np.eye(count)[0]
     return nodes, fitted
-
-
-def _functionals(nodes: np.ndarray, weights: np.ndarray, directions: np.ndarray, n_nodes: int) -> sparse.csr_array:
-    """Return rows (p, 3 n_nodes) that weigh nodes (p, k) along directions (p, 3)."""
-    rows = np.repeat(np.arange(len(nodes)), 3 * nodes.shape[1])
-    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
-    values = (weights[:, :, None] * directions[:, None, :]).ravel()
-    return sparse.csr_array((values, (rows, columns)), shape=(len(nodes), 3 * n_nodes))

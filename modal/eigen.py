@@ -16,7 +16,7 @@ from vanedamp.files.display import Displayed
 from vanedamp.modal import petsc
 from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.modal.petsc import Factorization, SolverError
+from vanedamp.modal.petsc import Factorization, SolverError, factorize
 
 __all__ = [
     "Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
@@ -31,7 +31,7 @@ SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
 _SLICE = 50
-# of a share of stiffness that is stable
+# relative, of a fraction of a stiffness that is stable
 _SHARE_DIGITS = 1e-3
 
 
@@ -106,8 +106,7 @@ def solve_modes(
     zero frequency: those whose strain energy is within round-off. Raises SolverError for a count that the structure
     does not have, no mode in the range, or no convergence.
     """
-    free = matrices.free
-    pencil = _Pencil(*(matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass)))
+    free, pencil = matrices.free, _Pencil.of(matrices)
     floor = _SHIFT * _straining_eigenvalue(matrices)
     if max_frequency is None:
         if not 1 <= count <= free.size:
@@ -131,17 +130,15 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
     """Return the number of modes below a frequency, exactly, from the inertia of K - (2 pi f)^2 M."""
     if not frequency_hz > 0.0:
         raise SolverError(f"frequency: expected a positive number of Hz, not {frequency_hz}")
-    free = matrices.free
-    return _Pencil(*(m[free][:, free] for m in (matrices.stiffness, matrices.mass))).below(_eigenvalue(frequency_hz))
+    return _Pencil.of(matrices).below(_eigenvalue(frequency_hz))
 
 
 def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
-    """Return the largest share (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
+    """Return the largest fraction (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
 
     Stable: the free stiffness is positive definite, as it is without the addition. To three digits below 1.
     """
-    free = matrices.free
-    given, added = matrices.stiffness[free][:, free], added[free][:, free]
+    given, added = matrices.of_free(matrices.stiffness), matrices.of_free(added)
 
     def unstable(share: float) -> bool:
         return petsc.negative_eigenvalues(sparse.csr_array(given + share * added)) > 0
@@ -157,19 +154,10 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
     return low
 
 
-def factorize(matrix: sparse.csr_array) -> Factorization:
-    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (CHOLMOD, or MUMPS' LDL^T).
-
-    The result solves for right-hand sides (n,) or (n, k) with `.solve`; `.destroy()` or the end of a `with` block
-    frees it. Raises SolverError for a singular matrix.
-    """
-    return petsc.factorized(matrix)
-
-
 def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
     """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
     free, shape = matrices.free, np.zeros(matrices.size)
-    with factorize(matrices.stiffness[free][:, free]) as factors:
+    with factorize(matrices.of_free(matrices.stiffness)) as factors:
         shape[free] = factors.solve(load[free])
     return shape
 
@@ -179,6 +167,10 @@ class _Pencil(NamedTuple):
 
     stiffness: sparse.csr_array
     mass: sparse.csr_array
+
+    @classmethod
+    def of(cls, matrices: SystemMatrices) -> _Pencil:
+        return cls(matrices.of_free(matrices.stiffness), matrices.of_free(matrices.mass))
 
     def below(self, eigenvalue: float) -> int:
         """Return the number of eigenvalues below one."""

@@ -21,6 +21,14 @@ from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
+_NO_CENTRIFUGAL_SOLUTION = (
+    "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no static "
+    "solution; clamp a group in [support], or give it springs"
+)
+_NO_THERMAL_SOLUTION = (
+    "temperature: the structure is not held against every rigid motion, so that its thermal stress has no static "
+    "solution; hold it in [support] as it can expand, or leave out expansion"
+)
 
 
 class ElasticityError(VanedampError):
@@ -107,7 +115,7 @@ class Solid:
     materials    volume group -> Material; the key "default" serves every group that is not named
     degree       of the displacements, 1 to 3; 2 is right for bending
     elastic      facet group -> ElasticSupport
-    scale        metres a unit of length of the file
+    scale        metres per unit of length of the file
     temperature  of the structure: it changes the moduli, and what cannot expand is under stress
 
     Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh, TemperatureError for the
@@ -132,7 +140,8 @@ class Solid:
         self.degree = degree
         self.materials = _by_group(materials, self.domain)
         self.elastic = dict(elastic or {})
-        self.space = fenicsx.vector_space(self.domain, degree)
+        self.space = fenicsx.vector_space(self.domain.mesh, degree)
+        self._trial, self._test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.temperature = temperature
         self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
@@ -153,14 +162,13 @@ class Solid:
         part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them.
         Raises UnstableError for a temperature at which the structure has buckled.
         """
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         patches = {name: self._patch(name) for name in self.domain.groups}
         stiffness = self._material_stiffness(ufl.dx)
         for name in self.elastic:
             stiffness = stiffness + self._support_stiffness(name)
         unheated = SystemMatrices(
             stiffness=stiffness,
-            mass=fenicsx.matrix(self._density * ufl.inner(trial, test) * ufl.dx),
+            mass=fenicsx.matrix(self._density * ufl.inner(self._trial, self._test) * ufl.dx),
             coordinates=fenicsx.node_coordinates(self.space),
             fixed=self._fixed(clamped),
             patches=patches,
@@ -189,14 +197,7 @@ class Solid:
         direction, origin = unit_direction(axis), np.array(point, dtype=float)
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
-        try:
-            displacement = static_shape(matrices, load)
-        except SolverError:
-            raise ElasticityError(
-                "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no "
-                "static solution; clamp a group in [support], or give it springs"
-            ) from None
-        stress = self.stress(fenicsx.field(self.space, displacement))
+        stress = self.stress(self._static(matrices, load, _NO_CENTRIFUGAL_SOLUTION))
         return RotatingMatrices(
             standing=matrices,
             centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
@@ -213,18 +214,17 @@ class Solid:
         That of thermal stress is none of them.
         """
         parts = {
-            f"material.{name}": self._material_stiffness(fenicsx.over_cells(self.domain, cells))
+            f"material.{name}": self._material_stiffness(fenicsx.over(self.domain, 3, cells))
             for name, cells in self.domain.volumes.items()
         }
         return parts | {f"support.{name}": self._support_stiffness(name) for name in self.elastic}
 
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
         """Return von Mises stresses, Pa, of displacements (N,) at the corners of all cells, each from its own cell."""
-        if np.shape(displacement) != (3 * len(fenicsx.node_coordinates(self.space)),):
-            raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
+        self._check_size(displacement)
         deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
+        return np.array(fenicsx.evaluator(equivalent, fenicsx.discontinuous_space(self.domain, 1))().x.array)
 
     def stress_components(self, displacements: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
         """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,), where `von_mises` has its values.
@@ -232,11 +232,10 @@ class Solid:
         Of several displacements (m, N) the stresses (m, 6, k). points: indices of the places wanted; default: all. They
         are linear in the displacements.
         """
+        self._check_size(displacements, 2)
         given = np.atleast_2d(displacements)
-        if np.ndim(displacements) > 2 or given.shape[1] != 3 * len(fenicsx.node_coordinates(self.space)):
-            raise ElasticityError(f"displacement: shape {np.shape(displacements)} is not that of this mesh and degree")
         space = fenicsx.discontinuous_space(self.domain, 1)
-        cells = None if points is None else fenicsx.cells_of(self.domain, space, np.asarray(points))
+        cells = None if points is None else fenicsx.cells_of(space, np.asarray(points))
         places = slice(None) if points is None else np.asarray(points)
         moved = fenicsx.field(self.space, given[0])
         stress = self.stress(moved)
@@ -275,15 +274,8 @@ class Solid:
         reference = self.temperature.reference
         strain = self._field(lambda material, values: material.expansion * (values - reference))
         pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
-        load = fenicsx.vector(pressure * ufl.div(ufl.TestFunction(self.space)) * ufl.dx)
-        try:
-            displacement = static_shape(matrices, load)
-        except SolverError:
-            raise ElasticityError(
-                "temperature: the structure is not held against every rigid motion, so that its thermal stress has no "
-                "static solution; hold it in [support] as it can expand, or leave out expansion"
-            ) from None
-        stress = self.stress(fenicsx.field(self.space, displacement)) - pressure * ufl.Identity(3)
+        load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
+        stress = self.stress(self._static(matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
         added = self._geometric_stiffness(stress)
         share = stable_share(matrices, added)
         if share < 1.0:
@@ -293,26 +285,36 @@ class Solid:
             )
         return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
 
+    def _static(self, matrices: SystemMatrices, load: np.ndarray, without: str) -> Any:
+        """Return the displacements under a static load as a function; without: the error where there are none."""
+        try:
+            return fenicsx.field(self.space, static_shape(matrices, load))
+        except SolverError:
+            raise ElasticityError(without) from None
+
+    def _check_size(self, displacements: np.ndarray, most: int = 1) -> None:
+        """Raise ElasticityError for displacements that are not (N,), or (m, N) where `most` is 2."""
+        shape = np.shape(displacements)
+        if not 1 <= len(shape) <= most or shape[-1] != 3 * len(fenicsx.node_coordinates(self.space)):
+            raise ElasticityError(f"displacement: shape {shape} is not that of this mesh and degree")
+
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        return fenicsx.matrix(ufl.inner(self.stress(trial), ufl.sym(ufl.grad(test))) * measure)
+        return fenicsx.matrix(ufl.inner(self.stress(self._trial), ufl.sym(ufl.grad(self._test))) * measure)
 
     def _geometric_stiffness(self, stress: Any) -> sparse.csr_array:
         """Return the matrix of the integral of sigma_jk u_i,j v_i,k: the stiffness of a stress at rest."""
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         # exact for straight tetrahedra; the degree that UFL estimates takes four times as many points in hexahedra
         measure = ufl.dx(metadata={"quadrature_degree": 2 * self.degree + 1})
-        return fenicsx.matrix(ufl.inner(ufl.grad(trial) * stress, ufl.grad(test)) * measure)
+        return fenicsx.matrix(ufl.inner(ufl.grad(self._trial) * stress, ufl.grad(self._test)) * measure)
 
     def _support_stiffness(self, name: str) -> sparse.csr_array:
-        support, domain = self.elastic[name], self.domain
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        support, domain, trial = self.elastic[name], self.domain, self._trial
         axes = fenicsx.constant(domain, support.stiffness)
         normal, tangential = (fenicsx.constant(domain, value) for value in (support.normal, support.tangential))
         outward = ufl.FacetNormal(domain.mesh)
         traction = ufl.as_vector([axes[i] * trial[i] for i in range(3)]) + tangential * trial
         traction += (normal - tangential) * ufl.inner(trial, outward) * outward
-        return fenicsx.matrix(ufl.inner(traction, test) * fenicsx.over_facets(domain, domain.facet_group(name)))
+        return fenicsx.matrix(ufl.inner(traction, self._test) * fenicsx.over(domain, 2, domain.facet_group(name)))
 
     def _nodes(self, name: str) -> np.ndarray:
         parts = [fenicsx.group_nodes(self.space, group, dimension) for dimension, group in self.domain.group(name)]

@@ -87,16 +87,18 @@ class Domain:
         if name not in self.groups:
             kinds = {"edge": self.edges, "point": self.points}
             lower = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
-            known = ", ".join(sorted(self.facets)) or "none"
-            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{lower}")
+            raise self._no_facets(name, lower)
         return self.groups[name]
 
     def facet_group(self, name: str) -> np.ndarray:
         """Return the facet indices of a group. Raises MeshError with the groups that exist."""
         if name not in self.facets:
-            known = ", ".join(sorted(self.facets)) or "none"
-            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}")
+            raise self._no_facets(name)
         return self.facets[name]
+
+    def _no_facets(self, name: str, others: str = "") -> MeshError:
+        known = ", ".join(sorted(self.facets)) or "none"
+        return MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{others}")
 
 
 def versions() -> dict[str, str]:
@@ -116,33 +118,25 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
         try:
             _prepare_groups()
             lines, nodes = msh.taken(1), msh.taken(0)
+            names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
+            with _compiling():
+                # three fields up to 0.9, more after them since
+                mesh, cells, tags = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
+            mesh.geometry.x[:] *= scale
+            edges, points = _lower_groups(mesh, lines, nodes)
+            facets = _members(tags, names[2])
+            _check_boundary(mesh.topology, facets)
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
-        names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
-        with _compiling():
-            # three fields up to 0.9, more after them since
-            mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
-    mesh.geometry.x[:] *= scale
-    try:
-        edges, points = _lower_groups(mesh, lines, nodes)
-    except MeshError as error:
-        raise MeshError(f"{file}: {error}") from error
-    domain = Domain(
-        mesh=mesh,
-        volumes=_members(cells, names[3]),
-        facets=_members(facets, names[2]),
-        edges=edges,
-        points=points,
-        path=str(file),
-        sha256=digest(file),
-    )
-    _check_boundary(domain)
-    return domain
+    return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), digest(file))
 
 
-def vector_space(domain: Domain, degree: int) -> Any:
-    """Return the continuous Lagrange displacements of a degree, three components a node."""
-    return _vectors(domain.mesh, degree)
+def vector_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous Lagrange displacements of a degree on a dolfinx mesh, three components per node."""
+    with _compiling():
+        if hasattr(fem, "functionspace"):
+            return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
+        return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
 def discontinuous_space(domain: Domain, degree: int) -> Any:
@@ -156,7 +150,7 @@ def discontinuous_space(domain: Domain, degree: int) -> Any:
 def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
     """Return a function that is constant in every cell, its value given by volume group."""
     function = fem.Function(discontinuous_space(domain, 0))
-    dofs = _array(function.function_space.dofmap.list)
+    dofs = _cell_dofs(function.function_space)
     for name, value in values.items():
         function.x.array[dofs[domain.volumes[name]]] = value
     return function
@@ -167,7 +161,7 @@ def cell_functions(domain: Domain, values: Callable[[str, np.ndarray], np.ndarra
     space = discontinuous_space(domain, 1)
     function = fem.Function(space)
     places = node_coordinates(space)
-    dofs = _array(space.dofmap.list).reshape(domain.mesh.topology.index_map(3).size_local, -1)
+    dofs = _cell_dofs(space)
     for name, cells in domain.volumes.items():
         inside = dofs[cells].ravel()
         function.x.array[inside] = values(name, places[inside])
@@ -214,14 +208,11 @@ def vector(form: Any) -> np.ndarray:
     return np.array(fem.assemble_vector(compiled).array)
 
 
-def over_facets(domain: Domain, facets: np.ndarray) -> Any:
-    """Return the UFL measure of the integral over boundary facets."""
-    return _measure("ds", domain, 2, facets)
-
-
-def over_cells(domain: Domain, cells: np.ndarray) -> Any:
-    """Return the UFL measure of the integral over cells."""
-    return _measure("dx", domain, 3, cells)
+def over(domain: Domain, dimension: int, entities: np.ndarray) -> Any:
+    """Return the UFL measure of the integral over boundary facets (dimension 2) or cells (3)."""
+    # one tag value for all groups, so that one compiled form serves them all
+    tags = dolfinx.mesh.meshtags(domain.mesh, dimension, entities, np.ones_like(entities))
+    return ufl.Measure({2: "ds", 3: "dx"}[dimension], domain=domain.mesh, subdomain_data=tags)(1)
 
 
 def constant(domain: Domain, values: float | Sequence[float]) -> Any:
@@ -232,14 +223,14 @@ def constant(domain: Domain, values: float | Sequence[float]) -> Any:
 def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
     """Return the integral (n_nodes,), m^2, of every nodal shape function over the facets."""
     along_x = constant(domain, [1.0, 0.0, 0.0])
-    return vector(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets)).reshape(-1, 3)[:, 0]
+    return vector(ufl.inner(along_x, ufl.TestFunction(space)) * over(domain, 2, facets)).reshape(-1, 3)[:, 0]
 
 
 def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     """Return the integral (3,), m^2, of the outward unit normal over boundary facets."""
     axis = constant(domain, [1.0, 0.0, 0.0])
     with _compiling():
-        compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over_facets(domain, facets))
+        compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over(domain, 2, facets))
     found = np.empty(3)
     for i, unit in enumerate(np.eye(3)):
         axis.value[:] = unit
@@ -247,15 +238,11 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     return found
 
 
-def evaluate(expression: Any, space: Any) -> Any:
-    """Return the function of a space that takes the values of a UFL expression at the space's own points."""
-    return evaluator(expression, space)()
-
-
 def evaluator(expression: Any, space: Any, cells: np.ndarray | None = None) -> Callable[[], Any]:
-    """Return what `evaluate` is of an expression whose functions change: called, it takes their values as they are.
+    """Return a call that gives the function of a space with the values of a UFL expression at the space's own points.
 
-    cells: those in which the values are wanted; default: all.
+    It takes the functions in the expression as they are when it is called. cells: those in which the values are
+    wanted; default: all.
     """
     points = space.element.interpolation_points
     function = fem.Function(space)
@@ -269,10 +256,9 @@ def evaluator(expression: Any, space: Any, cells: np.ndarray | None = None) -> C
     return values
 
 
-def cells_of(domain: Domain, space: Any, dofs: np.ndarray) -> np.ndarray:
+def cells_of(space: Any, dofs: np.ndarray) -> np.ndarray:
     """Return the sorted cells (int32) that have any of the DOFs of a discontinuous space."""
-    table = _array(space.dofmap.list).reshape(domain.mesh.topology.index_map(3).size_local, -1)
-    return np.flatnonzero(np.isin(table, dofs).any(axis=1)).astype(np.int32)
+    return np.flatnonzero(np.isin(_cell_dofs(space), dofs).any(axis=1)).astype(np.int32)
 
 
 def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
@@ -280,7 +266,7 @@ def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.Pa
     # XDMF carries one set of nodes
     geometry = space.mesh.geometry
     coordinate_map = geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
-    at_nodes = _vectors(space.mesh, coordinate_map.degree)
+    at_nodes = vector_space(space.mesh, coordinate_map.degree)
     with dolfinx.io.XDMFFile(MPI.COMM_SELF, os.fspath(path), "w") as file:
         file.write_mesh(space.mesh)
         for name, values in fields.items():
@@ -298,7 +284,7 @@ def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _prepare_groups() -> None:
-    """Refuse faults that dolfinx's reader does not report, and bring the model to a form that every version reads."""
+    """Reject faults that dolfinx's reader does not report, and bring the model to a form that every version reads."""
     _check_kinds()
     grouped = {
         entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()
@@ -330,17 +316,9 @@ def _check_kinds() -> None:
             raise MeshError(f"facets are not of the volume elements' order {order}; set the order of the whole mesh")
 
 
-def _measure(kind: str, domain: Domain, dimension: int, entities: np.ndarray) -> Any:
-    # one tag value for all groups, so that one compiled form serves them all
-    tags = dolfinx.mesh.meshtags(domain.mesh, dimension, entities, np.ones_like(entities))
-    return ufl.Measure(kind, domain=domain.mesh, subdomain_data=tags)(1)
-
-
-def _vectors(mesh: Any, degree: int) -> Any:
-    with _compiling():
-        if hasattr(fem, "functionspace"):
-            return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
-        return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+def _cell_dofs(space: Any) -> np.ndarray:
+    """Return the DOFs (cells, k) of every cell."""
+    return _array(space.dofmap.list).reshape(space.mesh.topology.index_map(3).size_local, -1)
 
 
 def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:
@@ -388,15 +366,14 @@ def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.nd
     return np.unique(order[places]).astype(np.int32)
 
 
-def _check_boundary(domain: Domain) -> None:
-    topology = domain.mesh.topology
+def _check_boundary(topology: Any, groups: Mapping[str, np.ndarray]) -> None:
     topology.create_connectivity(2, 3)
     neighbours = np.diff(topology.connectivity(2, 3).offsets)
-    for name, facets in domain.facets.items():
+    for name, facets in groups.items():
         if facets.size == 0 or np.any(neighbours[facets] != 1):
             raise MeshError(
-                f"{domain.path}: facet group {name!r} is not on the boundary of the meshed volumes; "
-                "interfaces and supports act on outer faces"
+                f"facet group {name!r} is not on the boundary of the meshed volumes; interfaces and supports act on "
+                "outer faces"
             )
 
 

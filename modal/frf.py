@@ -14,14 +14,14 @@ from vanedamp.modal.rational_fit import Fit, Rational
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 #: and their units per force
 UNITS = {"receptance": "m/N", "mobility": "m/(N s)", "accelerance": "m/(N s^2)"}
-# share of a damping ratio: a standard deviation above it means that the response does not determine the pole
+# fraction of a damping ratio: a standard deviation above it means that the response does not determine the pole
 _UNCERTAIN = 0.5
-# share of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
+# fraction of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
 _NARROW = 0.5
 # root mean square of the error over that of the response: where more is missed the fit is not of this response. Noise
 # of a tenth of the peak over forty bandwidths leaves 0.41
 _MISFIT = 0.5
-# share of its misfit that a response read as decibels has at most where it is one in decibels; of linear responses,
+# fraction of its misfit that a response read as decibels has at most where it is one in decibels; of linear responses,
 # with noise up to a tenth of the peak, it is 0.9 and more
 _DECIBELS = 0.5
 # highest probability that noise explains a mode
@@ -129,7 +129,7 @@ def identify(frf: Frf, count: int = 1) -> Poles:
     s = 2j * np.pi * frf.frequencies_hz
     scale, size = np.abs(s).max(), np.abs(frf.values).max()
     problem = Rational(s / scale, frf.values / size, QUANTITIES[frf.quantity])
-    found = problem.best(count)
+    found = problem.fit(problem.relocated(count))
     order = np.argsort(np.abs(found.poles))
     poles = found.poles[order]
     fitted, residues = problem.solve(poles)
@@ -184,7 +184,7 @@ def _span(frf: Frf) -> str:
 
 
 def _check(poles: Poles, frf: Frf) -> None:
-    """Refuse poles that are no damped modes of the band, or that its lines do not resolve."""
+    """Reject poles that are no damped modes of the band, or that its lines do not resolve."""
     axis = frf.frequencies_hz
     span = _span(frf)
     for frequency, ratio, (_, deviation) in zip(
@@ -213,7 +213,7 @@ def _check(poles: Poles, frf: Frf) -> None:
 
 
 def _check_misfit(poles: Poles, frf: Frf) -> None:
-    """Refuse a fit that misses the response as a whole or around one of its poles."""
+    """Reject a fit that misses the response as a whole or around one of its poles."""
     missed = {f"the band {_span(frf)}": poles.misfit}
     for frequency, ratio in zip(poles.frequencies_hz, poles.damping_ratios, strict=True):
         # wide enough for one line of those that the least bandwidth allows

@@ -1,6 +1,6 @@
 """Complex modes of a structure that rotates, with the gyroscopic coupling.
 
-Motions Re(x exp(i omega t)) in the frame that turns with the structure solve the Hermitian problem
+Motions Re(x exp(i omega t)) in the rotating frame solve the Hermitian problem
 
     Q(omega) x = (K + i omega W G - omega^2 M) x = 0,    K = K0 + W^2 K1.
 
@@ -21,15 +21,13 @@ from scipy import linalg, sparse
 from vanedamp.files import store
 from vanedamp.modal import petsc
 from vanedamp.modal.algebra import orthonormal, symmetric_part
-from vanedamp.modal.eigen import SolverError, factorize, shape_signs, solve_modes
+from vanedamp.modal.eigen import SPARE, SolverError, factorize, shape_signs, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
 # residual of a mode; round-off leaves some 1e-8 of a slender beam's first one
 _TOLERANCE = 1e-6
 # corrections of a mode, each as good as a step of a Krylov method, after which something is wrong
 _ROUNDS = 30
-# modes beyond those asked for, among which the gap is sought where they are counted
-_SPARE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +66,9 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     """
     matrices = rotating.at(speed)
     free = matrices.free
-    stiffness, mass, gyroscopic = (
-        matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass, rotating.gyroscopic)
-    )
+    stiffness, mass, gyroscopic = map(matrices.of_free, (matrices.stiffness, matrices.mass, rotating.gyroscopic))
     pencil = _Pencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
-    still = solve_modes(matrices, max(count, min(count + _SPARE, free.size)))
+    still = solve_modes(matrices, max(count, min(count + SPARE, free.size)))
     omega, shapes, residuals = _converged(pencil, still.shapes[:, free].T)
     if count < omega.size:
         ceiling, below = _known_count(still.angular_frequencies, speed, count) or _count(pencil, omega, count)

@@ -31,7 +31,7 @@ class MatricesError(VanedampError):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A group of nodes and their shares of the patch.
+    """A group of nodes and their weights in the patch.
 
     nodes    (k,) node indices, each once
     weights  (k,) m^2, integral of the node's shape function over the facet group; ones for nodes of edges and points
@@ -55,11 +55,10 @@ class Patch:
             raise MatricesError("patch: a node occurs twice; list every node once and add up its weights")
         if not np.all(np.isfinite(weights)) or weights.sum() <= 0.0:
             raise MatricesError(f"patch: weights must be finite with a positive sum (an area), not {weights.sum()}")
-        object.__setattr__(self, "nodes", nodes)
         if normal.shape != (3,) or not np.all(np.isfinite(normal)):
             raise MatricesError(f"patch: normal must be three numbers, not {self.normal}")
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "normal", normal)
+        for name, value in (("nodes", nodes), ("weights", weights), ("normal", normal)):
+            object.__setattr__(self, name, value)
 
     @property
     def area(self) -> float:
@@ -122,6 +121,10 @@ class SystemMatrices(Displayed):
         mask[self.fixed] = False
         return np.flatnonzero(mask)
 
+    def of_free(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """Return the rows and columns of a matrix (N, N) that belong to the free DOFs."""
+        return matrix[self.free][:, self.free]
+
     def rigid_translations(self) -> np.ndarray:
         """Return unit translations (N, 3) of every DOF along x, y and z."""
         return np.tile(np.eye(3), (len(self.coordinates), 1))
@@ -142,7 +145,7 @@ class SystemMatrices(Displayed):
     def movable_mass(self) -> np.ndarray:
         """Mass (3,) along x, y and z, kg: r^T M r of the free DOFs, the sum of the effective masses of all modes.
 
-        Less than the total mass by the share of the elements at the supports that their fixed nodes carry.
+        Less than the total mass by the part of the elements at the supports that their fixed nodes carry.
         """
         translations = self.movable_translations()
         return np.einsum("ij,ij->j", translations, self.mass @ translations)
@@ -188,13 +191,12 @@ class SystemMatrices(Displayed):
             for label, start, stop, normal in zip(values["patch"], offsets[:-1], offsets[1:], normals, strict=True)
         }
         size = values["coordinates"].size
-        stiffness, mass = (
-            sparse.csr_array((values[name], values[f"{name}_column"], values[f"{name}_row_start"]), shape=(size, size))
+        found = {
+            name: sparse.csr_array((values[name], values[f"{name}_column"], values[f"{name}_row_start"]), (size, size))
             for name in ("stiffness", "mass")
-        )
+        }
         return cls(
-            stiffness=stiffness,
-            mass=mass,
+            **found,
             coordinates=values["coordinates"],
             fixed=values["fixed"],
             patches=patches,

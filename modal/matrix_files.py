@@ -6,7 +6,6 @@ components); the degrees of freedom are x, y, z of the nodes in the order of nod
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -16,7 +15,8 @@ from typing import Any
 import numpy as np
 from scipy import io, sparse
 
-from vanedamp.files.foreign import existing, reading
+from vanedamp.files.csv_input import csv_table
+from vanedamp.files.foreign import existing
 from vanedamp.files.formats.matrices.matlab import read_mat
 from vanedamp.files.formats.matrices.numpy_files import read_npz
 from vanedamp.files.formats.matrices.table import read_table
@@ -50,8 +50,8 @@ def read_matrices(
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
-    scale            metres a unit of length of the nodes: 1e-3 for mm
-    mass_scale       kg a unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness, too
+    scale            metres per unit of length of the nodes: 1e-3 for mm
+    mass_scale       kg per unit of mass, with seconds: 1e3 for matrices in t, N and mm; it multiplies both
 
     Raises MatricesError, with the file, for shapes that do not fit, one triangle only, unknown nodes or sets.
     """
@@ -62,8 +62,8 @@ def read_matrices(
         if name not in patches:
             raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
         held += [3 * patches[name].nodes + _component(sets, component) for component in components]
-    system = _system(stiffness, mass, coordinates, np.concatenate(held), patches, damping_ratio)
-    return _scaled(system, scale, mass_scale)
+    fixed_dofs = np.concatenate(held)
+    return _system(stiffness, mass, coordinates, fixed_dofs, patches, damping_ratio, scale, mass_scale)
 
 
 def read_folder(
@@ -82,22 +82,8 @@ def read_folder(
             for component in components.strip()
         ]
         fixed = np.array(held, dtype=int)
-    found = {name: _either(home, name) for name in ("stiffness", "mass")}
-    return _scaled(
-        _system(found["stiffness"], found["mass"], coordinates, fixed, patches, damping_ratio), scale, mass_scale
-    )
-
-
-def _scaled(system: SystemMatrices, scale: float, mass_scale: float) -> SystemMatrices:
-    for name, value in (("scale", scale), ("mass_scale", mass_scale)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise MatricesError(f"{name}: expected a positive number, not {value}")
-    return replace(
-        system,
-        stiffness=mass_scale * system.stiffness,
-        mass=mass_scale * system.mass,
-        coordinates=scale * system.coordinates,
-    )
+    stiffness, mass = (_either(home, name) for name in ("stiffness", "mass"))
+    return _system(stiffness, mass, coordinates, fixed, patches, damping_ratio, scale, mass_scale)
 
 
 def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:
@@ -130,7 +116,10 @@ def _system(
     fixed: np.ndarray,
     patches: dict[str, Patch],
     damping_ratio: float,
+    scale: float,
+    mass_scale: float,
 ) -> SystemMatrices:
+    """Return the checked system in SI units."""
     provenance = {"stiffness": os.path.basename(stiffness), "mass": os.path.basename(mass)}
     loaded = {}
     for name, path in (("stiffness", stiffness), ("mass", mass)):
@@ -146,10 +135,23 @@ def _system(
             raise MatricesError(
                 f"{path}: degree of freedom {place} has {diagonal[place]:.3g} on the diagonal; check its sign"
             )
-    return SystemMatrices(
-        stiffness=loaded["stiffness"], mass=loaded["mass"], coordinates=coordinates, fixed=fixed, patches=patches,
-        damping_ratio=damping_ratio, provenance=provenance,
-    )  # fmt: skip
+    system = SystemMatrices(
+        **loaded,
+        coordinates=coordinates,
+        fixed=fixed,
+        patches=patches,
+        damping_ratio=damping_ratio,
+        provenance=provenance,
+    )
+    for name, value in (("scale", scale), ("mass_scale", mass_scale)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise MatricesError(f"{name}: expected a positive number, not {value}")
+    return replace(
+        system,
+        stiffness=mass_scale * system.stiffness,
+        mass=mass_scale * system.mass,
+        coordinates=scale * system.coordinates,
+    )
 
 
 def _matrix(path: Path, name: str) -> sparse.csr_array:
@@ -229,9 +231,8 @@ def _component(path: str | os.PathLike[str] | None, component: str) -> int:
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
     """Return the lines of a CSV, without its header."""
-    existing(path, MatricesError, f"file; expected the columns {', '.join(columns)}")
-    with reading(path, MatricesError, "not a CSV table"), path.open(newline="", encoding="utf-8-sig") as stream:
-        rows = [[word.strip() for word in row] for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    kind = f"file; expected the columns {', '.join(columns)}"
+    rows = [words for _, words in csv_table(path, MatricesError, kind)]
     if rows and rows[0][0].lower() == columns[0]:
         rows = rows[1:]
     for number, row in enumerate(rows, start=1):

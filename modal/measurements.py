@@ -8,16 +8,15 @@ optional dependency.
 
 from __future__ import annotations
 
-import csv
+import contextlib
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from vanedamp.files.csv_input import content_lines
+from vanedamp.files.csv_input import csv_table
 from vanedamp.files.foreign import existing, reading
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
@@ -35,8 +34,8 @@ from vanedamp.files.formats.universal_datasets import (
 )
 from vanedamp.files.store import write_csv
 from vanedamp.modal.correlation import MeasuredShapes
-from vanedamp.modal.frf import Frf, FrfError
-from vanedamp.modal.temperature import Temperature, TemperatureError
+from vanedamp.modal.frf import Frf
+from vanedamp.modal.temperature import Temperature
 
 _NO_UNIVERSAL = "not a universal file that pyuff can read"
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
@@ -65,7 +64,7 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
     """Write shapes as `read_shapes` reads them; the suffix chooses (.csv, .uff, .unv).
 
     A universal file holds points with displacements along x, y and z, so shapes measured along other directions are
-    refused there, as are two values for one point and axis.
+    rejected there, as are two values for one point and axis.
     """
     target = Path(path)
     if target.suffix.lower() in _UNIVERSAL:
@@ -87,7 +86,7 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
 
     columns  one of COLUMNS; left out: as the header line says (real, imag; magnitude, phase in deg or
              rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
-             says so, are refused
+             says so, are rejected
 
     Raises MeasurementError.
     """
@@ -101,7 +100,7 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
             f"{file}: expected the columns frequency, real part, imaginary part (or magnitude and phase; and more "
             f"pairs), not {rows.shape[1]}"
         )
-    try:
+    with _of(file):
         first, second = rows[:, 1::2].T, rows[:, 2::2].T
         frf = Frf(rows[:, 0], first + 1j * second, quantity)
         kind = _columns(columns, header, first, second)
@@ -109,8 +108,6 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
             return frf
         angle = np.radians(second) if kind == "magnitude-degrees" else second
         return Frf(rows[:, 0], first * np.exp(1j * angle), quantity)
-    except (MeasurementError, FrfError) as error:
-        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
@@ -174,16 +171,14 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
     rows = _numbers(file)[1]
     if rows.shape[1] != 4:
         raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {rows.shape[1]}")
-    try:
+    with _of(file):
         return Temperature(reference, rows[:, 3], rows[:, :3])
-    except TemperatureError as error:
-        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
-    rows = _table(file)
+    rows = csv_table(file, MeasurementError)
     header = rows[0][1] if rows else []
-    if [word.strip() for word in header[:6]] != list(_PLACE) or len(header) < 7:
+    if header[:6] != list(_PLACE) or len(header) < 7:
         raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
     names, body = header[6:], rows[1:]
     values = np.empty((len(body), len(header)), dtype=complex)
@@ -195,20 +190,20 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
         except ValueError as error:
             raise MeasurementError(f"{file}: line {number}: expected numbers ({error})") from error
     shapes = values[:, 6:].T
-    return _measured(
-        file,
-        points=values[:, :3].real,
-        directions=values[:, 3:6].real,
-        shapes=shapes if np.any(shapes.imag) else shapes.real,
-        frequencies_hz=[_number(name) for name in names],
-    )
+    with _of(file):
+        return MeasuredShapes(
+            points=values[:, :3].real,
+            directions=values[:, 3:6].real,
+            shapes=shapes if np.any(shapes.imag) else shapes.real,
+            frequencies_hz=np.array([_number(name) for name in names]),
+        )
 
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
-    rows, header = [words for _, words in _table(file)], []
+    rows, header = [words for _, words in csv_table(file, MeasurementError)], []
     if rows and np.isnan(_number(rows[0][0])):
-        header, rows = [word.strip() for word in rows[0]], rows[1:]
+        header, rows = rows[0], rows[1:]
     try:
         values = np.array([[float(word) for word in row] for row in rows])
     except ValueError as error:
@@ -218,15 +213,6 @@ def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     return header, values
 
 
-def _table(file: Path) -> list[tuple[int, list[str]]]:
-    """Return number and words of the lines of a CSV file."""
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MeasurementError(f"{file}: not a text file ({error})") from error
-    return [(number, next(csv.reader([line]))) for number, line in content_lines(text)]
-
-
 def _number(word: str) -> float:
     try:
         return float(word)
@@ -234,9 +220,11 @@ def _number(word: str) -> float:
         return float("nan")
 
 
-def _measured(file: Path, **values: Any) -> MeasuredShapes:
+@contextlib.contextmanager
+def _of(file: Path) -> Iterator[None]:
+    """Raise MeasurementError with the file for what a record rejects."""
     try:
-        return MeasuredShapes(**values)
+        yield
     except ValueError as error:
         raise MeasurementError(f"{file}: {error}") from error
 
@@ -262,14 +250,14 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
     frequencies = [m["freq"] if "freq" in m else abs(m["eig"]) / (2 * np.pi) for m in modes]
     # exact zeros in every mode are axes that no sensor looked along
     seen = np.abs(shapes).max(axis=0) > 0.0
-    return _measured(
-        file,
-        points=np.repeat([nodes[n] for n in numbers.tolist()], 3, axis=0)[seen],
-        directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
-        shapes=shapes[:, seen],
-        frequencies_hz=frequencies,
-        damping_ratios=[damping_ratio(mode) for mode in modes],
-    )
+    with _of(file):
+        return MeasuredShapes(
+            points=np.repeat([nodes[n] for n in numbers.tolist()], 3, axis=0)[seen],
+            directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
+            shapes=shapes[:, seen],
+            frequencies_hz=np.array(frequencies),
+            damping_ratios=np.array([damping_ratio(mode) for mode in modes]),
+        )
 
 
 def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
@@ -313,10 +301,8 @@ def _frf_of_universal(file: Path) -> Frf:
         if not np.array_equal(np.asarray(dataset["x"], dtype=float), frequencies):
             raise MeasurementError(f"{file}: the responses have different frequencies; export them over one axis")
     labels = tuple(f"{d['rsp_node']}:{d['rsp_dir']}/{d['ref_node']}:{d['ref_dir']}" for d in found)
-    try:
+    with _of(file):
         return Frf(frequencies, np.array([d["data"] for d in found]), _QUANTITIES[kinds.pop()], labels)
-    except FrfError as error:
-        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _frf_to_universal(frf: Frf, target: Path) -> None:

@@ -9,9 +9,10 @@ edges and of points.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,25 +22,38 @@ from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 from vanedamp.modal.msh import same_rows
 
-# corners of the faces of a cell, and of a quadratic one the nodes between them (VTK's order)
-_FACES: dict[str, list[tuple[int, ...]]] = {
-    "tetra": [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
-    "hexahedron": [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
-}
-_BETWEEN = {frozenset(pair): 4 + index for index, pair in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])}
-_CORNERS = {"tetra": 4, "hexahedron": 8}
-# kind -> that of the cells and number of their nodes: a dolfinx geometry knows no 20-node brick, its edges are straight
-_VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
-_VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
-# gmsh's elements by dimension from 0
-_GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
-# gmsh's order of a quadratic tetrahedron; it is its own inverse
-_SWAPPED = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
+
+class _Shape(NamedTuple):
+    """A kind of volume cell: its nodes, and those of its facets and edges, corners first (VTK's order).
+
+    elements: gmsh's types by dimension from 0; order: gmsh's order of the nodes of a cell.
+    """
+
+    corners: int
+    facet_corners: int
+    facets: Sequence[tuple[int, ...]]
+    edges: Sequence[tuple[int, ...]]
+    elements: tuple[int, int, int, int]
+    order: list[int]
+
+
+_FACETS = [(0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (2, 0, 3, 6, 7, 9)]
+_EDGES = [(0, 1, 4), (1, 2, 5), (0, 2, 6), (0, 3, 7), (1, 3, 8), (2, 3, 9)]
+_TETRA = _Shape(4, 3, [facet[:3] for facet in _FACETS], [edge[:2] for edge in _EDGES], (15, 1, 2, 4), [0, 1, 2, 3])
+_TETRA10 = _Shape(4, 3, _FACETS, _EDGES, (15, 8, 9, 11), [0, 1, 2, 3, 4, 5, 6, 7, 9, 8])
+_BRICK = _Shape(
+    8, 4, [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+    [(0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7)],
+    (15, 1, 3, 5), list(range(8)),
+)  # fmt: skip
+# a dolfinx geometry knows no 20-node brick: its edges become straight
+_SHAPES = {"tetra": _TETRA, "tetra10": _TETRA10}
+_SHAPES |= dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), _BRICK)
 
 
 @dataclass(frozen=True, eq=False)
 class _Source:
-    """A mesh as read: volume cells of one kind, and named sets of them and of nodes, by index.
+    """A mesh as read: volume cells of one shape, and named sets of them and of nodes, by index.
 
     covers  dimension -> name -> corners (sorted) of the shells, lines and points of a set, of faces of a surface
     absent  name -> the first member of a set that the mesh does not have
@@ -47,7 +61,7 @@ class _Source:
 
     path: Path
     points: np.ndarray
-    kind: str
+    shape: _Shape
     cells: np.ndarray
     cell_sets: dict[str, np.ndarray]
     covers: dict[int, dict[str, set[tuple[int, ...]]]]
@@ -67,15 +81,14 @@ def convert(
     volumes  sets of volume elements that become volume groups; left out: all
     facets   sets of nodes, of shells, lines and points, and surfaces, that become groups of facets, or else of edges
              and points; left out: all
-    scale    metres a unit of length of the file: 1e-3 for millimetres
+    scale    metres per unit of length of the file: 1e-3 for millimetres
 
     Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
     with straight edges (the displacements have a degree of their own). Raises MeshError.
     """
     source = _source(Path(path), read_mesh(Path(path)))
     entities, groups = _grouped(source, volumes, facets)
-    for dimension, what in ((2, "facet"), (3, "volume")):
-        _check_disjoint(source.path, what, groups[dimension])
+    _check_disjoint(source.path, groups)
     return _write(source, entities, groups, scale, output)
 
 
@@ -87,9 +100,7 @@ def group_names(
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
     source = _source(Path(path), read_mesh(Path(path)))
-    _, wanted = _grouped(source, volumes, facets)
-    for dimension, what in ((2, "facet"), (3, "volume")):
-        _check_disjoint(source.path, what, wanted[dimension])
+    _check_disjoint(source.path, _grouped(source, volumes, facets)[1])
     _, groups = _grouped(source, None, None)
     return {dimension: list(named) for dimension, named in groups.items()}, np.unique(source.cells).size
 
@@ -99,7 +110,8 @@ def _grouped(
 ) -> tuple[dict[int, np.ndarray], dict[int, dict[str, np.ndarray]]]:
     """Return the nodes of cells, facets, edges and points by dimension, and groups of them by name."""
     surface, edges = _boundary(source), _edges(source)
-    groups = {3: _volume_groups(source, volumes), 2: _facet_groups(source, surface, facets)}
+    groups = {3: _wanted(source, source.cell_sets, volumes, "set of volume elements")}
+    groups[2] = _facet_groups(source, surface, facets)
     groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
     return {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}, groups
 
@@ -117,11 +129,11 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
         missing = [node for node in nodes if node not in place]
         if missing:
             raise MeshError(f"{path}: element {label}: there is no node {missing[0]}")
-    kind, cells, order = _cells(path, mesh, place)
+    shape, cells, order = _cells(path, mesh, place)
     return _Source(
         path=path,
         points=points,
-        kind=kind,
+        shape=shape,
         cells=cells,
         cell_sets=_indexed(mesh.element_sets, order),
         covers=_covers(mesh, place),
@@ -130,20 +142,21 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
     )
 
 
-def _cells(path: Path, mesh: LabelledMesh, place: dict[int, int]) -> tuple[str, np.ndarray, dict[int, int]]:
-    """Return the kind of the volume elements, the indices of their nodes, and the index of each by its label."""
+def _cells(path: Path, mesh: LabelledMesh, place: dict[int, int]) -> tuple[_Shape, np.ndarray, dict[int, int]]:
+    """Return the shape of the volume elements, the indices of their nodes, and the index of each by its label."""
     volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
     solids = set(volumes.values())
-    if len(solids) != 1 or not solids <= set(_VOLUMES):
+    if len(solids) != 1 or not solids <= set(_SHAPES):
         found = ", ".join(sorted(solids)) or "none"
         raise MeshError(f"{path}: volume elements: {found}; expected one kind, tetrahedra or hexahedra")
-    kind, width = _VOLUMES[solids.pop()]
+    shape = _SHAPES[solids.pop()]
+    width = len(shape.order)
     cells = np.array([[place[node] for node in mesh.elements[label][1][:width]] for label in volumes])
-    pair = same_rows(np.sort(cells[:, : _CORNERS[kind.removesuffix("10")]], axis=1))
+    pair = same_rows(np.sort(cells[:, : shape.corners], axis=1))
     if pair is not None:
         first, second = (list(volumes)[index] for index in pair)
         raise MeshError(f"{path}: volume elements {first} and {second} have the same nodes; remove one of them")
-    return kind, cells, dict(zip(volumes, range(len(volumes)), strict=True))
+    return shape, cells, dict(zip(volumes, range(len(volumes)), strict=True))
 
 
 def _absent(mesh: LabelledMesh) -> dict[str, str]:
@@ -173,11 +186,12 @@ def _covers(mesh: LabelledMesh, place: dict[int, int]) -> dict[int, dict[str, se
 
 def _indexed(sets: dict[str, list[int]], place: dict[int, int]) -> dict[str, np.ndarray]:
     """Return the sets with members that are there, as sorted indices."""
-    found = {
-        name: np.unique(np.array([place[label] for label in labels if label in place], dtype=int))
-        for name, labels in sets.items()
-    }
-    return _kept(found)
+    return _kept(
+        {
+            name: np.unique(np.array([place[label] for label in labels if label in place], dtype=int))
+            for name, labels in sets.items()
+        }
+    )
 
 
 def _kept(sets: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -190,20 +204,15 @@ def _keys(facets: np.ndarray, corners: int) -> list[tuple[int, ...]]:
 
 def _boundary(source: _Source) -> np.ndarray:
     """Return the nodes (n, k) of the facets that belong to one cell, corners first."""
-    shape = source.kind.removesuffix("10")
-    places = [list(face) for face in _FACES[shape]]
-    corners = len(places[0])
-    if source.kind == "tetra10":
-        for face in places:
-            face.extend(_BETWEEN[frozenset((face[i], face[(i + 1) % 3]))] for i in range(3))
-    facets = np.concatenate([source.cells[:, face] for face in places])
-    _, first, counts = np.unique(np.sort(facets[:, :corners], axis=1), axis=0, return_index=True, return_counts=True)
+    facets = np.concatenate([source.cells[:, facet] for facet in source.shape.facets])
+    corners = np.sort(facets[:, : source.shape.facet_corners], axis=1)
+    _, first, counts = np.unique(corners, axis=0, return_index=True, return_counts=True)
     return np.asarray(facets[np.sort(first[counts == 1])])
 
 
 def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
     """Return facet groups: name -> indices into the surface."""
-    keys = {key: index for index, key in enumerate(_keys(surface, len(_FACES[source.kind.removesuffix("10")][0])))}
+    keys = {key: index for index, key in enumerate(_keys(surface, source.shape.facet_corners))}
     groups: dict[str, np.ndarray] = {}
     for name, nodes in source.node_sets.items():
         inside = np.zeros(len(source.points), dtype=bool)
@@ -223,12 +232,7 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
 
 def _edges(source: _Source) -> np.ndarray:
     """Return the nodes of the element edges: (n, 2), of quadratic cells (n, 3) with the node between them last."""
-    if source.kind == "tetra10":
-        places = [[*sorted(pair), middle] for pair, middle in _BETWEEN.items()]
-    else:
-        pairs = {frozenset((face[i - 1], face[i])) for face in _FACES[source.kind] for i in range(len(face))}
-        places = [sorted(pair) for pair in pairs]
-    edges = np.concatenate([source.cells[:, place] for place in places])
+    edges = np.concatenate([source.cells[:, edge] for edge in source.shape.edges])
     return np.asarray(edges[np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True)[1]])
 
 
@@ -236,7 +240,7 @@ def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Return sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
-    corners = np.unique(source.cells[:, : _CORNERS[source.kind.removesuffix("10")]])
+    corners = np.unique(source.cells[:, : source.shape.corners])
     keys = {key: index for index, key in enumerate(_keys(edges, 2))}
     lines: dict[str, np.ndarray] = {}
     points: dict[str, np.ndarray] = {}
@@ -260,10 +264,6 @@ def _lower_groups(
     return _kept(lines), _kept(points)
 
 
-def _volume_groups(source: _Source, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
-    return _wanted(source, source.cell_sets, wanted, "set of volume elements")
-
-
 def _wanted(
     source: _Source, groups: dict[str, np.ndarray], wanted: Collection[str] | None, kind: str
 ) -> dict[str, np.ndarray]:
@@ -276,16 +276,14 @@ def _wanted(
     return _kept({name: groups[name] for name in groups if name in taken})
 
 
-def _check_disjoint(path: Path, what: str, groups: dict[str, np.ndarray]) -> None:
-    names = list(groups)
-    for second, name in enumerate(names):
-        for first in names[:second]:
-            shared = np.intersect1d(groups[first], groups[name]).size
-            if shared:
-                raise MeshError(
-                    f"{path}: the sets {first!r} and {name!r} share {shared} {what} elements; take one of them, or "
-                    "make them disjoint: an element carries one label"
-                )
+def _check_disjoint(path: Path, groups: dict[int, dict[str, np.ndarray]]) -> None:
+    for dimension, what in ((2, "facet"), (3, "volume")):
+        pair = msh.overlap(groups[dimension])
+        if pair is not None:
+            raise MeshError(
+                f"{path}: the sets {pair[0]!r} and {pair[1]!r} share {pair[2]} {what} elements; take one of them, or "
+                "make them disjoint: an element carries one label"
+            )
 
 
 def _write(
@@ -296,7 +294,7 @@ def _write(
     output: str | os.PathLike[str],
 ) -> Path:
     """Write the gmsh file; entities: nodes of cells, facets, edges and points by dimension, which groups number."""
-    rest = np.setdiff1d(np.arange(len(source.cells)), _all(groups[3].values()))
+    rest = np.setdiff1d(np.arange(len(source.cells)), np.concatenate([np.empty(0, int), *groups[3].values()]))
     used = np.unique(source.cells)
     number = np.zeros(len(source.points), dtype=int)
     number[used] = np.arange(1, used.size + 1)
@@ -304,12 +302,12 @@ def _write(
     with msh.session(str(source.path)):
         for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
             nodes = number[entities[dimension]]
-            nodes = nodes[:, _SWAPPED] if (dimension, source.kind) == (3, "tetra10") else nodes
+            nodes = nodes[:, source.shape.order] if dimension == 3 else nodes
             for name, members in named.items():
                 entity = gmsh.model.addDiscreteEntity(dimension)
                 if dimension == 3 and entity == 1:
                     gmsh.model.mesh.addNodes(3, entity, number[used], (scale * source.points[used]).ravel())
-                gmsh.model.mesh.addElementsByType(entity, _GMSH[source.kind][dimension], [], nodes[members].ravel())
+                gmsh.model.mesh.addElementsByType(entity, source.shape.elements[dimension], [], nodes[members].ravel())
                 if name:
                     gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
         before = gmsh.option.getNumber("Mesh.SaveAll")
@@ -318,7 +316,3 @@ def _write(
             return msh.write(output)
         finally:
             gmsh.option.setNumber("Mesh.SaveAll", before)
-
-
-def _all(members: Iterable[np.ndarray]) -> np.ndarray:
-    return np.concatenate([np.empty(0, dtype=int), *members])

@@ -18,9 +18,9 @@ from vanedamp.modal.speed_range import RPM, SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
-#: least share of its shape that a mode takes over from another one for a veering
+#: least fraction of its shape that a mode takes over from another one for a veering
 LEAST_EXCHANGE = 0.25
-#: speeds closer than this share of the range are no longer divided
+#: speeds closer than this fraction of the range are no longer divided
 _CLOSEST = 1e-8
 
 
@@ -85,7 +85,8 @@ class Tracks:
 
     def frequencies(self, mode: int) -> np.ndarray:
         """Return the frequencies (s,) of a mode, rad/s; nan where it is not among the modes of the source."""
-        return np.array([self._value(j, mode, state.frequencies) for j, state in enumerate(self.states)])
+        found = (state.frequencies[number == mode] for state, number in zip(self.states, self.number, strict=True))
+        return np.array([frequency[0] if frequency.size else np.nan for frequency in found])
 
     def number_at(self, speed: float, place: int) -> int:
         """Return the mode that is the place-th lowest at a speed of the range, by its shapes at the neighbours."""
@@ -112,10 +113,6 @@ class Tracks:
         ]
         return sorted(kept, key=lambda approach: approach.speed)
 
-    def _value(self, j: int, mode: int, values: np.ndarray) -> float:
-        places = np.flatnonzero(self.number[j] == mode)
-        return float(values[places[0]]) if places.size else np.nan
-
     def _reach(self, speed: float) -> None:
         """Go on from the last state to a speed, over speeds between them as far as the shapes need."""
         ahead = [speed]
@@ -128,15 +125,12 @@ class Tracks:
                 ahead.append(between)
                 continue
             ahead.pop()
-            self._append(right, pairs)
-
-    def _append(self, right: SpeedModes, pairs: Pairing) -> None:
-        number = np.full(right.frequencies.size, -1)
-        number[pairs.second] = self.number[-1][pairs.first]
-        unknown = np.flatnonzero(number < 0)
-        number[unknown] = 1 + max(known.max() for known in self.number) + np.arange(unknown.size)
-        self.states.append(right)
-        self.number.append(number)
+            number = np.full(right.frequencies.size, -1)
+            number[pairs.second] = self.number[-1][pairs.first]
+            unknown = np.flatnonzero(number < 0)
+            number[unknown] = 1 + max(known.max() for known in self.number) + np.arange(unknown.size)
+            self.states.append(right)
+            self.number.append(number)
 
     def _between(self, left: SpeedModes, right: SpeedModes, pairs: Pairing) -> float | None:
         """Return a speed that has to come between two; None where the pairs are clear."""

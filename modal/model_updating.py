@@ -53,7 +53,7 @@ class Tuning:
     before_hz, after_hz   (n,) those of their partners among the computed modes
     modes_before, modes_after  (n,) indices of these partners
     mac_before, mac_after      (n,) MAC with the measured shapes, or with the untuned modes where none were given
-    sensitivities  (n, p) d log f / d log factor, after tuning: the share of strain energy of a part, halved
+    sensitivities  (n, p) d log f / d log factor, after tuning: half the fraction of the strain energy in a part
     evaluations    eigenvalue problems solved
     matrices       the tuned system
     warnings       what to look at: frequencies that are missed, another pairing with less change
@@ -167,7 +167,7 @@ def _doubts(problem: _Problem, before: _State, after: _State, found: Any) -> tup
             f"{_listed(np.exp(fit.x))}, modes {problem.meant.tolist()} to {miss:.2g} with {_listed(np.exp(found.x))}; "
             "say which modes they are, by `modes` or measured shapes"
         )
-        if miss > _DOUBTFUL or not problem.named:
+        if miss > _DOUBTFUL or problem.modes is None:
             raise TuningError(better)
         return (better,)
     if miss <= _DOUBTFUL:
@@ -238,29 +238,29 @@ class _State:
     jacobian: np.ndarray
 
 
+@dataclass(eq=False)
 class _Problem:
-    """Residuals and Jacobian at logarithms of factors; keeps the last state, and follows the modes."""
+    """Residuals and Jacobian at logarithms of factors; keeps the last state, and follows the modes.
 
-    def __init__(
-        self,
-        matrices: SystemMatrices,
-        parts: dict[str, sparse.csr_array],
-        target: np.ndarray,
-        measured: MeasuredShapes | None,
-        modes: Sequence[int] | None,
-        least_mac: float,
-    ) -> None:
-        self.matrices, self.parts, self.target = matrices, parts, target
-        self.measured, self.least = measured, least_mac
-        self.evaluations = 0
-        self._point: np.ndarray | None = None
-        self._state: _State | None = None
-        self._origin: np.ndarray | None = None
-        self._followed: np.ndarray | None = None
-        self._check(modes)
-        self.named = modes is not None
-        self.meant = np.arange(target.size) if modes is None else np.asarray(modes, dtype=int)
-        self.count = min(int(self.meant.max()) + 1 + _SPARE, matrices.free.size)
+    The arguments are those of `tune`; meant: (n,) the modes that the targets belong to, unless shapes say so.
+    """
+
+    matrices: SystemMatrices
+    parts: dict[str, sparse.csr_array]
+    target: np.ndarray
+    measured: MeasuredShapes | None
+    modes: Sequence[int] | None
+    least: float
+    evaluations: int = 0
+    _point: np.ndarray | None = None
+    _state: _State | None = None
+    _origin: np.ndarray | None = None
+    _followed: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self._check(self.modes)
+        self.meant = np.arange(self.target.size) if self.modes is None else np.asarray(self.modes, dtype=int)
+        self.count = min(int(self.meant.max()) + 1 + _SPARE, self.matrices.free.size)
 
     def system(self, point: np.ndarray) -> SystemMatrices:
         """Return the matrices with these factors."""
@@ -298,7 +298,7 @@ class _Problem:
         self.evaluations += 1
         modes = solve_modes(self.system(point), self.count)
         pairing = self._pair(modes)
-        indices = pairing.second
+        indices, mac = pairing.second, pairing.pair_mac
         frequencies = modes.frequencies_hz[indices]
         scaled = {n: f * k for f, (n, k) in zip(np.exp(point), self.parts.items(), strict=True)}
         if self.measured is None:
@@ -306,16 +306,8 @@ class _Problem:
             if self._origin is None:
                 self._origin = self._followed
             mac = np.diag(modal_assurance(self._origin, self._followed, self.matrices.mass))
-        else:
-            mac = pairing.pair_mac
-        return _State(
-            modes.frequencies_hz,
-            frequencies,
-            indices,
-            np.array(mac),
-            np.log(frequencies / self.target),
-            sensitivities(modes, scaled, indices),
-        )
+        residual, jacobian = np.log(frequencies / self.target), sensitivities(modes, scaled, indices)
+        return _State(modes.frequencies_hz, frequencies, indices, mac, residual, jacobian)
 
     def _pair(self, modes: Modes) -> Pairing:
         """Pair all targets (first) with computed modes (second), even where a search passes modes hard to pair."""

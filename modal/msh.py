@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -62,10 +63,9 @@ def merge(path: Path) -> None:
     if file_stamp(path) not in _written:
         try:
             apart(path, MeshError, lambda: gmsh.merge(str(path)))
-        except MeshError:
-            raise
-        except ValueError:  # which comes again
-            pass
+        except ValueError as error:
+            if isinstance(error, MeshError):
+                raise  # anything else comes again below
     gmsh.logger.start()
     try:
         gmsh.merge(str(path))
@@ -113,12 +113,9 @@ def taken(dimension: int) -> dict[str, np.ndarray]:
     """
     found = {}
     for name, tag in groups(dimension).items():
-        rows = [np.empty((0, dimension + 1), dtype=np.int64)]
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
-            for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
-                width = gmsh.model.mesh.getElementProperties(kind)[3]
-                rows.append(np.asarray(nodes, dtype=np.int64).reshape(-1, width)[:, : dimension + 1])
-        found[name] = np.concatenate(rows)
+        entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, tag)
+        rows = [corners for entity in entities for _, _, corners in _elements(dimension, entity)]
+        found[name] = np.concatenate([np.empty((0, dimension + 1), dtype=np.int64), *rows])
         if not found[name].size:
             raise MeshError(f"group {name!r} of dimension {dimension} is empty; mesh it with the volumes")
     if found:  # an empty list would remove every group
@@ -152,16 +149,20 @@ def drop_strays() -> None:
 
 def check_disjoint(dimension: int, kind: str) -> None:
     """Raise MeshError when an element lies in two groups of a dimension: readers keep the first and say nothing."""
-    names = list(groups(dimension))
-    members = [_elements(dimension, tag) for tag in groups(dimension).values()]
-    for second, name in enumerate(names):
-        for first in range(second):
-            shared = np.intersect1d(members[first], members[second], assume_unique=True).size
-            if shared:
-                raise MeshError(
-                    f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
-                    f"make the groups disjoint, an element can carry one label only"
-                )
+    pair = overlap({name: _members(dimension, tag) for name, tag in groups(dimension).items()})
+    if pair is not None:
+        raise MeshError(
+            f"{kind} groups {pair[0]!r} and {pair[1]!r} share {pair[2]} elements; "
+            "make the groups disjoint, an element can carry one label only"
+        )
+
+
+def overlap(groups: Mapping[str, np.ndarray]) -> tuple[str, str, int] | None:
+    """Return the names of two groups that have members in common, and how many; None where all are disjoint."""
+    for (first, ones), (second, others) in itertools.combinations(groups.items(), 2):
+        if shared := np.intersect1d(ones, others).size:
+            return first, second, shared
+    return None
 
 
 def check_points() -> None:
@@ -174,10 +175,8 @@ def check_points() -> None:
 
 def check_twice() -> None:
     """Raise MeshError for two volume elements of the current model on the same nodes: the body would count twice."""
-    for kind, labels, nodes in zip(*gmsh.model.mesh.getElements(3), strict=True):
-        corners = gmsh.model.mesh.getElementProperties(kind)[5]
-        rows = np.sort(np.asarray(nodes).reshape(len(labels), -1)[:, :corners], axis=1)
-        pair = same_rows(rows)
+    for labels, _, corners in _elements(3):
+        pair = same_rows(np.sort(corners, axis=1))
         if pair is not None:
             raise MeshError(f"elements {labels[pair[0]]} and {labels[pair[1]]} have the same nodes; remove one of them")
 
@@ -209,9 +208,9 @@ def inverted() -> dict[int, str]:
     """Return volume elements of the current model whose Jacobian is not positive everywhere, with their group."""
     bad: dict[int, str] = {}
     for _, entity in gmsh.model.getEntities(3):
-        for tags in gmsh.model.mesh.getElements(3, entity)[1]:
-            jacobians = np.asarray(gmsh.model.mesh.getElementQualities(tags, "minDetJac"))
-            bad |= dict.fromkeys(tags[~(jacobians > 0.0)].tolist(), _group_of(entity))
+        for labels, _, _ in _elements(3, entity):
+            jacobians = np.asarray(gmsh.model.mesh.getElementQualities(labels, "minDetJac"))
+            bad |= dict.fromkeys(labels[~(jacobians > 0.0)].tolist(), _group_of(entity))
     return bad
 
 
@@ -219,10 +218,10 @@ def check_connected() -> None:
     """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
     links, groups_of, lengths = [], [], []
     for _, entity in gmsh.model.getEntities(3):
-        for tags, nodes in zip(*gmsh.model.mesh.getElements(3, entity)[1:], strict=True):
-            links.append(np.asarray(nodes, dtype=np.int64))
-            groups_of.append(np.full(len(tags), _group_of(entity), dtype=object))
-            lengths.append(np.full(len(tags), len(nodes) // len(tags)))
+        for labels, rows, _ in _elements(3, entity):
+            links.append(rows.ravel())
+            groups_of.append(np.full(len(labels), _group_of(entity), dtype=object))
+            lengths.append(np.full(len(labels), rows.shape[1]))
     names, nodes = np.concatenate(groups_of), np.concatenate(links)
     elements = np.repeat(np.arange(names.size), np.concatenate(lengths))
     size = names.size + int(nodes.max()) + 1
@@ -261,15 +260,18 @@ def _native_stderr_muted() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _elements(dimension: int, tag: int) -> np.ndarray:
+def _elements(dimension: int, entity: int = -1) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield labels (n,), nodes (n, k) and corner nodes (n, c) of an entity's elements, by type; default: of all."""
+    for kind, labels, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+        rows = np.asarray(nodes, dtype=np.int64).reshape(len(labels), -1)
+        yield labels, rows, rows[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
+
+
+def _members(dimension: int, tag: int) -> np.ndarray:
     """Return the elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
-    found = []
-    for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
-        for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
-            _, _, _, n_nodes, _, n_corners = gmsh.model.mesh.getElementProperties(kind)
-            # zeros, which are no node's number, fill up to the corners of a hexahedron
-            corners = np.zeros((len(nodes) // n_nodes, 8), dtype=np.int64)
-            corners[:, :n_corners] = np.asarray(nodes).reshape(-1, n_nodes)[:, :n_corners]
-            found.append(np.sort(corners, axis=1))
-    rows = np.concatenate([np.empty((0, 8), np.int64), *found])
+    entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, tag)
+    found = [corners for entity in entities for _, _, corners in _elements(dimension, entity)]
+    # zeros, which are no node's number, fill up to the corners of a hexahedron
+    filled = [np.sort(np.pad(corners, ((0, 0), (0, 8 - corners.shape[1]))), axis=1) for corners in found]
+    rows = np.concatenate([np.empty((0, 8), np.int64), *filled])
     return np.unique(rows.view(np.dtype((np.void, 8 * rows.itemsize))))

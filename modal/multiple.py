@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.modal.eigen import Modes, shape_signs
 from vanedamp.modal.matrices import SystemMatrices
 
-# below this share of its largest possible value, a component along a guide is round-off
+# below this fraction of its largest possible value, a component along a guide is round-off
 _NOISE = 1e-6
 
 
@@ -48,7 +48,7 @@ def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share
     """Return the indices of the other modes near a mode in frequency that move a functional (N,), too.
 
     Those whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
-    (w^T phi)^2, is at least a share of the mode's.
+    (w^T phi)^2, is at least the fraction `share` of the mode's.
     """
     frequency, seen = modes.frequencies_hz[mode], (modes.shapes @ functional) ** 2
     near = np.abs(modes.frequencies_hz - frequency) <= within * frequency

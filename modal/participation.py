@@ -30,7 +30,7 @@ def effective_masses(modes: Modes, matrices: SystemMatrices) -> np.ndarray:
 def effective_mass_shares(
     modes: Modes, matrices: SystemMatrices, direction: Sequence[float] | np.ndarray
 ) -> np.ndarray:
-    """Return the effective mass (m,) of every mode along a direction, as a share of the mass that can move along it."""
+    """Return the effective mass (m,) of every mode along a direction, relative to the mass that can move along it."""
     translation = matrices.movable_translations() @ unit_direction(direction)
     inertia = matrices.mass @ translation
     return (modes.shapes @ inertia) ** 2 / (translation @ inertia)
@@ -54,5 +54,5 @@ def first_bending(
             f"direction {np.asarray(direction).tolist()}: no mode carries {least_share:.0%} of the movable mass "
             f"along it ({listed}); compute more modes or check the direction"
         )
-    # symmetric structures have pairs whose shares differ by round-off only
+    # symmetric structures have pairs whose fractions differ by round-off only
     return int(np.flatnonzero(shares > (1.0 - 1e-6) * largest)[0])

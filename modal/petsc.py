@@ -12,7 +12,6 @@ import vanedamp.modal.stack  # noqa: F401
 # isort: split
 import contextlib
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -49,10 +48,7 @@ class Factorization:
             given = stack.enter_context(_petsc(_upper_triangle(matrix)))
             ksp = stack.enter_context(_petsc(PETSc.KSP().create(PETSc.COMM_SELF)))
             ksp.setOperators(given)
-            if direct == "mumps":
-                _configure_direct(ksp)
-            else:
-                _set_direct(ksp, direct)
+            _set_direct(ksp, direct, inertia=direct == "mumps")
             try:
                 ksp.setUp()
             except PETSc.Error as error:
@@ -91,9 +87,7 @@ class Factorization:
     def __enter__(self) -> Factorization:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.destroy()
 
     def _check(self, matrix: sparse.csr_array, status: int) -> None:
@@ -131,20 +125,20 @@ def nearest_eigenpairs(
         values, vectors = _on_all_ranks("nearest", (stiffness, mass), wanted, shift)
     else:
         matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
-        with factorized(matrix, definite=shift <= 0.0) as factors:
+        with factorize(matrix, definite=shift <= 0.0) as factors:
             try:
                 values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare)
             except NotConvergedError as error:
                 raise SolverError(str(error)) from error
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:wanted]
-    order = nearest[np.argsort(values[nearest], kind="stable")]
-    return values[order], vectors[order]
+    return _ascending(values[nearest], vectors[nearest])
 
 
-def factorized(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
-    """Return a matrix, factorised by CHOLMOD where that is there and the matrix is positive definite, or by MUMPS.
+def factorize(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
+    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs, by CHOLMOD or by MUMPS' LDL^T.
 
-    definite: whether it may be. Raises SolverError for a singular matrix.
+    definite: whether it may be positive definite, for CHOLMOD. The result solves for right-hand sides (n,) or (n, k)
+    with `.solve`; `.destroy()` or the end of a `with` block frees it. Raises SolverError for a singular matrix.
     """
     if definite and PETSc.Sys.hasExternalPackage("suitesparse") and np.all(matrix.diagonal() > 0.0):
         with contextlib.suppress(SolverError):
@@ -160,16 +154,12 @@ def interval_eigenpairs(
     Shifts walk through the interval, and inertia counts give the number of eigenvalues between two of them (Campos and
     Roman 2012, Numer. Algorithms 60). Raises SolverError.
     """
-    values, vectors = _on_all_ranks("interval", (stiffness, mass), lower, upper)
-    order = np.argsort(values, kind="stable")
-    return values[order], vectors[order]
+    return _ascending(*_on_all_ranks("interval", (stiffness, mass), lower, upper))
 
 
-@contextlib.contextmanager
-def ranks() -> Iterator[bool]:
+def ranks() -> contextlib.AbstractContextManager[bool]:
     """Yield True on MPI's rank 0, which runs the program, and False on the others once they have helped it."""
-    with parallel.ranks(_assist) as first:
-        yield first
+    return parallel.ranks(_assist)
 
 
 def _on_all_ranks(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
@@ -193,24 +183,26 @@ def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], argument
 def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
     ksp = stack.enter_context(_petsc(PETSc.KSP().create(parallel.COMM)))
     ksp.setOperators(operators[0])
-    _configure_direct(ksp)
+    _set_direct(ksp, inertia=True)
     ksp.setUp()
     factor = ksp.getPC().getFactorMatrix()
-    if factor.getMumpsInfog(1) < 0:
-        raise SolverError(f"MUMPS cannot factorise a matrix of size {operators[0].getSize()[0]}: {_complaint(factor)}")
+    status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
+    if status < 0:
+        raise SolverError(
+            f"MUMPS cannot factorise a matrix of size {operators[0].getSize()[0]}: status {status} ({detail})"
+            + (", not enough memory" if status in (-9, -13) else "")
+        )
     return int(factor.getInertia()[0])
 
 
 def _nearest(
     stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators)
-    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.TARGET_MAGNITUDE)
     eps.setTarget(shift)
     eps.setDimensions(count)
     eps.getST().setShift(shift)
-    _set_direct(eps.getST().getKSP())
-    _solve(eps)
+    _solve(eps, eps.getST().getKSP())
     if eps.getConverged() < count:
         raise SolverError(f"{eps.getConverged()} of {count} modes converged in {eps.getIterationNumber()} iterations")
     return _eigenpairs(stack, eps, operators[0])
@@ -219,18 +211,16 @@ def _nearest(
 def _interval(
     stack: contextlib.ExitStack, operators: list[Any], lower: float, upper: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators)
-    eps.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.ALL)
     eps.setInterval(lower, upper)
-    _set_direct(eps.getKrylovSchurKSP())
-    _solve(eps)
+    _solve(eps, eps.getKrylovSchurKSP())
     return _eigenpairs(stack, eps, operators[0])
 
 
 _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _nearest, "interval": _interval}
 
 
-def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any]) -> Any:
+def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: Any) -> Any:
     eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)
     # the solver makes its factors itself, so that MUMPS takes its controls from the options of that prefix only
@@ -242,11 +232,13 @@ def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any]) -> Any:
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
     eps.setTolerances(1e-11, 500)
+    eps.setWhichEigenpairs(which)
     eps.getST().setType(SLEPc.ST.Type.SINVERT)
     return eps
 
 
-def _solve(eps: Any) -> None:
+def _solve(eps: Any, ksp: Any) -> None:
+    _set_direct(ksp)
     try:
         eps.solve()
     except PETSc.Error as error:
@@ -271,6 +263,11 @@ def _petsc(created: Any) -> Iterator[Any]:
         created.destroy()
 
 
+def _ascending(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(values, kind="stable")
+    return values[order], vectors[order]
+
+
 def _upper_triangle(matrix: sparse.csr_array) -> Any:
     """Return the upper triangle of a symmetric CSR matrix as a symmetric one of PETSc; the caller destroys it."""
     matrix = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
@@ -289,23 +286,13 @@ def _distributed(matrix: sparse.csr_array | None) -> Any:
     return created
 
 
-def _set_direct(ksp: Any, direct: str = "mumps") -> None:
-    """Make a Krylov solver a direct one."""
+def _set_direct(ksp: Any, direct: str = "mumps", inertia: bool = False) -> None:
+    """Make a Krylov solver a direct one; inertia: one that can count negative eigenvalues."""
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.CHOLESKY)
     pc.setFactorSolverType(direct)
-
-
-def _configure_direct(ksp: Any) -> None:
-    """Make a Krylov solver a direct one that can count negative eigenvalues."""
-    _set_direct(ksp)
-    ksp.getPC().setFactorSetUpSolverType()
-    for number, value in _FOR_INERTIA.items():
-        ksp.getPC().getFactorMatrix().setMumpsIcntl(number, value)
-
-
-def _complaint(factor: Any) -> str:
-    """Return MUMPS' status after a failure, in words."""
-    status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
-    return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")
+    if inertia:
+        pc.setFactorSetUpSolverType()
+        for number, value in _FOR_INERTIA.items():
+            pc.getFactorMatrix().setMumpsIcntl(number, value)

@@ -15,9 +15,9 @@ from scipy import linalg, special
 from scipy.optimize import least_squares
 
 _RELOCATIONS = 30
-# a fit may try bandwidths down to this share of the least line spacing; a pole that ends there is refused
+# a fit may try bandwidths down to this fraction of the least line spacing; a pole that ends there is rejected
 _NARROWEST = 1e-3
-# share of the responses' norm that round-off of the fit stays below; smaller misfits count as noise
+# fraction of the responses' norm that round-off of the fit stays below; smaller misfits count as noise
 _ROUND_OFF = 1e-12
 # poles that noise can try independently for each frequency line: see `Rational.chance`
 _TRIALS = 10
@@ -44,10 +44,6 @@ class Rational:
     s: np.ndarray
     values: np.ndarray
     power: int
-
-    def best(self, count: int) -> Fit:
-        """Return the fit with `count` poles, from wherever vector fitting finds them."""
-        return self.fit(self.relocated(count))
 
     def fit(self, start: np.ndarray) -> Fit:
         """Return the fit next to the poles (m,) of a start.
@@ -77,7 +73,7 @@ class Rational:
     def chance(self, fit: Fit) -> float:
         """Bound the probability that noise by itself lets the last pole lower the misfit as much as it does.
 
-        White noise gives a pole at a fixed place the share Beta(k, (N - p)/2) of the misfit that was left without it:
+        White noise gives a pole at a fixed place the fraction Beta(k, (N - p)/2) of the misfit without it:
         2 k coefficients, N values, p parameters in all. Complex values count as one number each, not two, so that the
         bound also holds for noise in one of their parts only. A fit chooses the place (Davies 1987; Adler and Taylor
         2007): the expected number of places that reach a level u is that of one place times the area of the half

@@ -110,7 +110,7 @@ def fatigue_amplitude(
     fatigue_strength: float,
     share: float = FATIGUE_SHARE,
 ) -> float:
-    """Return the displacement amplitude, m, of an interface coordinate at a share of a mode's fatigue strength.
+    """Return the displacement amplitude, m, of an interface coordinate at a fraction of a mode's fatigue strength.
 
     peak_stress       Pa, largest von Mises stress of the mode's shape as it is stored (Solid.von_mises(shape).max()).
                       Sharp corners are singular points of elasticity: their stress grows with mesh refinement

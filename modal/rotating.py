@@ -1,4 +1,4 @@
-"""A structure that rotates: K(speed) = K0 + speed^2 K1, as matrices in the frame that turns with it.
+"""A structure that rotates: K(speed) = K0 + speed^2 K1, as matrices in the rotating frame.
 
 About its centrifugal equilibrium at a constant speed W (rad/s) the structure moves by
 
@@ -32,7 +32,7 @@ class RotatingMatrices:
     standing               at standstill, with the stiffness of a thermal prestress if there is one
     centrifugal_stiffness  (N, N) symmetric CSR, kg: K1
     gyroscopic             (N, N) skew CSR, kg: G
-    load                   (N,) kg m: centrifugal load a squared speed
+    load                   (N,) kg m: centrifugal load per squared speed
     axis, point            (3,) unit vector, and (3,) m, a point of the axis
     """
 

@@ -7,7 +7,6 @@ the shapes, and the error is estimated from the residual with the full matrices.
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-#: 1/min in a rad/s
+#: 1/min per rad/s
 RPM = 30.0 / np.pi
 # of the unit length of a shape: what the basis lacks of it for a field more
 _LACKING = 1e-10
@@ -60,7 +59,7 @@ class SpeedRange:
         self._solved_count = min(count + 2 * spare, self._free.size)
         named = [standing.stiffness, rotating.centrifugal_stiffness, standing.mass]
         named += [rotating.gyroscopic] if gyroscopic else []
-        self._operators = [sparse.csr_array(matrix[self._free][:, self._free]) for matrix in named]
+        self._operators = [standing.of_free(matrix) for matrix in named]
         self._basis = np.empty((self._free.size, 0))
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
@@ -78,9 +77,7 @@ class SpeedRange:
     def __enter__(self) -> SpeedRange:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._factor.destroy()
 
     @property

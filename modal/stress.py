@@ -53,15 +53,14 @@ def hot_spot(
         if not (math.isfinite(strengths[name]) and strengths[name] > 0.0):
             raise ElasticityError(f"hot spot: strength of {name!r}: expected a positive number, not {strengths[name]}")
     stress = solid.von_mises(displacement)
-    corners = fenicsx.discontinuous_space(solid.domain, 1)
     # the group of a cell, seen from its corners
-    numbers = fenicsx.cell_constants(solid.domain, {name: float(index) for index, name in enumerate(groups)})
-    group = np.rint(np.array(fenicsx.evaluate(numbers, corners).x.array)).astype(int)
+    numbers = fenicsx.cell_functions(solid.domain, lambda name, places: np.full(len(places), groups.index(name)))
+    group = numbers.x.array.astype(int)
     allowed = np.array([strengths[name] if name in looked_at else np.inf for name in groups])
     ratios = stress / allowed[group]
     worst = first_largest(ratios)
     if not ratios[worst] > 0.0:
         raise ElasticityError("hot spot: the displacements strain none of the groups looked at")
-    x, y, z = fenicsx.node_coordinates(corners)[worst].tolist()
+    x, y, z = solid.stress_points()[worst].tolist()
     name = groups[group[worst]]
     return HotSpot(float(stress[worst]), float(strengths[name]), (x, y, z), name)

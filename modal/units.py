@@ -57,9 +57,7 @@ def doubts(
         found.append(f"the mass is {mass:.3g} kg")
     if first_hz is not None and _outside(first_hz, FREQUENCIES):
         found.append(f"the first frequency is {first_hz:.4g} Hz")
-    if not found:
-        return ()
-    return (f"{'; '.join(found)}; check the units: mesh in m, young in Pa, density in kg/m^3",)
+    return _together(found, "mesh in m, young in Pa, density in kg/m^3")
 
 
 def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:
@@ -70,7 +68,11 @@ def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:
         found.append(f"the first mode has an effective mass of {effective_mass:.3g} kg at the interface{slip}")
     if _outside(first_hz, FREQUENCIES):
         found.append(f"the first frequency is {first_hz:.4g} Hz")
-    return (f"{'; '.join(found)}; check the units: mass in kg, stiffness in N/m",) if found else ()
+    return _together(found, "mass in kg, stiffness in N/m")
+
+
+def _together(found: list[str], units: str) -> tuple[str, ...]:
+    return (f"{'; '.join(found)}; check the units: {units}",) if found else ()
 
 
 def _outside(value: float, bounds: tuple[float, float]) -> bool:

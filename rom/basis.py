@@ -8,12 +8,16 @@ An installed package adds one, a ReductionBasis or an object that answers like o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from vanedamp.files.extensions import Registry
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases import craig_bampton, free_interface
 from vanedamp.rom.bases.projection import Factorize, ReductionError
+from vanedamp.rom.error_estimate import Rung, frf_errors
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import SpeedBases
@@ -56,7 +60,10 @@ class ReductionBasis:
         self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize, blocks: int,
         keep_recovery: bool = False,
     ) -> ReducedModel:  # fmt: skip
-        """Return the model that `cut` takes those up to `modes` of, with that many blocks of quasi-static modes."""
+        """Return the model that `cut` takes those up to `modes` of, with that many blocks of quasi-static modes.
+
+        With 1 + BLOCKS, it has their error estimates as well (rom.error_estimate); Craig-Bampton models then have one.
+        """
         reduce = craig_bampton.reduce if self.held else free_interface.reduce_free
         return reduce(matrices, interface, modes, factorize, keep_recovery, blocks)
 
@@ -69,6 +76,8 @@ class ReductionBasis:
         return 0 if self.held and not self.without_mass else max(rich.rigid_modes, self.least)
 
 
+#: blocks of quasi-static coordinates that the error estimate of a model needs in addition to its own
+BLOCKS = 2
 #: the values of `basis` (rom.reduction.reduce says what they are)
 BASES = Registry(
     "basis",
@@ -92,3 +101,15 @@ def basis_named(name: str) -> ReductionBasis:
         raise ReductionError(f"basis: expected one of {', '.join(BASES.names())}, not {name!r}")
     basis: ReductionBasis = BASES.part(name)
     return basis
+
+
+def basis_ladder(
+    rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
+) -> list[Rung]:
+    """Return the error of every model of a basis that can be cut from a rich one, against the latter."""
+    found = basis_named(basis)
+    models = [(modes, found.cut(rich, modes)) for modes in range(found.least_modes(rich), rich.modes + 1)]
+    return [
+        Rung(modes, model.size, float(frf_errors(model, rich, frequencies_hz, labels).max()), 0.0)
+        for modes, model in models
+    ]

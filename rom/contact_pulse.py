@@ -83,7 +83,7 @@ def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
 
 
 def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: Collision) -> float:
-    """Return the share of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
+    """Return the fraction of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
 
     A half sine of force at the contact frequency leaves mode j the energy (row_j p S(omega_j))^2 / 2, p the impulse at
     the mass of the first mode and S the pulse's spectrum; relative to that of the approach and of all modes but the

@@ -16,7 +16,7 @@ Needs numpy and reduced models only.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ class LadderError(VanedampError):
 class Rung:
     """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
-    above: share of a collision's energy that modes beyond the model's would take, which need not be an error;
+    above: fraction of a collision's energy that modes beyond the model's would take, which need not be an error;
     attached: whether the modes come with residual attachment modes (ReducedModel.attached).
     """
 
@@ -101,14 +101,9 @@ def frf_errors(
 def worst_rungs(ladders: Sequence[Sequence[Rung]]) -> list[Rung]:
     """Return the largest errors of several ladders by their numbers of modes, of those that all of them have."""
     by_modes = [{rung.modes: rung for rung in ladder} for ladder in ladders]
-    return [
-        Rung(
-            modes, max(rung.size for rung in rungs), max(rung.receptance for rung in rungs),
-            max(rung.collision for rung in rungs), max(rung.above for rung in rungs), any(r.attached for r in rungs),
-        )
-        for modes in by_modes[0]
-        if len(rungs := [ladder[modes] for ladder in by_modes if modes in ladder]) == len(ladders)
-    ]  # fmt: skip
+    common = [modes for modes in by_modes[0] if all(modes in ladder for ladder in by_modes)]
+    fields = [zip(*(astuple(ladder[modes]) for ladder in by_modes), strict=True) for modes in common]
+    return [Rung(*(max(values) for values in columns)) for columns in fields]
 
 
 def rigid_errors(
@@ -179,7 +174,7 @@ def natural_ladder(
 
 
 def _natural_models(richer: ReducedModel, attached: bool) -> Iterator[ReducedModel]:
-    for modes in range(_least(richer), richer.size):
+    for modes in range(max(1, richer.rigid_modes), richer.size):
         model = with_attachment_modes(richer, modes) if attached else massless(richer, modes)
         if model.size < richer.size:
             yield model
@@ -189,11 +184,6 @@ def _natural_models(richer: ReducedModel, attached: bool) -> Iterator[ReducedMod
 def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: float) -> list[complex]:
     squares, shapes = spectrum(model.mass, model.stiffness)
     return [pulse(squares, model.row(item.label) @ shapes, item, frequency_hz).transform for item in collisions]
-
-
-def _least(model: ReducedModel) -> int:
-    """Return the fewest natural modes of a model: one, or its rigid motions."""
-    return max(1, model.rigid_modes)
 
 
 def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:

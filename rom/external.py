@@ -111,11 +111,9 @@ def external_model(
     size = len(mass)
     rows = {label: _row(label, given, size) for label, given in interface.items()}
     massless = ~np.any(matrices["mass"], axis=0)
-    definiteness = tuple(
-        checks.definiteness(matrix[np.ix_(kept, kept)])
-        for matrix, kept in ((matrices["mass"], ~massless), (matrices["stiffness"], matrices["stiffness"].any(axis=0)))
-    )
-    for name, value in zip(("mass", "stiffness"), definiteness, strict=True):
+    definiteness = {}
+    for name, kept in (("mass", ~massless), ("stiffness", matrices["stiffness"].any(axis=0))):
+        value = definiteness[name] = checks.definiteness(matrices[name][np.ix_(kept, kept)])
         if value < -_INDEFINITE:
             raise ExternalError(f"{name}: not positive definite (lowest eigenvalue {value:.1e} of the highest)")
     residual = None
@@ -125,7 +123,8 @@ def external_model(
         matrices["mass"], matrices["stiffness"], rows, damping=matrices.get("damping"), damping_ratio=damping_ratio,
         directions=directions, base_load=base_load, residual_flexibility=residual, provenance=dict(provenance or {}),
     )  # fmt: skip
-    return model, Findings(asymmetry, (definiteness[0], definiteness[1]), model.rigid_modes, int(massless.sum()))
+    lowest = definiteness["mass"], definiteness["stiffness"]
+    return model, Findings(asymmetry, lowest, model.rigid_modes, int(massless.sum()))
 
 
 def _condensed(

@@ -19,7 +19,7 @@ KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
-# the same of the constraints between rigid patches: an edge that is straight within that share of its length is a hinge
+# the same of the constraints between rigid patches: an edge, straight within that fraction of its length, is a hinge
 _STRAIGHT = 1e-5
 # a mean normal shorter than this is that of a surface which faces everywhere, or that of several which face apart
 _FLAT, _ONE_WAY = 0.5, 0.9
@@ -117,7 +117,7 @@ def plane_motion(
         )
     second /= np.linalg.norm(second)
     groups = (facets,) if isinstance(facets, str) else tuple(facets)
-    patch, point = matrices.patch(groups), None
+    (patch, centroid, offsets), point = _around(matrices, groups), None
     known = any(matrices.patch(group).normal.any() for group in groups)
     if kind == "patch" and known and np.linalg.norm(patch.normal) < _ONE_WAY:
         raise InterfaceError(
@@ -125,9 +125,8 @@ def plane_motion(
             "one entry for each surface"
         )
     if kind == "cavity":
-        offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
         middle = 0.5 * (np.min(offsets @ first) + np.max(offsets @ first))
-        point = _triple(_centroid(matrices, patch) + middle * first + np.min(offsets @ second) * second)
+        point = _triple(centroid + middle * first + np.min(offsets @ second) * second)
     own, one = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
     motion = [
         InterfaceCoordinate(label, one, _triple(first), own, point=point),
@@ -152,7 +151,7 @@ def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> t
 
 def outward_normal(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
     """Return the unit normal of a patch of facets, out of the material. Raises InterfaceError for one without."""
-    normal = _normal(matrices, facets)
+    normal = _normal(matrices.patch(facets))
     if not normal.any():
         raise InterfaceError(f"{facets!r} has no normal: it is a node set, or curves too much; give three numbers")
     return _triple(normal)
@@ -163,11 +162,10 @@ def _triple(vector: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _normal(matrices: SystemMatrices, facets: str | Sequence[str]) -> np.ndarray:
+def _normal(patch: Patch) -> np.ndarray:
     """Return the unit normal (3,) of a patch; zeros where it has none."""
-    normal = matrices.patch(facets).normal
-    length = np.linalg.norm(normal)
-    return normal / length if length > _FLAT else np.zeros(3)
+    length = np.linalg.norm(patch.normal)
+    return patch.normal / length if length > _FLAT else np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -209,12 +207,11 @@ class Interface(Displayed):
         twice = sorted({label for label in labels if labels.count(label) > 1})
         if twice:
             raise InterfaceError(f"{twice[0]}: this label occurs twice; interface labels must be unique")
-        vectors = np.column_stack([_functional(matrices, coordinate) for coordinate in coordinates])
+        resolved = [_resolved(matrices, coordinate) for coordinate in coordinates]
+        functionals, normals, positions, arms = (np.array(values) for values in zip(*resolved, strict=True))
+        vectors = functionals.T
         motions = _motions(matrices, list(dict.fromkeys(item.facets for item in coordinates if item.kind == "rigid")))
         _check_independent(coordinates, vectors, motions.T @ vectors)
-        normals = np.array([_normal(matrices, coordinate.facets) for coordinate in coordinates])
-        positions = np.array([_position(matrices, coordinate) for coordinate in coordinates])
-        arms = np.array([_arm(matrices, coordinate) for coordinate in coordinates])
         return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates), normals, positions, arms)
 
     @property
@@ -229,31 +226,37 @@ class Interface(Displayed):
 
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
         """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
-        if self.motions.nnz == self.motions.shape[1]:  # no rigid patch: free DOFs only
-            free = self.motions.nonzero()[0]
-            stiffness, mass = (matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass))
-        else:
-            stiffness, mass = (
-                sparse.csr_array(self.motions.T @ matrix @ self.motions)
-                for matrix in (matrices.stiffness, matrices.mass)
-            )
-        return stiffness, mass, self.motions.T @ self.vectors
+
+        def restricted(matrix: sparse.csr_array) -> sparse.csr_array:
+            if self.motions.nnz == self.motions.shape[1]:  # no rigid patch: free DOFs only
+                return matrices.of_free(matrix)
+            return sparse.csr_array(self.motions.T @ matrix @ self.motions)
+
+        return restricted(matrices.stiffness), restricted(matrices.mass), self.motions.T @ self.vectors
 
 
-def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
-    if coordinate.motion == "rotation":
-        return _rotation(matrices, coordinate, np.array(coordinate.direction))
-    if coordinate.kind == "node":
-        nearest = _nearest(matrices, matrices.patch(coordinate.facets))
+def _resolved(matrices: SystemMatrices, item: InterfaceCoordinate) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return functional (N,), normal of the patch (3,), place of the motion (3,), m, and radius of gyration, m.
+
+    The radius is that of the patch about the axis of a rotation; 0 for a displacement.
+    """
+    patch, centroid, offsets = _around(matrices, item.facets)
+    normal = _normal(patch)
+    if item.motion == "rotation":
+        squares = np.square(np.cross(offsets, item.direction)).sum(axis=1)
+        arm = float(np.sqrt(patch.weights @ squares / patch.area))
+        return _rotation(matrices, item, np.array(item.direction)), normal, centroid, arm
+    if item.kind == "node":
+        nearest = int(patch.nodes[first_largest(-np.linalg.norm(offsets, axis=1))])
         functional = np.zeros(matrices.size)
-        functional[3 * nearest : 3 * nearest + 3] = coordinate.direction
-        return functional
-    functional = patch_average(matrices, coordinate.facets, coordinate.direction)
-    if coordinate.point is not None:
-        # the rotation moves a point by (theta x offset) . direction = theta . (offset x direction)
-        offset = np.array(coordinate.point) - _centroid(matrices, matrices.patch(coordinate.facets))
-        functional = functional + _rotation(matrices, coordinate, np.cross(offset, coordinate.direction))
-    return functional
+        functional[3 * nearest : 3 * nearest + 3] = item.direction
+        return functional, normal, matrices.coordinates[nearest], 0.0
+    functional = patch_average(matrices, item.facets, item.direction)
+    if item.point is None:
+        return functional, normal, centroid, 0.0
+    # the rotation moves a point by (theta x offset) . direction = theta . (offset x direction)
+    axis = np.cross(np.array(item.point) - centroid, item.direction)
+    return functional + _rotation(matrices, item, axis), normal, np.array(item.point), 0.0
 
 
 def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: np.ndarray) -> np.ndarray:
@@ -261,8 +264,7 @@ def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: n
 
     axis: (3,) of any length. Raises InterfaceError for nodes whose motion does not tell it.
     """
-    patch = matrices.patch(coordinate.facets)
-    offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
+    patch, _, offsets = _around(matrices, coordinate.facets)
     length = np.abs(offsets).max() or 1.0
     root = np.sqrt(np.maximum(np.repeat(patch.weights, 3), 0.0))
     wanted = np.concatenate([np.zeros(3), axis])
@@ -273,24 +275,6 @@ def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: n
     functional = np.zeros((len(matrices.coordinates), 3))
     functional[patch.nodes] = (fit * root / length).reshape(-1, 3)
     return functional.ravel()
-
-
-def _position(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
-    """Return the place (3,) whose motion the coordinate is, m."""
-    patch = matrices.patch(coordinate.facets)
-    if coordinate.kind == "node":
-        return matrices.coordinates[_nearest(matrices, patch)]
-    return _centroid(matrices, patch) if coordinate.point is None else np.array(coordinate.point)
-
-
-def _arm(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> float:
-    """Return the radius of gyration, m, of a patch about the axis of its rotation; 0 for a displacement."""
-    if coordinate.motion != "rotation":
-        return 0.0
-    patch = matrices.patch(coordinate.facets)
-    offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
-    squares = np.square(np.cross(offsets, coordinate.direction)).sum(axis=1)
-    return float(np.sqrt(patch.weights @ squares / patch.area))
 
 
 def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
@@ -314,11 +298,11 @@ def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -
     free[matrices.free] = True
     rest, count, blocks = free.copy(), np.zeros(matrices.size), []
     for facets in rigid:
-        patch = matrices.patch(facets)
+        patch, _, offsets = _around(matrices, facets)
         dofs = (3 * patch.nodes[:, None] + np.arange(3)).ravel()
         rest[dofs] = False
         count[dofs] += 1.0
-        basis = rigid_basis(matrices.coordinates[patch.nodes] - _centroid(matrices, patch))
+        basis = rigid_basis(offsets)
         columns = np.tile(np.arange(basis.shape[1]), len(dofs))
         shape = (matrices.size, basis.shape[1])
         blocks.append(sparse.csr_array((basis.ravel(), (np.repeat(dofs, basis.shape[1]), columns)), shape=shape))
@@ -365,14 +349,12 @@ def rigid_basis(offsets: np.ndarray) -> np.ndarray:
     return left[:, singular > _DEPENDENT * singular[0]]
 
 
-def _nearest(matrices: SystemMatrices, patch: Patch) -> int:
-    """Return the node of a patch nearest to its centroid."""
-    distances = np.linalg.norm(matrices.coordinates[patch.nodes] - _centroid(matrices, patch), axis=1)
-    return int(patch.nodes[first_largest(-distances)])
-
-
-def _centroid(matrices: SystemMatrices, patch: Patch) -> np.ndarray:
-    return patch.weights @ matrices.coordinates[patch.nodes] / patch.area
+def _around(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[Patch, np.ndarray, np.ndarray]:
+    """Return a patch, its centroid (3,) and the positions of its nodes about that (k, 3), m."""
+    patch = matrices.patch(facets)
+    points = matrices.coordinates[patch.nodes]
+    centroid = patch.weights @ points / patch.area
+    return patch, centroid, points - centroid
 
 
 def _check_independent(coordinates: Sequence[InterfaceCoordinate], vectors: np.ndarray, restricted: np.ndarray) -> None:

@@ -235,22 +235,15 @@ class ReducedModel(Displayed):
 
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
         """Return the Ritz model in the coordinates y of q = basis @ y, basis (n, m), with `changes` of its fields."""
-        mass, stiffness = (symmetric_part(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
-        added = self.centrifugal_stiffness
-        if self.damping_ratio is None:
-            damping = symmetric_part(basis.T @ self.damping @ basis)
-        else:
-            damping = modal_damping(mass, stiffness, self.damping_ratio)
-        values: dict[str, Any] = {
-            "mass": mass,
-            "damping": damping,
-            "stiffness": stiffness,
-            "selection": self.selection @ basis,
-            "base_load": basis.T @ self.base_load,
-            "centrifugal_stiffness": None if added is None else symmetric_part(basis.T @ added @ basis),
-            "output_rows": None if self.output_rows is None else self.output_rows @ basis,
-            "recovery": None if self.recovery is None else self.recovery @ basis,
-        }
+        values: dict[str, Any] = {"base_load": basis.T @ self.base_load}
+        for name in ("mass", "damping", "stiffness", "centrifugal_stiffness"):
+            if (matrix := getattr(self, name)) is not None:
+                values[name] = symmetric_part(basis.T @ matrix @ basis)
+        for name in ("selection", "output_rows", "recovery"):
+            if (rows := getattr(self, name)) is not None:
+                values[name] = rows @ basis
+        if self.damping_ratio is not None:
+            values["damping"] = modal_damping(values["mass"], values["stiffness"], self.damping_ratio)
         return replace(self, **(values | changes))
 
     def at_speed(self, speed: float) -> ReducedModel:
@@ -310,13 +303,48 @@ class ReducedModel(Displayed):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an HDF5 record that xarray opens."""
-        _save(self, path)
+        arrays = {name: (getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
+        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
+        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
+        variables["axis"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",))
+        variables["natural_frequency"] = store.Variable(self.natural_frequencies_hz, ("mode",), "Hz")
+        if self.outputs:
+            variables["output"] = store.Variable(np.array(self.outputs, dtype=object), ("output",))
+        if self.blocks:
+            variables["blocks"] = store.Variable(np.array(self.blocks, np.int64), ("block",))
+        attributes: dict[str, Any] = {
+            "fixed_interface_modes": self.fixed_interface_modes,
+            "free_modes": self.free_modes,
+            "provenance": dict(self.provenance),
+        }
+        if self.damping_ratio is not None:
+            attributes["damping_ratio"] = self.damping_ratio
+        if self.greatest_speed:
+            attributes["greatest_speed"] = self.greatest_speed
+        store.save(path, _KIND, variables, attributes)
 
     @classmethod
     @store.reader
     def load(cls, path: str | os.PathLike[str]) -> ReducedModel:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
-        return cls(**_fields(path))
+        values, attributes = store.load(path, _KIND)
+        for name in _REQUIRED:
+            if np.iscomplexobj(values[name]):
+                raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
+            if not np.all(np.isfinite(values[name])):
+                raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
+        arrays: dict[str, Any] = {name: values[name] if name in _REQUIRED else values.get(name) for name in _ARRAYS}
+        return cls(
+            **arrays,
+            interface=tuple(values["interface"]),
+            outputs=tuple(values.get("output", ())),
+            blocks=tuple(values.get("blocks", ())),
+            damping_ratio=attributes.get("damping_ratio"),
+            fixed_interface_modes=attributes["fixed_interface_modes"],
+            free_modes=attributes.get("free_modes", 0),
+            greatest_speed=attributes.get("greatest_speed", 0.0),
+            provenance=json.loads(attributes["provenance"]),
+        )
 
     @property
     def squares(self) -> np.ndarray:
@@ -385,49 +413,3 @@ def _check_interface(model: ReducedModel) -> None:
         raise ReducedModelError(f"blocks: {model.blocks} and {model.modes} modes exceed the {model.size} coordinates")
     if np.any(model.selection[:, model.size - model.fixed_interface_modes :]):
         raise ReducedModelError("selection: the last coordinates are fixed-interface modes and must not move it")
-
-
-def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
-    """Write the record."""
-    arrays = {name: (getattr(model, name), *layout) for name, layout in _ARRAYS.items()}
-    variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
-    variables["interface"] = store.Variable(np.array(model.interface, dtype=object), ("interface",))
-    variables["axis"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",))
-    variables["natural_frequency"] = store.Variable(model.natural_frequencies_hz, ("mode",), "Hz")
-    if model.outputs:
-        variables["output"] = store.Variable(np.array(model.outputs, dtype=object), ("output",))
-    if model.blocks:
-        variables["blocks"] = store.Variable(np.array(model.blocks, np.int64), ("block",))
-    attributes = {
-        "fixed_interface_modes": model.fixed_interface_modes,
-        "free_modes": model.free_modes,
-        "provenance": dict(model.provenance),
-    }
-    if model.damping_ratio is not None:
-        attributes["damping_ratio"] = model.damping_ratio
-    if model.greatest_speed:
-        attributes["greatest_speed"] = model.greatest_speed
-    store.save(path, _KIND, variables, attributes)
-
-
-def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the fields of the model whose record `save` wrote. Raises files.store.StoreError."""
-    values, attributes = store.load(path, _KIND)
-    required = {name: values[name] for name in _REQUIRED}
-    for name, array in required.items():
-        if np.iscomplexobj(array):
-            raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
-        if not np.all(np.isfinite(array)):
-            raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
-    return dict(
-        **required,
-        **{name: values.get(name) for name in _ARRAYS if name not in _REQUIRED},
-        interface=tuple(values["interface"]),
-        outputs=tuple(values.get("output", ())),
-        blocks=tuple(values.get("blocks", ())),
-        damping_ratio=attributes.get("damping_ratio"),
-        fixed_interface_modes=attributes["fixed_interface_modes"],
-        free_modes=attributes.get("free_modes", 0),
-        greatest_speed=attributes.get("greatest_speed", 0.0),
-        provenance=json.loads(attributes["provenance"]),
-    )

@@ -3,7 +3,7 @@
 The basis joins those of Craig and Bampton at several speeds, each from one factorisation. The constraint modes at
 standstill move the interface; what they become at other speeds, and the fixed-interface and quasi-static modes there,
 differ from those at standstill by motions that leave the interface at rest. Of these differences a basis, orthogonal to
-the modes at standstill in strain energy, stands beside the constraint modes: every smaller model (rom.truncation) keeps
+the modes at standstill in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps
 it. As the squared speed enters the stiffness linearly, a few speeds are enough, spaced evenly in its square.
 
 The error between the speeds of the basis is estimated at those halfway (in the square): by what the model gains from
@@ -34,7 +34,7 @@ from vanedamp.rom.reduced import ReducedModel
 if TYPE_CHECKING:
     from vanedamp.modal.rotating import RotatingMatrices
 
-# share of a field's strain energy that the modes at standstill must not have; the error of a squared frequency by it
+# fraction of a field's strain energy that the modes at standstill must not have; the error of a squared frequency by it
 _OWN_SHARE = 1e-10
 # relative error of natural frequencies between the speeds of the basis
 _FREQUENCY = 1e-5
@@ -81,7 +81,7 @@ class SpeedBases:
         """
         standing, interface = self.rotating.standing, self.interface
         joined = self._joined(speeds, modes)
-        basis = interface.motions @ np.hstack([joined.constraint, *joined.blocks, joined.fixed])
+        basis = interface.motions @ joined.fields
         model = replace(
             craig_bampton.reduced_model(standing, interface, joined, origin, keep_recovery),
             centrifugal_stiffness=symmetric_part(basis.T @ (self.rotating.centrifugal_stiffness @ basis)),
@@ -100,7 +100,7 @@ class SpeedBases:
         return replace(standing, stiffness=standing.stiffness + speed**2 * self.rotating.centrifugal_stiffness)
 
     def _joined(self, speeds: Sequence[float], modes: int) -> Basis:
-        """Return the basis at standstill, with what others differ from it beside the constraint modes."""
+        """Return the basis at standstill, with the differences of the others from it, after the constraint modes."""
         stiffness, mass, _ = self.interface.restrict(self.rotating.standing)
         count = len(self.interface.labels)
         first = self.at(speeds[0])

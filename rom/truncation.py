@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from vanedamp.modal.algebra import orthonormal, symmetric_part
+from vanedamp.modal.algebra import krylov, orthonormal, symmetric_part
 from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectrum
-from vanedamp.rom.krylov import krylov
 from vanedamp.rom.reduced import ReducedModel
 
 # natural modes, and what the structure does beyond them, are those of one stiffness

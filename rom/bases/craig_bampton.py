@@ -19,25 +19,23 @@ from the same factors (Craig and Hale 1988, J. Guidance 11(6), block-Krylov comp
 from __future__ import annotations
 
 import contextlib
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.algebra import column_signs, orthogonal, orthonormal, symmetric_part
-from vanedamp.modal.lanczos import NotConvergedError, directions
+from vanedamp.modal.algebra import column_signs, krylov, orthogonal, orthonormal, symmetric_part
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.projection import Factorize, ReductionError, motions_left, project, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, lowest_modes, motions_left, project, superlu
 from vanedamp.rom.interface import Interface
-from vanedamp.rom.krylov import krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # a round trip through a well-posed matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2
 # the same for a structure that its supports hold
 _EXACT = 1e-6
-# share of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
+# fraction of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
 # lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
 _SMALLEST = 1e-14
@@ -53,6 +51,11 @@ class Basis(NamedTuple):
     constraint: np.ndarray
     blocks: list[np.ndarray]
     fixed: np.ndarray
+
+    @property
+    def fields(self) -> np.ndarray:
+        """(n, m) all fields, in the order of the reduced coordinates."""
+        return np.hstack([self.constraint, *self.blocks, self.fixed])
 
 
 def reduce(
@@ -104,19 +107,9 @@ def reduced_model(
     matrices: SystemMatrices, interface: Interface, parts: Basis, origin: dict[str, Any], keep_recovery: bool = False
 ) -> ReducedModel:
     """Return the model that a basis makes of a structure; origin: entries of its provenance."""
-    basis = np.hstack([parts.constraint, *parts.blocks, parts.fixed])
-    full = interface.motions @ basis
-    return project(
-        matrices, interface,
-        mass=symmetric_part(full.T @ (matrices.mass @ full)),
-        stiffness=symmetric_part(full.T @ (matrices.stiffness @ full)),
-        basis=basis,
-        selection=np.eye(len(interface.labels), basis.shape[1]),
-        blocks=parts.blocks,
-        origin=origin,
-        keep_recovery=keep_recovery,
-        fixed_interface_modes=parts.fixed.shape[1],
-    )  # fmt: skip
+    basis, kept = parts.fields, parts.fixed.shape[1]
+    selection = np.eye(len(interface.labels), basis.shape[1])
+    return project(matrices, interface, basis, selection, parts.blocks, origin, keep_recovery, kept)
 
 
 def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -157,15 +150,6 @@ def _characteristic(
     return np.hstack([static, (modes - static @ (labels @ modes))[:, news]])
 
 
-class _Held(Protocol):
-    """The stiffness with the interface held, factorised: constraint modes (n, k), and responses to loads."""
-
-    constraint: np.ndarray
-
-    def solve(self, load: np.ndarray) -> np.ndarray:
-        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
-
-
 def _held(
     matrices: SystemMatrices,
     interface: Interface,
@@ -173,8 +157,8 @@ def _held(
     mass: sparse.csr_array,
     vectors: np.ndarray,
     factorize: Factorize,
-) -> _Held:
-    """Return the held stiffness by the way that is quickest: its own factors where the supports hold the structure."""
+) -> _Supported | _Bordered:
+    """Return the stiffness with the interface held, factorised: from its own factors where the supports hold it."""
     if motions_left(matrices, interface, stiffness, mass)[0] == 0:
         with contextlib.suppress(VanedampError):
             held = _Supported(stiffness, vectors, factorize)
@@ -184,9 +168,9 @@ def _held(
 
 
 class _Supported:
-    """A structure that its supports hold: from the factors of its own stiffness.
+    """A structure that its supports hold: from the factors of its own stiffness; constraint: (n, k) constraint modes.
 
-    The response with the interface held is the one without, less the constraint modes' share in it. That cancels digits
+    The response with the interface held is the one without, less the constraint modes' part of it. That cancels digits
     where the supports are much softer than the structure; `error` says how exact it is, relative to 1.
     """
 
@@ -223,11 +207,11 @@ class _Bordered:
         self.constraint = self._factor.solve(given)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
+        """Return the same as that of _Supported."""
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
-def _fixed_interface_modes(held: _Held, mass: sparse.csr_array, count: int, modes: int) -> np.ndarray:
+def _fixed_interface_modes(held: _Supported | _Bordered, mass: sparse.csr_array, count: int, modes: int) -> np.ndarray:
     """Return mass-normalised modes (n, modes), by frequency; count: of the held functionals.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
@@ -238,23 +222,18 @@ def _fixed_interface_modes(held: _Held, mass: sparse.csr_array, count: int, mode
         raise ReductionError(
             f"modes: expected 0 to {size - count} (the structure has no more with its interface held), not {modes}"
         )
-    if modes == 0:
-        return np.empty((size, 0))
-    if directions(modes) < size - count:
-        try:
-            shapes = lowest_modes(mass, modes, held.solve)[1]
-        except NotConvergedError as error:
-            raise ReductionError(f"modes: {error}") from error
-    else:
+
+    def dense() -> tuple[np.ndarray, np.ndarray]:
         inertia = mass.toarray()
-        flexibility = inertia @ held.solve(np.eye(size)) @ inertia
-        wanted = [size - modes, size - 1]
-        shapes = linalg.eigh(symmetric_part(flexibility), inertia, subset_by_index=wanted)[1][:, ::-1]
-    return shapes * column_signs(shapes)
+        flexibility = symmetric_part(inertia @ held.solve(np.eye(size)) @ inertia)
+        values, shapes = linalg.eigh(flexibility, inertia, subset_by_index=[size - modes, size - 1])
+        return 1.0 / values[::-1], shapes[:, ::-1]
+
+    return lowest_modes(mass, modes, held.solve, size - count, 0.0, dense)[1]
 
 
 def _quasi_static_blocks(
-    held: _Held, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray, count: int
+    held: _Supported | _Bordered, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray, count: int
 ) -> list[np.ndarray]:
     """Return blocks (n, m <= k), M-orthonormal, without combinations that blocks before and fixed-interface modes have.
 

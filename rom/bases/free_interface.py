@@ -17,19 +17,25 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal.algebra import column_signs, symmetric_part
-from vanedamp.modal.lanczos import NotConvergedError, directions
+from vanedamp.modal.algebra import column_signs, krylov
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, motions_left, project, superlu
+from vanedamp.rom.bases.projection import (
+    Factorize,
+    ReductionError,
+    Solver,
+    lowest_modes,
+    motions_left,
+    project,
+    superlu,
+)
 from vanedamp.rom.interface import Interface
-from vanedamp.rom.krylov import krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # of the squared frequency of uniform strains: small beside those of modes, far above round-off of the factorisation
 _SHIFT = 1e-4
 _ROUNDS = 200
 _CONVERGED = 1e-12
-# share of the static response that the modes have left, below which an attachment mode is round-off
+# fraction of the static response that the modes have left, below which an attachment mode is round-off
 _LEFT = 1e-9
 
 
@@ -56,41 +62,17 @@ def reduce_free(
         )
     shift = _SHIFT * strain if rigid else 0.0
     shifted = factorize(sparse.csr_array(stiffness + shift * mass) if rigid else stiffness)
-    squares, shapes = _natural_modes(shifted, stiffness, mass, modes, shift, rigid)
-    attached = _attachments(shifted, mass, squares, shapes, vectors, shift, blocks)
-    basis = np.hstack([*attached, shapes])
-    lead = basis.shape[1] - modes
-    return project(
-        matrices, interface,
-        mass=_uncoupled(basis.T @ (mass @ basis), lead, np.ones(modes)),
-        stiffness=_uncoupled(basis.T @ (stiffness @ basis), lead, squares),
-        basis=basis,
-        selection=vectors.T @ basis,
-        blocks=attached,
-        origin={"basis": "rubin" if blocks else "truncated", "modes": modes, "quasi_static": blocks},
-        keep_recovery=keep_recovery,
-        free_modes=modes,
+    squares, shapes = lowest_modes(
+        mass, modes, shifted.solve, size, shift,
+        lambda: linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, modes - 1]),
     )  # fmt: skip
-
-
-def _natural_modes(
-    shifted: Solver, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, shift: float, rigid: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared frequencies (modes,), zero for rigid motions, and mass-normalised shapes (n, modes)."""
-    size = mass.shape[0]
-    if modes == 0:
-        return np.empty(0), np.empty((size, 0))
-    if directions(modes) < size:
-        try:
-            squares, shapes = lowest_modes(mass, modes, shifted.solve, shift)
-        except NotConvergedError as error:
-            raise ReductionError(f"modes: {error}") from error
-    else:
-        squares, shapes = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, modes - 1])
     if np.any(squares[rigid:] <= 0.0):
         raise ReductionError("the structure has a mechanism: parts of it move without strain; support or join them")
     squares[:rigid] = 0.0
-    return squares, shapes * column_signs(shapes)
+    attached = _attachments(shifted, mass, squares, shapes, vectors, shift, blocks)
+    basis = np.hstack([*attached, shapes])
+    origin = {"basis": "rubin" if blocks else "truncated", "modes": modes, "quasi_static": blocks}
+    return project(matrices, interface, basis, vectors.T @ basis, attached, origin, keep_recovery, squares=squares)
 
 
 def _attachments(
@@ -108,7 +90,15 @@ def _attachments(
     inertia = mass @ shapes
 
     def static(load: np.ndarray) -> np.ndarray:
-        return _static(shifted, mass, shapes, inertia, load, shift)
+        """Return K^-1 load without the kept modes, for loads that these do not feel."""
+        response = np.zeros_like(load)
+        for _ in range(_ROUNDS if shift else 1):
+            before = response
+            response = shifted.solve(load + shift * (mass @ before) if shift else load)
+            response = response - shapes @ (inertia.T @ response)
+            if np.abs(response - before).max() <= _CONVERGED * np.abs(response).max():
+                break
+        return response
 
     known = shapes.T @ vectors
     block = static(vectors - inertia @ known)
@@ -116,22 +106,3 @@ def _attachments(
     known_part = np.linalg.norm(known[elastic] / squares[elastic, None], axis=0)
     left = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * known_part
     return [found * column_signs(found) for found in krylov(block[:, left], static, mass, count)]
-
-
-def _static(
-    shifted: Solver, mass: sparse.csr_array, shapes: np.ndarray, inertia: np.ndarray, load: np.ndarray, shift: float
-) -> np.ndarray:
-    """Return K^-1 load without the kept modes, for loads that these do not feel."""
-    response = np.zeros_like(load)
-    for _ in range(_ROUNDS if shift else 1):
-        before = response
-        response = shifted.solve(load + shift * (mass @ before) if shift else load)
-        response = response - shapes @ (inertia.T @ response)
-        if np.abs(response - before).max() <= _CONVERGED * np.abs(response).max():
-            break
-    return response
-
-
-def _uncoupled(matrix: np.ndarray, lead: int, diagonal: np.ndarray) -> np.ndarray:
-    """Return the attachments' block and the modes' diagonal: all else is round-off."""
-    return linalg.block_diag(symmetric_part(matrix[:lead, :lead]), np.diag(diagonal))

@@ -12,7 +12,8 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.algebra import affine_fields, ritz_values
+from vanedamp.modal.algebra import affine_fields, column_signs, ritz_values, symmetric_part
+from vanedamp.modal.lanczos import NotConvergedError, directions, eigenpairs
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
@@ -47,29 +48,65 @@ def superlu(matrix: sparse.csr_array) -> Solver:
         raise ReductionError(f"the matrix of size {matrix.shape[0]} is singular ({error})") from error
 
 
+def lowest_modes(
+    mass: sparse.csr_array,
+    modes: int,
+    solve: Callable[[np.ndarray], np.ndarray],
+    rank: int,
+    shift: float,
+    dense: Callable[[], tuple[np.ndarray, np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest eigenvalues (m,) ascending and vectors (n, m) of K x = lambda M x, by block Lanczos.
+
+    solve  (K + shift M)^-1 applied to loads (n, b), or its inverse in a subspace, where the vectors then lie
+    rank   dimension of that subspace
+    dense  returns the same modes by a dense solution, for structures that are too small for Lanczos
+
+    Raises ReductionError for modes that do not converge.
+    """
+    if modes == 0:
+        return np.empty(0), np.empty((mass.shape[0], 0))
+    if directions(modes) < rank:
+        try:
+            squares, rows = eigenpairs(lambda loads: solve(loads.T).T, mass, modes, -shift)
+        except NotConvergedError as error:
+            raise ReductionError(f"modes: {error}") from error
+        order = np.argsort(squares)
+        squares, shapes = squares[order], np.ascontiguousarray(rows[order].T)
+    else:
+        squares, shapes = dense()
+    return squares, shapes * column_signs(shapes)
+
+
 def project(
     matrices: SystemMatrices,
     interface: Interface,
-    mass: np.ndarray,
-    stiffness: np.ndarray,
     basis: np.ndarray,
     selection: np.ndarray,
     blocks: Sequence[np.ndarray],
     origin: dict[str, Any],
     keep_recovery: bool,
     fixed_interface_modes: int = 0,
-    free_modes: int = 0,
+    squares: np.ndarray | None = None,
 ) -> ReducedModel:
     """Return the reduced model of a basis (n, m) of the motions that the interface leaves to the structure.
 
-    mass, stiffness  (m, m) projected onto the basis
-    selection        (k, m) interface displacements of the basis
-    blocks           blocks of quasi-static modes in it
-    origin           which basis of how many modes and blocks, for the provenance
+    selection  (k, m) interface displacements of the basis
+    blocks     blocks of quasi-static modes in it
+    origin     which basis of how many modes and blocks, for the provenance
+    squares    (f,) squared frequencies of natural modes, the last f of the basis, if it ends with such
 
-    The numbers of modes are those of ReducedModel.
+    fixed_interface_modes is that of ReducedModel.
     """
     recovery = interface.motions @ basis
+    mass, stiffness = (
+        symmetric_part(recovery.T @ (matrix @ recovery)) for matrix in (matrices.mass, matrices.stiffness)
+    )
+    free_modes = 0 if squares is None else len(squares)
+    if squares is not None:  # what couples them with the rest, and with each other, is round-off
+        lead = slice(basis.shape[1] - free_modes)
+        mass = linalg.block_diag(mass[lead, lead], np.eye(free_modes))
+        stiffness = linalg.block_diag(stiffness[lead, lead], np.diag(squares))
     coordinates = [asdict(item) | {"direction": list(item.direction)} for item in interface.coordinates]
     return ReducedModel.from_matrices(
         mass,

@@ -33,8 +33,7 @@ from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
-from vanedamp.rom.basis import basis_named
-from vanedamp.rom.basis_ladder import BLOCKS, basis_ladder, basis_model, rich_model
+from vanedamp.rom.basis import BLOCKS, basis_ladder, basis_named
 from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors, worst_rungs
 from vanedamp.rom.interface import (
     Interface,
@@ -450,7 +449,7 @@ def reduction(
     """
     rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
     recovery = keep_recovery or bool(spots)
-    speeds = basis_named(basis).speeds
+    found = basis_named(basis)
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
     most = min(_MOST, structure.matrices.free.size // 4)
@@ -458,10 +457,10 @@ def reduction(
     while True:
         if rotating is None:
             bases = None
-            rich = [rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=recovery)]
+            rich = [found.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
         else:
-            assert speeds is not None  # as _greatest_speed has checked
-            bases = speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+            assert found.speeds is not None  # as _greatest_speed has checked
+            bases = found.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
             rich = [bases.model_at(speed) for speed in (0.0, greatest)]
         grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
         rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
@@ -475,7 +474,7 @@ def reduction(
     covered = [min(float(grid[0]) for grid in grids), max(float(grid[-1]) for grid in grids)]
     estimate = choice.to_json() | {"frequencies_hz": covered}
     if bases is None:
-        model = basis_model(rich[0], basis, choice.chosen.modes)
+        model = found.cut(rich[0], choice.chosen.modes)
     else:
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)

@@ -105,7 +105,7 @@ def test_the_chance_of_noise_is_bounded(kind, responses):
     s, chances = 1j * np.linspace(0.8, 1.0, 16), []
     for seed in range(300):
         problem = Rational(s, noise(np.random.default_rng(seed), (responses, s.size), kind), 0)
-        chances.append(problem.chance(problem.best(1)))
+        chances.append(problem.chance(problem.fit(problem.relocated(1))))
     for bound in (0.5, 0.1, 0.01):
         share = np.mean(np.array(chances) < bound)
         assert share <= bound + 3.0 * np.sqrt(bound * (1.0 - bound) / len(chances))

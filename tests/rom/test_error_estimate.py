@@ -9,8 +9,8 @@ from scipy import linalg
 from tests.tools.reduction_errors import full_receptance, receptance_errors
 from tests.tools.small_structures import rod, truss
 from vanedamp.rom import error_estimate as ladder
-from vanedamp.rom.basis import BASES
-from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
+from vanedamp.rom.bases.projection import superlu
+from vanedamp.rom.basis import BASES, BLOCKS, basis_ladder, basis_named
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.reduction import reduce
@@ -39,7 +39,7 @@ def within_five(rich, basis, frequencies, reference, counts):
     """Assert that the estimate is within a factor of five of the true error, frequency by frequency."""
     compared = 0
     for modes in counts:
-        model = basis_model(rich, basis, modes)
+        model = basis_named(basis).cut(rich, modes)
         truth = receptance_errors(model, frequencies, reference)
         estimate = ladder.frf_errors(model, rich if basis == "massless" else truncated(rich, modes), frequencies)
         seen = truth > 1e-9  # what round-off leaves of the reference
@@ -54,7 +54,7 @@ def test_estimate_over_forty_modes_of_the_cluster(coarse, basis):
     from vanedamp.modal.eigen import factorize
 
     matrices, interface, frequencies, reference = coarse
-    rich = rich_model(matrices, interface, basis, 40, factorize)
+    rich = basis_named(basis).rich(matrices, interface, 40, factorize, 1 + BLOCKS)
     least = {"craig-bampton": 0, "rubin": 0}.get(basis, 1)
     # plain modes below the excitation leave errors of whole modes, which no local correction sees
     counts = [modes for modes in (0, 1, 2, 3, 5, 8, 12, 20, 30, 40) if modes >= least]
@@ -66,7 +66,7 @@ def test_estimate_of_a_rod(basis):
     interface = Interface.on_patches(rod(), [InterfaceCoordinate("tip", "tip", (1, 0, 0))])
     frequencies = np.array([0.1, 0.3, 0.6, 0.7])
     omega = 2 * np.pi * frequencies
-    rich = rich_model(rod(), interface, basis, 12)
+    rich = basis_named(basis).rich(rod(), interface, 12, superlu, 1 + BLOCKS)
     within_five(rich, basis, frequencies, (np.tan(omega) / omega)[:, None, None], range(1, 12))
 
 
@@ -91,7 +91,7 @@ def test_choice_keeps_its_promise():
     matrices = replace(truss(), damping_ratio=0.01)
     interface = Interface.on_patches(matrices, ENDS)
     every = reduce(matrices, interface, modes=28)
-    rich = rich_model(matrices, interface, "craig-bampton", 20)
+    rich = basis_named("craig-bampton").rich(matrices, interface, 20, superlu, 1 + BLOCKS)
     frequencies = ladder.frequency_grid(rich, 0.0, 2.0 * rich.natural_frequencies_hz[0])
     rungs = basis_ladder(rich, "craig-bampton", frequencies)
     for tolerance in (0.1, 1e-2, 1e-4):
