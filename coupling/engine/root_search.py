@@ -15,14 +15,14 @@ periods.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
 from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.exponentials import (
     exp_minus_line,
     exp_minus_one,
@@ -35,6 +35,9 @@ from vanedamp.coupling.numerics.exponentials import (
 from vanedamp.coupling.numerics.tolerances import AT_ROOT, NEAR_ROOT, SUM_ROUND_OFF
 from vanedamp.coupling.numerics.vectors import whole_vectors
 
+#: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
+#: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
+MOST, ENDLESS = 1_000_000, -3
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
 _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
@@ -52,20 +55,17 @@ _FAST = 4.0
 class Expansion(NamedTuple):
     """The expansion of an event function at a time, and room for it."""
 
-    taylor: np.ndarray  # (2, DEGREE + 1) polynomials of its motion, and of that without fast modes
-    amplitude: np.ndarray  # (m,) complex: those of the exponentials at its time
-    slow: np.ndarray  # sums over the slow modes
-    fast: np.ndarray  # those over the fast ones
-    more: np.ndarray
-    shifted: np.ndarray  # (DEGREE + 1,) polynomial from another time on
+    taylor: Annotated[np.ndarray, "2 degrees"]  # polynomials of its motion, and of that without fast modes
+    amplitude: Annotated[np.ndarray, "m", complex]  # those of the exponentials at its time
+    slow: Annotated[np.ndarray, "sums"]  # sums over the slow modes
+    fast: Annotated[np.ndarray, "sums"]  # those over the fast ones
+    more: Annotated[np.ndarray, "sums"]
+    shifted: Annotated[np.ndarray, "degrees"]  # polynomial from another time on
 
 
 def new_expansion(modes: int) -> Expansion:
     """Return room for the expansion of event functions of m modes."""
-    slow, fast, more = np.zeros((3, _SUMS))
-    return Expansion(
-        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), slow, fast, more, np.zeros(DEGREE + 1)
-    )  # fmt: skip
+    return room(Expansion, {"m": modes, "degrees": DEGREE + 1, "sums": _SUMS})
 
 
 @kernel
@@ -325,6 +325,43 @@ def _step_by_parabola(a, sign, f, h):
     c7, c8, c9 = min(sign * a[7], 0.0), min(sign * a[8], 0.0), min(sign * a[9], 0.0)
     lowest = (c3 * h + (c4 + c5 * h) * h2) + ((c6 + c7 * h) + (c8 + c9 * h) * h2) * h4 - a[10] * (h4 * h4)
     return min(h, first_root_of_parabola(f, sign * a[1], 2.0 * (sign * a[2] + lowest)))
+
+
+@kernel
+def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
+    """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
+
+    The third value returned: whether k0_far - sign motion has no root on the step either; False is not known.
+    expansion, noise, second, calm, fast: of the motion, as set and returned by `expand`.
+    """
+    whole, slow = expansion.taylor[0], expansion.taylor[1]
+    noise += SUM_ROUND_OFF * abs(k0)
+    f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
+    if f <= noise:
+        if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
+            return 0.0, True, False
+        f = 0.0
+    longest = max(longest, shortest)
+    far = 0.0
+    if calm >= 0.0:
+        above = k0 + sign * slow[0] - fast
+        if above > noise:
+            far, _, _ = safe_step(slow, sign, above, 0.0, 0.0, calm, longest)
+            if far >= longest:
+                return far, False, False
+    step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
+    if far > step:
+        return far, False, False
+    if calm >= 0.0 and far == 0.0 and not found and shortest < step < longest:
+        # the slow motion has left the fast one behind by then
+        above = k0 + sign * slow[0] - fast + shift(slow, sign, step, expansion.shifted)
+        if above > noise:
+            far, _, _ = safe_step(expansion.shifted, 1.0, above, 0.0, 0.0, calm, longest - step)
+            return step + far, False, False
+    if step < shortest:
+        falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
+        return (0.0, True, False) if falls else (shortest, False, False)
+    return step, found, clear
 
 
 @kernel

@@ -12,13 +12,13 @@ are unique, and one of the possible sets of forces is found.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE, OUT
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.tolerances import DEPENDENCE, FORCE_ROUND_OFF
 
 NONE = np.int64(-1)
@@ -222,41 +222,26 @@ class Problem(NamedTuple):
     """A complementarity problem of up to r rows with the space to solve it."""
 
     # the problem
-    matrix: np.ndarray  # (r, r) A
-    b: np.ndarray  # (r,) accelerations without forces
-    low: np.ndarray  # (r,) bounds of the forces
-    high: np.ndarray  # (r,)
-    forced: np.ndarray  # (r,) int: the bound that a force has just reached, otherwise 0 (changed by the solution)
-    restitution: np.ndarray  # (r,) of the contacts in an impact; the solution does not use it
+    matrix: Annotated[np.ndarray, "r r"]  # A
+    b: Annotated[np.ndarray, "r"]  # accelerations without forces
+    low: Annotated[np.ndarray, "r"]  # bounds of the forces
+    high: Annotated[np.ndarray, "r"]
+    forced: Annotated[np.ndarray, "r", int]  # bound that a force has just reached, or 0 (changed by the solution)
+    restitution: Annotated[np.ndarray, "r"]  # of the contacts in an impact; the solution does not use it
 
     # its solution
-    force: np.ndarray  # (r,) f
-    acceleration: np.ndarray  # (r,) a
-    state: np.ndarray  # (r,) int: FREE, AT_LOW, AT_HIGH or DEPENDENT
+    force: Annotated[np.ndarray, "r"]  # f
+    acceleration: Annotated[np.ndarray, "r"]  # a
+    state: Annotated[np.ndarray, "r", int]  # FREE, AT_LOW, AT_HIGH or DEPENDENT
 
     # scratch
-    d_force: np.ndarray  # (r,) change of the forces in a pivot step
-    d_acceleration: np.ndarray  # (r,) change of the accelerations
-    free: np.ndarray  # (r,) int: list of FREE rows
-    factor: np.ndarray  # (r, r) Cholesky factor of their part of A
-    solution: np.ndarray  # (r,) of a system of equations with it
+    d_force: Annotated[np.ndarray, "r"]  # change of the forces in a pivot step
+    d_acceleration: Annotated[np.ndarray, "r"]  # change of the accelerations
+    free: Annotated[np.ndarray, "r", int]  # list of FREE rows
+    factor: Annotated[np.ndarray, "r r"]  # Cholesky factor of their part of A
+    solution: Annotated[np.ndarray, "r"]  # of a system of equations with it
 
 
 def new_problem(r: int) -> Problem:
     """Return room for a complementarity problem of r rows."""
-    return Problem(
-        matrix=np.zeros((r, r)),
-        b=np.zeros(r),
-        low=np.zeros(r),
-        high=np.zeros(r),
-        forced=np.zeros(r, np.int64),
-        restitution=np.zeros(r),
-        force=np.zeros(r),
-        acceleration=np.zeros(r),
-        state=np.zeros(r, np.int64),
-        d_force=np.zeros(r),
-        d_acceleration=np.zeros(r),
-        free=np.zeros(r, np.int64),
-        factor=np.zeros((r, r)),
-        solution=np.zeros(r),
-    )
+    return room(Problem, {"r": r})

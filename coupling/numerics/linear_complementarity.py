@@ -8,12 +8,12 @@ lies flat, are ties. For contact with Coulomb friction it finds a solution if th
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.tolerances import PIVOT, PIVOT_GROWTH, RESIDUAL, RESIDUAL_LARGEST
 
 #: covering vectors that are tried, and the ratio that spreads their entries
@@ -24,20 +24,17 @@ _ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 class Lemke(NamedTuple):
     """Room for a problem of up to k unknowns."""
 
-    matrix: np.ndarray  # (k, k) M
-    q: np.ndarray  # (k,)
-    z: np.ndarray  # (k,) the solution
-    w: np.ndarray  # (k,)
-    tableau: np.ndarray  # (k, 2k + 2) scratch: columns of w, z, the covering variable, and q
-    basis: np.ndarray  # (k,) int, scratch: basic variable of each row
+    matrix: Annotated[np.ndarray, "k k"]  # M
+    q: Annotated[np.ndarray, "k"]
+    z: Annotated[np.ndarray, "k"]  # the solution
+    w: Annotated[np.ndarray, "k"]
+    tableau: Annotated[np.ndarray, "k columns"]  # scratch: columns of w, z, the covering variable, and q
+    basis: Annotated[np.ndarray, "k", int]  # scratch: basic variable of each row
 
 
 def new_lemke(k: int) -> Lemke:
     """Room for a problem of up to k unknowns."""
-    return Lemke(
-        matrix=np.zeros((k, k)), q=np.zeros(k), z=np.zeros(k), w=np.zeros(k), tableau=np.zeros((k, 2 * k + 2)),
-        basis=np.zeros(k, np.int64),
-    )  # fmt: skip
+    return room(Lemke, {"k": k, "columns": 2 * k + 2})
 
 
 @entry

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.engine.line.tolerances import ADHESION, RECLOSING
-from vanedamp.coupling.engine.root_search import add_secular, expand, first_root_of_parabola, safe_step, shift
+from vanedamp.coupling.engine.root_search import (
+    ENDLESS,
+    MOST,
+    add_secular,
+    expand,
+    first_root_of_parabola,
+    step_or_stop,
+)
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -34,11 +41,8 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import secular_bound
-from vanedamp.coupling.numerics.tolerances import AT_START, CHATTER, RESOLUTION, SUM_ROUND_OFF
+from vanedamp.coupling.numerics.tolerances import AT_START, CHATTER, RESOLUTION
 
-#: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
-#: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
-MOST, ENDLESS = 1_000_000, -3
 #: in periods: what is known without a root at a period's start is left out from here on, at the price of exponentials
 _AHEAD = 0.02
 
@@ -117,43 +121,6 @@ def carry_over_period(system, st, watched, tau):
         watched.no_root_before[k] = left
         if watched.status[k] == EXPANDED and left < _AHEAD * system.period:
             watched.status[k] = BOUNDED
-
-
-@kernel
-def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
-    """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
-
-    The third value returned: whether k0_far - sign motion has no root on the step either; False is not known.
-    expansion, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
-    """
-    whole, slow = expansion.taylor[0], expansion.taylor[1]
-    noise += SUM_ROUND_OFF * abs(k0)
-    f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
-    if f <= noise:
-        if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
-            return 0.0, True, False
-        f = 0.0
-    longest = max(longest, shortest)
-    far = 0.0
-    if calm >= 0.0:
-        above = k0 + sign * slow[0] - fast
-        if above > noise:
-            far, _, _ = safe_step(slow, sign, above, 0.0, 0.0, calm, longest)
-            if far >= longest:
-                return far, False, False
-    step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
-    if far > step:
-        return far, False, False
-    if calm >= 0.0 and far == 0.0 and not found and shortest < step < longest:
-        # the slow motion has left the fast one behind by then
-        above = k0 + sign * slow[0] - fast + shift(slow, sign, step, expansion.shifted)
-        if above > noise:
-            far, _, _ = safe_step(expansion.shifted, 1.0, above, 0.0, 0.0, calm, longest - step)
-            return step + far, False, False
-    if step < shortest:
-        falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
-        return (0.0, True, False) if falls else (shortest, False, False)
-    return step, found, clear
 
 
 @inlined

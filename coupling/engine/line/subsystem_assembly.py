@@ -16,7 +16,7 @@ rows stay functionals of c.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag, null_space
@@ -27,7 +27,7 @@ from vanedamp.coupling.engine.line.complex_modes import IllConditioned, RealMode
 from vanedamp.coupling.engine.line.peaks import GRIDS
 from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MOVES_ALIKE, SLOW, UNFELT
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
-from vanedamp.coupling.numerics.compiler.record import record_with
+from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
 from vanedamp.coupling.system.line_system import LineSystem
 
@@ -40,114 +40,74 @@ _Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @record_with(free_axes=1)
 class Flows(NamedTuple):
-    """Stack of the subsystems met so far, first axis s, filled once a subsystem.
+    """Stack of the subsystems met so far, first axis s, filled once per subsystem.
 
-    m is the largest number of complex modes, the excitation's e harmonics included.
+    m is the largest number of complex modes, the excitation's e harmonics included; other sizes as in line.state.
     """
 
     # the subsystem
-    active_set: np.ndarray  # (s, r) which rows are closed
-    modes: np.ndarray  # (s,) number of its complex modes; 0: a free place
-    eigenvalue: np.ndarray  # (s, m) of the modes, 1/s
-    sprung: np.ndarray  # (s,) whether springs are closed
-    attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
+    active_set: Annotated[np.ndarray, "s r", bool]  # which rows are closed
+    modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: a free place
+    eigenvalue: Annotated[np.ndarray, "s m", complex]  # of the modes, 1/s
+    sprung: Annotated[np.ndarray, "s", bool]  # whether springs are closed
+    attached: Annotated[np.ndarray, "s b", bool]  # whether rigid rows hold a body to the structure
 
     # functionals of the amplitudes c
-    shape: np.ndarray  # (s, m, 2n): (p, p') = constant + Re(c shape)
-    support: np.ndarray  # (s, m, 2): the first coordinate p of each of its rows, and the last one plus 1
-    motion: np.ndarray  # (s, r, m): displacement of each row
-    velocity: np.ndarray  # (s, r, m): its rate
-    force: np.ndarray  # (s, r, m): force of each closed row
-    impulse: np.ndarray  # (s, r, m): its antiderivative, for rows with springs
-    response: np.ndarray  # (s, m): displacement of the response
-    momentum: np.ndarray  # (s, m): momentum of all bodies
-    work: np.ndarray  # (s, e, m): power of the conjugate loads of each harmonic
+    shape: Annotated[np.ndarray, "s m 2n", complex]  # (p, p') = constant + Re(c shape)
+    support: Annotated[np.ndarray, "s m 2", int]  # first coordinate p of each of its rows, and the last plus 1
+    motion: Annotated[np.ndarray, "s r m", complex]  # displacement of each row
+    velocity: Annotated[np.ndarray, "s r m", complex]  # its rate
+    force: Annotated[np.ndarray, "s r m", complex]  # force of each closed row
+    impulse: Annotated[np.ndarray, "s r m", complex]  # its antiderivative, for rows with springs
+    response: Annotated[np.ndarray, "s m", complex]  # displacement of the response
+    momentum: Annotated[np.ndarray, "s m", complex]  # momentum of all bodies
+    work: Annotated[np.ndarray, "s e m", complex]  # power of the conjugate loads of each harmonic
 
     # growth of the modes that the excitation drives
-    driven: np.ndarray  # (s, e + 1): harmonic h drives the modes from driven[h] to driven[h + 1]; the first is mode e
-    load: np.ndarray  # (s, m): rate at which a unit phase of their harmonic makes them grow
+    driven: Annotated[np.ndarray, "s phases", int]  # harmonic h drives modes driven[h] to driven[h + 1] - 1, from e on
+    load: Annotated[np.ndarray, "s m", complex]  # rate at which a unit phase of their harmonic makes them grow
 
     # how it begins: c = project ((p, p') - constant - excitation) + project_slip ((slips, rates) - ...)
-    project: np.ndarray  # (s, m, 2n)
-    project_slip: np.ndarray  # (s, m, 2b)
-    excited: np.ndarray  # (s, 2b, e): share of the excitation in the displacements xi of sprung bodies and their rates
-    static: np.ndarray  # (s, n + b, n + b): constant (p, xi) under constant loads on (p, x)
-    constrained: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
-    body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
-    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
-    impulse_response: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
+    project: Annotated[np.ndarray, "s m 2n", complex]
+    project_slip: Annotated[np.ndarray, "s m 2b", complex]
+    excited: Annotated[np.ndarray, "s 2b e", complex]  # the excitation in xi of sprung bodies and its rate
+    static: Annotated[np.ndarray, "s N N"]  # constant (p, xi) under constant loads on (p, x)
+    constrained: Annotated[np.ndarray, "s N n"]  # constant (p, xi) kept by constraints inside the structure
+    body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
+    closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
+    impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
 
     # sizes of modes, and steps of the search for the peak
-    speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
-    acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
-    grid_factor: np.ndarray  # (s, GRIDS, m): factor of its amplitude over a step of each grid (exact.peaks)
+    speed: Annotated[np.ndarray, "s m"]  # largest speed of a mode over all rows and the response
+    acceleration: Annotated[np.ndarray, "s m"]  # largest of its terms, whether closed rows hold them or not
+    grid_factor: Annotated[np.ndarray, "s grids m", complex]  # of its amplitude over a step of each grid (line.peaks)
 
     # Antiderivatives of the terms of the ledger, as forms of c: an integral over a segment is the form at its end minus
     # the form at its start. Where the rate by which a product of two modes changes vanishes beside the frequency, the
     # form would cancel: such pairs are left out of the forms, and listed.
-    linear: np.ndarray  # (s, m, WORK_MAP + 4 e): linear maps, by the columns of numerics.codes
-    loss: np.ndarray  # (s, 2m, 2m): viscous loss of two modes, by their real and imaginary parts in turns
-    dashpot: np.ndarray  # (s, 2m, 2m): loss in the dashpots of contacts
-    square: np.ndarray  # (s, 2m, 2m): squared response of two modes
-    kick: np.ndarray  # (s, r, 3, 2m): loss, square and dashpot of each mode and the change by a unit impulse on a row
-    kick_maps: np.ndarray  # (s, r, WORK_MAP/2 + 2 e): linear maps of that change
-    damped: np.ndarray  # (s,) whether contacts with dashpots are closed
-    uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
-    slow_count: np.ndarray  # (s,) number of entries in these lists
-    slow: np.ndarray  # (s, p, 4) int: pairs left out (j, k, SUM or DIFFERENCE, harmonic that both turn with or -1),
-    # modes left out of means (j, 0, SINGLE, -1), modes whose square is integrated at once (j, 0, CALM, -1)
-    slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
-    slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
-    slow_square: np.ndarray  # (s, p) complex: its share of the squared response
+    linear: Annotated[np.ndarray, "s m maps"]  # linear maps, by the columns of numerics.codes
+    loss: Annotated[np.ndarray, "s 2m 2m"]  # viscous loss of two modes, by their real and imaginary parts in turns
+    dashpot: Annotated[np.ndarray, "s 2m 2m"]  # loss in the dashpots of contacts
+    square: Annotated[np.ndarray, "s 2m 2m"]  # squared response of two modes
+    kick: Annotated[np.ndarray, "s r 3 2m"]  # loss, square, dashpot of a mode and the change by a unit impulse on a row
+    kick_maps: Annotated[np.ndarray, "s r kicks"]  # linear maps of that change
+    damped: Annotated[np.ndarray, "s", bool]  # whether contacts with dashpots are closed
+    uncoupled: Annotated[np.ndarray, "s", bool]  # whether damping couples no two free modes
+    slow_count: Annotated[np.ndarray, "s", int]  # number of entries in these lists
+    # pairs left out (j, k, SUM or DIFFERENCE, harmonic that both turn with or -1), modes left out of means
+    # (j, 0, SINGLE, -1), modes whose square is integrated at once (j, 0, CALM, -1)
+    slow: Annotated[np.ndarray, "s pairs 4", int]
+    slow_loss: Annotated[np.ndarray, "s pairs", complex]  # viscous power of such a pair
+    slow_dashpot: Annotated[np.ndarray, "s pairs", complex]  # power in the dashpots
+    slow_square: Annotated[np.ndarray, "s pairs", complex]  # its share of the squared response
 
 
 def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
     """Return room for `capacity` subsystems, none of them filled (modes 0)."""
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = 2 * n + e + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
-    pairs = m * (m + 3)
-    return Flows(
-        active_set=np.zeros((s, r), np.bool_),
-        modes=np.zeros(s, np.int64),
-        eigenvalue=np.zeros((s, m), complex),
-        sprung=np.zeros(s, np.bool_),
-        attached=np.zeros((s, b), np.bool_),
-        shape=np.zeros((s, m, 2 * n), complex),
-        support=np.zeros((s, m, 2), np.int64),
-        motion=np.zeros((s, r, m), complex),
-        velocity=np.zeros((s, r, m), complex),
-        force=np.zeros((s, r, m), complex),
-        impulse=np.zeros((s, r, m), complex),
-        response=np.zeros((s, m), complex),
-        momentum=np.zeros((s, m), complex),
-        work=np.zeros((s, e, m), complex),
-        driven=np.zeros((s, e + 1), np.int64),
-        load=np.zeros((s, m), complex),
-        project=np.zeros((s, m, 2 * n), complex),
-        project_slip=np.zeros((s, m, 2 * b), complex),
-        excited=np.zeros((s, 2 * b, e), complex),
-        static=np.zeros((s, n + b, n + b)),
-        constrained=np.zeros((s, n + b, n)),
-        body_acceleration=np.zeros((s, b, b)),
-        closed_inverse=np.zeros((s, r, r)),
-        impulse_response=np.zeros((s, r, m), complex),
-        speed=np.zeros((s, m)),
-        acceleration=np.zeros((s, m)),
-        grid_factor=np.zeros((s, GRIDS, m), complex),
-        linear=np.zeros((s, m, WORK_MAP + 4 * e)),
-        loss=np.zeros((s, 2 * m, 2 * m)),
-        dashpot=np.zeros((s, 2 * m, 2 * m)),
-        square=np.zeros((s, 2 * m, 2 * m)),
-        kick=np.zeros((s, r, 3, 2 * m)),
-        kick_maps=np.zeros((s, r, WORK_MAP // 2 + 2 * e)),
-        damped=np.zeros(s, np.bool_),
-        uncoupled=np.zeros(s, np.bool_),
-        slow_count=np.zeros(s, np.int64),
-        slow=np.zeros((s, pairs, 4), np.int64),
-        slow_loss=np.zeros((s, pairs), complex),
-        slow_dashpot=np.zeros((s, pairs), complex),
-        slow_square=np.zeros((s, pairs), complex),
-    )
+    sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
+    return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})
 
 
 class Subsystem(NamedTuple):

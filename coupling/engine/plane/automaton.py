@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.line.event_functions import ENDLESS
 from vanedamp.coupling.engine.plane.contact_decisions import decide, move_sliders
 from vanedamp.coupling.engine.plane.event_functions import next_event
 from vanedamp.coupling.engine.plane.impacts import collide, log_event, note_impact, stop_wedged
@@ -18,6 +17,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
     OVERLAP,
     SAMPLE,
 )
+from vanedamp.coupling.engine.root_search import ENDLESS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     AT_HIGH,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.line.event_functions import ENDLESS, MOST, step_or_stop
 from vanedamp.coupling.engine.plane.tolerances import AT_REST, DECIDED, DRIFT, FLAT
-from vanedamp.coupling.engine.root_search import DEGREE, expand, first_root_of_parabola
+from vanedamp.coupling.engine.root_search import DEGREE, ENDLESS, MOST, expand, first_root_of_parabola, step_or_stop
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.engine.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
+from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.response.records import ENERGIES, Records
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System

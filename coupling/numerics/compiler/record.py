@@ -11,8 +11,9 @@ A type may have the lengths of the arrays in it: functions are compiled for thes
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -30,6 +31,7 @@ from numba.extending import (
 )
 
 Class = TypeVar("Class", bound=type[tuple[Any, ...]])
+Named = TypeVar("Named", bound=tuple[Any, ...])
 
 
 class Record(types.Type):
@@ -72,6 +74,33 @@ def record_with(sizes: Sequence[str] = (), free_axes: int = 0) -> Callable[[Clas
         return kind
 
     return made
+
+
+def room(kind: type[Named], sizes: Mapping[str, int], **given: Any) -> Named:
+    """Return a record of zeros. given: fields that are something else.
+
+    Fields are annotated with their shapes, whose words are sizes or numbers, and unless they are floats with a type:
+    `Annotated[np.ndarray, "s 2m", complex]` is of shape (sizes["s"], 2 * sizes["m"]).
+    """
+    known = {"": 1, **sizes}
+    made = {
+        name: np.zeros([factor * known[size] for factor, size in shape], number)
+        for name, shape, number in _fields_with_room(kind)
+        if name not in given
+    }
+    return kind(**made, **given)
+
+
+@functools.cache
+def _fields_with_room(kind: type) -> list[tuple[str, list[tuple[int, str]], type]]:
+    """Return name, shape and type of number of each annotated field of a record."""
+    fields = []
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            words, number = (*hint.__metadata__, float)[:2]
+            parts = [re.fullmatch(r"(\d*)(\w*)", word) for word in words.split()]
+            fields.append((name, [(int(part[1] or 1), part[2]) for part in parts if part], number))
+    return fields
 
 
 def is_record(value: Any) -> bool:

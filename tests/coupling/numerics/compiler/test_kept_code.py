@@ -135,8 +135,7 @@ def test_code_of_other_arguments_is_not_taken(kept):
 _LIBRARIES = """
 import numpy as np
 from numba import njit
-from vanedamp.coupling.engine.line.event_functions import step_or_stop
-from vanedamp.coupling.engine.root_search import expand, new_expansion
+from vanedamp.coupling.engine.root_search import expand, new_expansion, step_or_stop
 from vanedamp.coupling.numerics.codes import POSITION
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 
