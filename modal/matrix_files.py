@@ -18,7 +18,7 @@ from scipy import io, sparse
 from vanedamp.files.csv_input import csv_table
 from vanedamp.files.foreign import existing
 from vanedamp.files.formats.matrices.matlab import read_mat
-from vanedamp.files.formats.matrices.numpy_files import read_npz
+from vanedamp.files.formats.matrices.registry import read_npz
 from vanedamp.files.formats.matrices.table import read_table
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.algebra import symmetric_part

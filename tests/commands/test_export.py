@@ -14,7 +14,7 @@ import vanedamp as vd
 from tests.tools.input_files import BLOCK, SCENE, changed, rom_scene
 from tests.tools.op2_file import write_op2
 from tests.tools.random_scenes import random_reduced
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.store import Variable, load, save
 from vanedamp.modal.measurements import read_shapes

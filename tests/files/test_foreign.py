@@ -14,7 +14,7 @@ from vanedamp.files import foreign, store
 from vanedamp.files.csv_input import read_csv
 from vanedamp.files.errors import shortened
 from vanedamp.files.foreign import apart, existing, reading
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.files.store import StoreError, Variable, decoding

@@ -8,7 +8,7 @@ from scipy import io, linalg, sparse
 
 from tests.tools.small_structures import truss
 from vanedamp.coupling.system.modal_basis import modal_basis
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.rom.external import ExternalError, external_model
 from vanedamp.rom.interface import Interface, InterfaceCoordinate

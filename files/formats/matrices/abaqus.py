@@ -13,7 +13,7 @@ from typing import TextIO
 
 import numpy as np
 
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 
 #: entries of a line, and columns of a number, that Abaqus reads
 _ENTRIES = 4

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import io, sparse
 
 from vanedamp.files.foreign import apart
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.sparse_indices import within_shape
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 
 
 def _nastran(path: str) -> Any:

@@ -13,13 +13,13 @@ from scipy import io, sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.abaqus import is_matrix_market
 from vanedamp.files.formats.matrices.abaqus import read_matrices as read_abaqus
-from vanedamp.files.formats.matrices.errors import MatrixFileError
 from vanedamp.files.formats.matrices.matlab import read_mat
 from vanedamp.files.formats.matrices.nastran import read_dmig, read_op2, read_op4
-from vanedamp.files.formats.matrices.numpy_files import read_archive
 from vanedamp.files.formats.matrices.table import read_table
+from vanedamp.files.sparse_indices import within_shape
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
@@ -51,6 +51,19 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
 
 
+def read_npz(path: str | os.PathLike[str]) -> Any:
+    """Return the matrix of scipy.sparse.save_npz. Raises what the libraries raise for a damaged file."""
+    return within_shape(sparse.load_npz(path))
+
+
+def _archive(path: str) -> dict[str, Any]:
+    """Return the arrays of a .npz by name; the matrix of scipy.sparse.save_npz is ""."""
+    with np.load(path, allow_pickle=False) as data:
+        if {"format", "shape", "data"} <= set(data.files):
+            return {"": read_npz(path)}
+        return {name: data[name] for name in data.files}
+
+
 def _dense(matrix: Any) -> Any:
     return matrix.toarray() if sparse.issparse(matrix) else matrix
 
@@ -61,7 +74,7 @@ def _mtx(path: str) -> dict[str, Any]:
 
 #: the first six hold several matrices by name; the others one, but for substructures of Abaqus
 _READERS = {
-    ".npz": read_archive,
+    ".npz": _archive,
     ".mat": read_mat,
     ".op4": read_op4,
     ".op2": read_op2,

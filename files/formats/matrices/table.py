@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 
 
 def read_table(path: str | Path) -> np.ndarray:

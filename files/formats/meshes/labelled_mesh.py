@@ -1,10 +1,12 @@
-"""Meshes as the files of other programs give them: nodes and elements by their labels, and named sets of these."""
+"""Meshes as the files of other programs give them: nodes and elements by label, named sets, and the lines of text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +30,44 @@ class MeshError(VanedampError):
     """A mesh that cannot be read or lacks a group; the message names file, group and remedy."""
 
 
+class DeckLine(NamedTuple):
+    """A line of a file.
+
+    within: the entry that it belongs to, as it stands before a message about the line ("*NODE ", "GRID: "), or ""
+    """
+
+    file: Path
+    number: int
+    text: str
+    within: str = ""
+
+    def error(self, message: str) -> MeshError:
+        """Return an error with file and line."""
+        return MeshError(f"{self.file}: line {self.number}: {self.within}{message}")
+
+    def whole(self, words: Iterable[str]) -> list[int]:
+        """Return words of the line as whole numbers. Raises MeshError."""
+        try:
+            return [int(word) for word in words]
+        except ValueError as error:
+            raise self.error(f"expected whole numbers ({error})") from error
+
+    def refuse(self, name: str, refused: Mapping[str, str]) -> None:
+        """Raise MeshError for an entry whose name matches a pattern; refused: the patterns by the reason."""
+        for why, pattern in refused.items():
+            if re.fullmatch(pattern, name):
+                raise self._replace(within=f"{name} ").error(why)
+
+    def named_file(self, name: str, including: tuple[Path, ...]) -> Path:
+        """Return the file that a line of a deck names; including: the files that lead to the line, resolved."""
+        file = self.file.parent / name
+        if not file.is_file():
+            raise self.error(f"{name}: no such file in the deck's folder")
+        if file.resolve() in including:
+            raise self.error(f"{name}: the file includes itself")
+        return file
+
+
 @dataclass(eq=False)
 class LabelledMesh:
     """A mesh in the order of its file.
@@ -49,8 +89,25 @@ class LabelledMesh:
         """Return the coordinates (n, 3) of nodes."""
         return np.array([self.nodes[label] for label in labels]).reshape(-1, 3)
 
+    def add_node(self, line: DeckLine, label: int, place: np.ndarray) -> None:
+        """Add a node that a line gives. Raises MeshError for one that is given twice, at different places."""
+        if not np.array_equal(self.nodes.setdefault(label, place), place):
+            raise line.error(f"node {label} is given twice, at different places")
 
-def text_lines(path: Path) -> list[str]:
+    def add_element(self, line: DeckLine, label: int, kind: str, nodes: list[int]) -> None:
+        """Add an element that a line gives. Raises MeshError for a second one of that label."""
+        if label in self.elements:
+            raise line.error(f"element {label} is given twice")
+        self.elements[label] = (kind, nodes)
+
+    def check_nodes(self, line: DeckLine, label: int, nodes: Iterable[int]) -> None:
+        """Raise MeshError for a node of an element that is not there, in formats whose nodes come first."""
+        missing = [node for node in nodes if node not in self.nodes]
+        if missing:
+            raise line.error(f"element {label}: node {missing[0]} is not given before it")
+
+
+def deck_lines(path: Path) -> list[DeckLine]:
     """Return the lines of a text file in UTF-8, or else in Latin-1. Raises MeshError for what is no text."""
     try:
         data = path.read_bytes()
@@ -59,6 +116,7 @@ def text_lines(path: Path) -> list[str]:
     if b"\0" in data:
         raise MeshError(f"{path}: holds zero bytes: damaged, or no text in UTF-8 or Latin-1; write it as plain text")
     try:
-        return data.decode("utf-8-sig").splitlines()
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("latin-1").splitlines()
+        text = data.decode("latin-1")
+    return [DeckLine(path, number, line) for number, line in enumerate(text.splitlines(), 1)]

@@ -4,8 +4,9 @@ A property number is a set of elements of that name. A SET of the case control, 
 numbers: `set 7 grids` are the grid points among them, `set 7 elements` the elements. The systems of displacements (CD)
 and of material axes say nothing about the mesh: supports and materials are the case's, in global axes.
 
-Why not pyNastran: version 1.4.1 takes 47 MB and needs matplotlib and numpy below 2. meshlane 5.5.0 refuses a deck
-without BEGIN BULK, as gmsh writes it.
+Why not pyNastran: version 1.4.1 takes 47 MB and needs matplotlib and numpy below 2. meshlane 5.5.0 misplaces the nodes
+of six of the tests' eight decks with coordinate systems, rejects the six without BEGIN BULK, as gmsh writes them, and
+reads seven of the nine that must be rejected as meshes; so does meshio 5.3.5.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.files.formats.meshes.frames import Frame, through
-from vanedamp.files.formats.meshes.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, MeshError, text_lines
+from vanedamp.files.formats.meshes.labelled_mesh import (
+    LINES,
+    SHELLS,
+    SOLIDS,
+    DeckLine,
+    LabelledMesh,
+    MeshError,
+    deck_lines,
+)
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
 # number of corners, and of all nodes where those between the corners are given
@@ -27,8 +36,9 @@ _ELEMENTS = {
     "CTRIA3": (3, 3), "CTRIAR": (3, 3), "CTRIA6": (3, 6), "CQUAD4": (4, 4), "CQUADR": (4, 4), "CQUAD8": (4, 8),
     "CBAR": (2, 2),
 }  # fmt: skip
+_JOINS = "joins or stiffens grid points, which is not imported; join the meshes, or remove it"
 _REFUSED = {
-    "joins or stiffens grid points, which is not imported; join the meshes, or remove it": (
+    _JOINS: (
         r"RBE\d|RBAR|RROD|RSPLINE|RJOINT|RTRPLT|MPC|MPCADD|CELAS\d|CBUSH\w*|CBEAM|CBEND|CROD|CONROD|CTUBE|CWELD|CSEAM"
         r"|CFAST|CGAP|GENEL|DMIG|CDAMP\d|CVISC"
     ),
@@ -39,7 +49,8 @@ _REFUSED = {
     "repeats the entry before it; write it out": r"=.*",
     "is a coordinate system that is not known; write CORD1 or CORD2, or global coordinates": r"CORD3\w+|GRIDB",
 }
-
+# with bars that have a property: they are no mere lines of a mesh
+_REFUSED_BARS = _REFUSED | {_JOINS: f"{_REFUSED[_JOINS]}|CBAR"}
 
 # the name of a set of the case control, as a card
 _COMMAND = "SET ="
@@ -48,13 +59,14 @@ _COMMAND = "SET ="
 class _Card(NamedTuple):
     """An entry of the bulk data, or a set of the case control, with the fields after its name."""
 
-    file: Path
-    line: int
+    line: DeckLine
     name: str
     fields: list[str]
 
-    def error(self, message: str) -> MeshError:
-        return MeshError(f"{self.file}: line {self.line}: {self.name}{message}")
+    @classmethod
+    def at(cls, line: DeckLine, name: str, fields: list[str]) -> _Card:
+        """Return the entry that begins with a line, which messages about it name."""
+        return cls(line._replace(within=f"{name}: "), name, fields)
 
     def number(self, place: int) -> float:
         """Return a real field, such as 1.5, 1.5+3 or 1.5D3; empty: zero."""
@@ -73,9 +85,7 @@ def read(path: Path) -> LabelledMesh:
     # bars without a property are lines of a mesh, as gmsh writes them
     bars = any(card.name in ("PBAR", "PBARL") for card in cards)
     for card in cards:
-        for why, refused in _REFUSED.items():
-            if re.fullmatch(refused, "CBEAM" if bars and card.name == "CBAR" else card.name):
-                raise card.error(f" {why}")
+        card.line.refuse(card.name, _REFUSED_BARS if bars else _REFUSED)
     systems = _Systems(cards)
     mesh = LabelledMesh({label: systems.place(label) for label in systems.grids})
     for card in cards:
@@ -92,20 +102,20 @@ def _take_element(mesh: LabelledMesh, card: _Card) -> None:
         label, reference = card.whole(1), card.whole(2)
         nodes = [card.whole(place) for place in range(3, 3 + most)]
     except ValueError as error:
-        raise card.error(f": expected whole numbers ({error})") from error
+        raise card.line.error(f"expected whole numbers ({error})") from error
     kinds = {2: LINES, 3: SHELLS}.get(corners, SHELLS if card.name.startswith("CQUAD") else SOLIDS)
     if not all(nodes):
         if any(nodes[corners:]) and kinds is SOLIDS:
-            raise card.error(f": element {label} has some of the nodes between its corners; give all of them, or none")
+            raise card.line.error(
+                f"element {label} has some of the nodes between its corners; give all of them, or none"
+            )
         nodes = nodes[:corners]
     missing = [node for node in nodes if node not in mesh.nodes]
     if missing:
-        raise card.error(f": there is no grid point {missing[0]}")
-    if label in mesh.elements:
-        raise card.error(f": element {label} is given twice")
+        raise card.line.error(f"there is no grid point {missing[0]}")
     if len(nodes) == 20:  # the nodes of the upright edges come before those of the upper face
         nodes = nodes[:12] + nodes[16:] + nodes[12:16]
-    mesh.elements[label] = (kinds[len(nodes)], nodes)
+    mesh.add_element(card.line, label, kinds[len(nodes)], nodes)
     mesh.element_sets.setdefault(str(reference or label), []).append(label)
 
 
@@ -134,7 +144,7 @@ def _take_set(mesh: LabelledMesh, card: _Card) -> None:
     except (ValueError, IndexError) as error:
         if card.name == _COMMAND:  # of real numbers or names: no set of a mesh
             return
-        raise card.error(": expected a number, and numbers with THRU and EXCEPT") from error
+        raise card.line.error("expected a number, and numbers with THRU and EXCEPT") from error
     found = {"grids": numbers.of(mesh.nodes), "elements": numbers.of(mesh.elements)}
     if kind == "PROP":
         references = [name for name in mesh.element_sets if name.isdecimal()]
@@ -148,7 +158,7 @@ def _take_set(mesh: LabelledMesh, card: _Card) -> None:
         if kind not in kinds or not any(number in there for number in found[what]):
             continue
         if sets.setdefault(name, found[what]) != found[what]:
-            raise card.error(f": set {label} is given twice, with other members")
+            raise card.line.error(f"set {label} is given twice, with other members")
 
 
 def _numbers(words: list[str]) -> _Numbers:
@@ -202,7 +212,7 @@ class _Systems:
                     for start in (0, 4) if second else (0,):
                         self.given[card.whole(start + 1)] = (card, start)
             except ValueError as error:
-                raise card.error(f": {error}") from error
+                raise card.line.error(f"{error}") from error
         self.default = default
 
     def place(self, label: int) -> np.ndarray:
@@ -213,7 +223,7 @@ class _Systems:
                 own = np.array([[card.number(place) for place in (3, 4, 5)]])
                 system = card.whole(2) if len(card.fields) > 1 and card.fields[1] else self.default
             except ValueError as error:
-                raise card.error(f": {error}") from error
+                raise card.line.error(f"{error}") from error
             self.places[label] = self.frame(system, card).to_global(own)[0]
         return self.places[label]
 
@@ -222,9 +232,9 @@ class _Systems:
         if label in self.frames:
             return self.frames[label]
         if label not in self.given:
-            raise asked.error(f": the coordinate system {label} is not given")
+            raise asked.line.error(f"the coordinate system {label} is not given")
         if label in self.pending:
-            raise asked.error(f": the coordinate system {label} stands on itself")
+            raise asked.line.error(f"the coordinate system {label} stands on itself")
         self.pending.append(label)
         card, start = self.given[label]
         try:
@@ -241,56 +251,48 @@ class _Systems:
         except MeshError:
             raise
         except ValueError as error:
-            raise card.error(f": {error}") from error
+            raise card.line.error(f"{error}") from error
         self.frames[label] = Frame(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
         return self.frames[label]
 
 
 def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
     """Return the sets of the case control, and the entries of the bulk data: free, small and large fields."""
-    lines = list(_lines(path))
-    begin = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("BEGIN")), -1)
-    end = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("ENDDATA")), None)
+    found = list(lines(path))
+    words = [line.text.strip().upper() for line in found]
+    begin = next((place for place, word in enumerate(words) if word.startswith("BEGIN")), -1)
+    end = next((place for place, word in enumerate(words) if word.startswith("ENDDATA")), None)
     if end is None:
         raise MeshError(f"{path}: no ENDDATA: cut short, or no file of Nastran; write it again")
-    commands, head = [], iter(lines[: max(begin, 0)])
-    for file, number, text in head:
+    commands, head = [], iter(found[: max(begin, 0)])
+    for line in head:
+        text = line.text
         while text.endswith(","):
-            text += next(head, (file, number, ""))[2].strip() or " "
-        found = re.fullmatch(r"\s*SET\s+(\d+)\s*=(.*)", text, re.IGNORECASE)
-        if found:
-            commands.append(_Card(file, number, _COMMAND, [found[1], *found[2].replace(",", " ").split()]))
+            more = next(head, None)
+            text += (more.text.strip() if more else "") or " "
+        said = re.fullmatch(r"\s*SET\s+(\d+)\s*=(.*)", text, re.IGNORECASE)
+        if said:
+            commands.append(_Card.at(line, _COMMAND, [said[1], *said[2].replace(",", " ").split()]))
     cards: list[_Card] = []
-    for file, number, text in lines[begin + 1 : end]:
-        name, fields = _fields(text)
+    for line in found[begin + 1 : end]:
+        name, fields = _fields(line.text)
         if not name.startswith(("+", "*")) and name:
-            cards.append(_Card(file, number, name.rstrip("*_"), fields))  # meshio writes CTETRA_
+            cards.append(_Card.at(line, name.rstrip("*_"), fields))  # meshio writes CTETRA_
         elif cards:
             cards[-1].fields.extend(fields)
     return commands, cards
 
 
-def files(path: Path) -> list[Path]:
-    """Return the files of a deck: itself and those that it includes. Raises MeshError with file and line."""
-    return list(dict.fromkeys([path, *(file for file, _, _ in _lines(path))]))
-
-
-def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[tuple[Path, int, str]]:
-    """Yield file, number and text of the lines that say something, of included files in their place."""
-    within = (*within, path.resolve())
-    for number, line in enumerate(text_lines(path), start=1):
-        text = line.split("$")[0].expandtabs(8).rstrip()
-        if not text.strip():
-            continue
+def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
+    """Yield the lines that say something, those of included files in their place. Raises MeshError."""
+    including = (*including, path.resolve())
+    for line in deck_lines(path):
+        text = line.text.split("$")[0].expandtabs(8).rstrip()
         found = re.fullmatch(r"INCLUDE\s+(['\"]?)(.+)\1", text.strip(), re.IGNORECASE)
-        if found is None:
-            yield path, number, text
-            continue
-        file = path.parent / found[2]
-        if not file.is_file() or file.resolve() in within:
-            why = "the file includes itself" if file.is_file() else "no such file in the deck's folder"
-            raise MeshError(f"{path}: line {number}: INCLUDE {found[2]}: {why}")
-        yield from _lines(file, within)
+        if found:
+            yield from lines(line._replace(within="INCLUDE ").named_file(found[2], including), including)
+        elif text.strip():
+            yield line._replace(text=text)
 
 
 def _fields(text: str) -> tuple[str, list[str]]:

@@ -12,7 +12,7 @@ from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError
 _NASTRAN = (".bdf", ".nas", ".fem", ".dat")
 _READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal.read} | dict.fromkeys(_NASTRAN, nastran.read)
 # decks that may consist of several files
-_INCLUDING = {".inp": abaqus.files} | dict.fromkeys(_NASTRAN, nastran.files)
+_INCLUDING = {".inp": abaqus.lines} | dict.fromkeys(_NASTRAN, nastran.lines)
 
 
 def read_mesh(path: Path) -> LabelledMesh:
@@ -23,4 +23,6 @@ def read_mesh(path: Path) -> LabelledMesh:
 
 def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
     """Return the files that a mesh is read from: itself and those that it includes. Raises MeshError."""
-    return _INCLUDING.get(Path(path).suffix.lower(), lambda file: [file])(Path(path))
+    file = Path(path)
+    lines = _INCLUDING[file.suffix.lower()](file) if file.suffix.lower() in _INCLUDING else ()
+    return list(dict.fromkeys([file, *(line.file for line in lines)]))

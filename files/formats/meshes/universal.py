@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError, text_lines
+from vanedamp.files.formats.meshes.labelled_mesh import DeckLine, LabelledMesh, MeshError, deck_lines
 
 _NODES, _ELEMENTS, _SYSTEMS = (2411, 781, 15), (2412, 780), (2420,)
 # numbers that each member of a group has
@@ -37,31 +36,21 @@ _PLACES = {
 }
 
 
-class _Line(NamedTuple):
-    path: Path
-    number: int
-    text: str
+def _whole(line: DeckLine, least: int = 0) -> list[int]:
+    """Return the whole numbers of a line."""
+    numbers = line.whole(line.text.split())
+    if len(numbers) < least:
+        raise line.error(f"expected {least} whole numbers, not {len(numbers)}")
+    return numbers
 
-    def error(self, message: str) -> MeshError:
-        return MeshError(f"{self.path}: line {self.number}: {message}")
 
-    def whole(self, at_least: int = 0) -> list[int]:
-        """Return the whole numbers of the line."""
-        try:
-            numbers = [int(word) for word in self.text.split()]
-        except ValueError as error:
-            raise self.error(f"expected whole numbers ({error})") from error
-        if len(numbers) < at_least:
-            raise self.error(f"expected {at_least} whole numbers, not {len(numbers)}")
-        return numbers
-
-    def place(self) -> np.ndarray:
-        """Return the last three numbers of the line, such as 1.5D+03."""
-        try:
-            x, y, z = (float(word.upper().replace("D", "E")) for word in self.text.split()[-3:])
-        except ValueError as error:
-            raise self.error(f"expected three coordinates ({error})") from error
-        return np.array([x, y, z])
+def _place(line: DeckLine) -> np.ndarray:
+    """Return the last three numbers of a line, such as 1.5D+03."""
+    try:
+        x, y, z = (float(word.upper().replace("D", "E")) for word in line.text.split()[-3:])
+    except ValueError as error:
+        raise line.error(f"expected three coordinates ({error})") from error
+    return np.array([x, y, z])
 
 
 def read(path: Path) -> LabelledMesh:
@@ -91,9 +80,9 @@ def read(path: Path) -> LabelledMesh:
     return mesh
 
 
-def _datasets(path: Path) -> Iterator[tuple[int, list[_Line]]]:
+def _datasets(path: Path) -> Iterator[tuple[int, list[DeckLine]]]:
     """Yield number and lines of the datasets, which stand between lines of -1."""
-    start, lines = None, [_Line(path, number, text) for number, text in enumerate(text_lines(path), 1)]
+    start, lines = None, deck_lines(path)
     for place, line in enumerate(lines):
         if line.text.strip() != "-1":
             continue
@@ -109,18 +98,18 @@ def _datasets(path: Path) -> Iterator[tuple[int, list[_Line]]]:
         raise MeshError(f"{path}: the last dataset {name} is not closed by -1: the file is cut short; write it again")
 
 
-def _take_node(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line] | None) -> int:
+def _take_node(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine] | None) -> int:
     """Take in a node, whose coordinates are on its line or the next one. Returns its coordinate system."""
-    label, system = (int(word) for word in head.text.split()[:2]) if rows is None else head.whole(2)[:2]
-    place = (head if rows is None else next(rows)).place()
-    if label in mesh.nodes and not np.array_equal(mesh.nodes[label], place):
-        raise head.error(f"node {label} is given twice, at different places")
-    mesh.nodes[label] = place
+    words = head.text.split()
+    if rows is None and len(words) < 2:
+        raise head.error("expected a label and a coordinate system")
+    label, system = head.whole(words[:2]) if rows is None else _whole(head, 2)[:2]
+    mesh.add_node(head, label, _place(head if rows is None else next(rows)))
     return system
 
 
-def _take_element(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line]) -> None:
-    label, descriptor, *_, width = head.whole(6)
+def _take_element(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine]) -> None:
+    label, descriptor, *_, width = _whole(head, 6)
     kind = _KINDS.get(descriptor)
     if kind is None:
         raise head.error(
@@ -131,21 +120,19 @@ def _take_element(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line]) -> Non
         next(rows)  # their sections
     nodes: list[int] = []
     while len(nodes) < width:
-        nodes += next(rows).whole(1)
-    if label in mesh.elements:
-        raise head.error(f"element {label} is given twice")
+        nodes += _whole(next(rows), 1)
     places = _PLACES.get(kind, range(width))
     if kind != "wedge15" and len(nodes) != len(places):
         raise head.error(f"element {label}: {len(nodes)} nodes; a finite element {descriptor} has {len(places)}")
-    mesh.elements[label] = (kind, [nodes[place] for place in places])
+    mesh.add_element(head, label, kind, [nodes[place] for place in places])
 
 
-def _take_group(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line], width: int) -> None:
-    number, *_, count = head.whole(2)
+def _take_group(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine], width: int) -> None:
+    number, *_, count = _whole(head, 2)
     name = next(rows).text.strip() or str(number)
     members: list[int] = []
     while len(members) < width * count:
-        members += next(rows).whole(width)
+        members += _whole(next(rows), width)
     if len(members) != width * count:
         raise head.error(f"group {name} announces {count} members and has others: the file is damaged; write it again")
     for code, sets in ((_NODE, mesh.node_sets), (_ELEMENT, mesh.element_sets)):
@@ -154,14 +141,14 @@ def _take_group(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line], width: i
             sets.setdefault(name, []).extend(labels)
 
 
-def _moved_systems(rows: Iterator[_Line]) -> set[int]:
+def _moved_systems(rows: Iterator[DeckLine]) -> set[int]:
     """Return the coordinate systems of a part that are not the global rectangular one."""
     next(rows), next(rows)  # number and name of the part
     moved = set()
     for head in rows:
-        label, kind = head.whole(2)[:2]
+        label, kind = _whole(head, 2)[:2]
         next(rows)
-        axes = np.array([next(rows).place() for _ in range(4)])
+        axes = np.array([_place(next(rows)) for _ in range(4)])
         if kind or not np.allclose(axes, np.eye(4, 3)):
             moved.add(label)
     return moved

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import io, sparse
 
-from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.matlab import read_mat
 from vanedamp.files.formats.matrices.table import read_table
 

@@ -394,6 +394,16 @@ def test_a_group_with_another_number_of_members_is_damaged(tmp_path):
         universal.read(tmp_path / "group.unv")
 
 
+@pytest.mark.parametrize(
+    ("head", "told"),
+    [("x 0 0 0 1. 2. 3.", "expected whole numbers"), ("7", "expected a label and a coordinate system")],
+)
+def test_a_damaged_node_of_the_oldest_universal_files(tmp_path, head, told):
+    (tmp_path / "node.unv").write_text(f"    -1\n    15\n{head}\n    -1\n")
+    with pytest.raises(MeshError, match=rf"node\.unv: line 3: {told}"):
+        universal.read(tmp_path / "node.unv")
+
+
 def test_labels_of_any_length(tmp_path):
     """A node that no element has may have a label beyond 64 bits."""
     (tmp_path / "two.inp").write_text(TWO.replace("*ELEMENT, TYPE=C3D4", f"{10**20}, 9, 9, 9\n*ELEMENT, TYPE=C3D4"))
