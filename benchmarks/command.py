@@ -5,13 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from benchmarks import BENCHMARKS
-from vanedamp.studies.commands.support.arguments import add_output
+from vanedamp.studies.commands.support.arguments import output_file
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Take the folder, a benchmark and its extent."""
     benchmarks = BENCHMARKS.all()
-    add_output(parser, "DIR", required=True)
+    output_file("DIR", required=True)(parser)
     parser.add_argument(
         "study", choices=tuple(benchmarks), help="; ".join(f"{name}: {b.SUMMARY}" for name, b in benchmarks.items())
     )

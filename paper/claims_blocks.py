@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from paper import claims_rigid
+from paper.claims_systems import means_of
+from paper.figure_scenes import Bar
 from vanedamp.studies.demo import claims as shown
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve, means_of
-from vanedamp.studies.demo.figure_file import Bar
+from vanedamp.studies.demo.curve import Curve
 from vanedamp.studies.report.claims import Claim
 
 _BARS = ("light", "nominal", "heavy", "light_same_gap", "nominal_same_gap", "heavy_same_gap")

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
+from paper.figure_scenes import Bar
 from vanedamp.studies.demo.claims import Curves, claim, verdict
 from vanedamp.studies.demo.curve import Curve
-from vanedamp.studies.demo.figure_file import Bar
 from vanedamp.studies.report.claims import Claim
 
 #: mean amplitude above which a row near its peak moves together like one body: between its two steady states

@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from paper.claims_rotation import Scenes, rigid, values
-from paper.claims_systems import top
+from paper.claims_systems import means_of, top
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve, means_of
+from vanedamp.studies.demo.curve import Curve
 from vanedamp.studies.report.claims import Claim
 
 #: amplitude below which a response counts as suppressed, of X

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vanedamp.studies.demo.claims import Curves, claim, verdict
@@ -28,6 +30,15 @@ def claims(curves: Curves) -> list[Claim]:
 def top(curve: Curve) -> float:
     """Return the top of the smoothed means where impacts scatter them, or else of the means."""
     return float((curve.smooth if curve.impacts.any() else curve.mean).max())
+
+
+def means_of(curves: Sequence[Curve]) -> np.ndarray:
+    """Return the means (k, f) of k curves at all f frequencies that one of them has; nan where a run is not ok."""
+    frequencies = np.unique(np.concatenate([curve.frequency for curve in curves]))
+    means = np.full((len(curves), len(frequencies)), np.nan)
+    for row, curve in zip(means, curves, strict=True):
+        row[np.searchsorted(frequencies, curve.frequency)] = curve.mean
+    return means
 
 
 def _top(curves: Curves, name: str) -> float:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from vanedamp.studies.commands.support.arguments import add_output, add_workers
+from vanedamp.studies.commands.support.arguments import output_file, workers
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Take the folder, and which studies to run."""
-    add_output(parser, "DIR", required=True)
+    output_file("DIR", required=True)(parser)
     parser.add_argument("studies", nargs="*", metavar="STUDY", help="fig9, campbell ... (default: all; docs/paper.md)")
-    add_workers(parser)
+    workers(parser)
     parser.add_argument("--resume", action="store_true", help="take over what the folder has of the same scenes")
 
 

@@ -1,6 +1,6 @@
 """Every figure of the paper as a study on the shipped cluster: sweeps, pictures, and claims with a verdict each.
 
-A figure is a file in scenes/ (studies.demo.figure_file), rules for its claims and a picture; those that the
+A figure is a file in scenes/ (paper.figure_scenes), rules for its claims and a picture; those that the
 demonstration shows are its own.
 """
 
@@ -22,23 +22,16 @@ from paper import (
     plots,
     plots_rotation,
 )
+from paper.figure_scenes import Bar
 from paper.scene_files import FOLDER, scene_file
+from paper.session import PaperSession, prepared
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.studies.demo import demo
 from vanedamp.studies.demo.curve import curves
-from vanedamp.studies.demo.figure_file import Bar, FigureScenes
-from vanedamp.studies.demo.figure_study import (
-    FigureStudy,
-    Read,
-    Session,
-    prepare,
-    print_claims,
-    swept,
-    write_scene,
-    written,
-)
+from vanedamp.studies.demo.figure_file import FigureScenes
+from vanedamp.studies.demo.figure_study import FigureStudy, Read, Session, print_claims, write_scene, written
 from vanedamp.studies.demo.figure_study import study as figure_study
 from vanedamp.studies.report.claims import Claim, Study
 from vanedamp.studies.workers import workers
@@ -54,10 +47,10 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
-    structure = prepare(folder, resume)
+    structure = prepared(folder, resume)
     studies = []
     with workers(count) as pool:
-        session = Session(structure, folder, pool, resume=resume)
+        session = PaperSession(structure, folder, pool, resume=resume)
         for name in names or STUDIES:
             begun = time.perf_counter()
             studies.append(study(name, session))
@@ -121,10 +114,10 @@ def _draw_fit(read: Read, path: Path) -> None:
 def _history(session: Session) -> Study:
     """Run Fig. 13: the scene at the damped peak of Fig. 12, with samples and events."""
     data = read_toml(FOLDER / "fig13.toml")
-    figure = FigureScenes.load(scene_file("fig12"), session.structure, session.effort)
+    figure = session.figure(scene_file("fig12"))
     runs = {}
     for curve, of in figure.scenes.items():
-        damped = curves(swept(figure, curve, session), curve)[0]
+        damped = curves(session.swept(figure, curve), curve)[0]
         scene = of.replace({"excitation.frequency": damped.peak().frequency, "sweep": {}, "time": data["time"]})
         aside = scene.replace({"damper.0.position": data["aside"] * scene.cavity[0].gap})
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)

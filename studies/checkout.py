@@ -22,9 +22,12 @@ class CheckoutError(VanedampError):
 class CheckoutCommand(NamedTuple):
     """A command whose arguments and work are in the module `command` of a package at the top of the repository.
 
-    Its methods raise CheckoutError where there is no checkout.
+    NAME, SUMMARY, ORDER: as studies.commands says. The methods raise CheckoutError where there is no checkout.
     """
 
+    NAME: str
+    SUMMARY: str
+    ORDER: int
     package: str
 
     def add_arguments(self, parser: ArgumentParser) -> None:

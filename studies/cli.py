@@ -56,7 +56,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
     try:
-        status = _interruptible(argv)
+        with swallowed_interrupts_again():
+            status = _on_first_rank(sys.argv[1:] if argv is None else argv)
         if argv is None:
             _ignore_interrupts()
     except KeyboardInterrupt:
@@ -73,30 +74,26 @@ def _ignore_interrupts() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _interruptible(argv: Sequence[str] | None) -> int:
-    with swallowed_interrupts_again():
-        if not _under_mpi():
-            return _main(argv)
-        from vanedamp.modal.petsc import ranks
+def _on_first_rank(words: Sequence[str]) -> int:
+    """Run the command line, under mpirun on the first rank only."""
+    if not _under_mpi():
+        return _run(words)
+    from vanedamp.modal.petsc import ranks
 
-        with ranks() as first:
-            return _main(argv) if first else 0
-
-
-def _main(argv: Sequence[str] | None) -> int:
-    with warnings.catch_warnings():
-        if not sys.warnoptions:  # of numbers that overflow on their way to the line that refuses them
-            warnings.simplefilter("ignore", RuntimeWarning)
-        return _run(sys.argv[1:] if argv is None else argv)
+    with ranks() as first:
+        return _run(words) if first else 0
 
 
 def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
-        arguments = _parser(words[0] if words else None).parse_args(words)
-        input_file = getattr(arguments, "input", None)
-        arguments.run(arguments)
-        sys.stdout.flush()
+        with warnings.catch_warnings():
+            if not sys.warnoptions:  # of numbers that overflow on their way to the line that refuses them
+                warnings.simplefilter("ignore", RuntimeWarning)
+            arguments = _parser(words[0] if words else None).parse_args(words)
+            input_file = getattr(arguments, "input", None)
+            arguments.run(arguments)
+            sys.stdout.flush()
     except BrokenPipeError:  # nobody reads on
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1

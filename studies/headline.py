@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.files.toml_input import plain
+
 #: a damped response within this share of the undamped one has not been touched by the bodies
 UNTOUCHED = 0.01
 
@@ -154,7 +156,7 @@ def headline(
         fixed_peak=glued.height,
         fixed_peak_at=glued.at,
         attached_mass_fraction=float(attached[ok][np.argmax(damped_mean[ok])]) if ok.any() else math.nan,
-        onset=_plain(x[touched[0]]) if touched.size else None,
+        onset=plain(x[touched[0]]) if touched.size else None,
         peak_at_edge=top.at_edge,
         undamped_at_edge=free.at_edge,
         fixed_at_edge=glued.at_edge,
@@ -183,7 +185,7 @@ def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:
     if not len(x):
         return _Top(math.nan, None, False)
     place = int(np.argmax(curve))
-    return _Top(float(curve[place]), _plain(x[place]), along_frequency and place in (0, len(x) - 1))
+    return _Top(float(curve[place]), plain(x[place]), along_frequency and place in (0, len(x) - 1))
 
 
 def _step(x: np.ndarray, place: float) -> float:
@@ -192,7 +194,3 @@ def _step(x: np.ndarray, place: float) -> float:
         return float(np.abs(x - place).min())
     left, right = np.searchsorted(x, place, "left"), np.searchsorted(x, place, "right")
     return float(np.diff(x[max(left - 1, 0) : right + 1]).max(initial=0.0))
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

@@ -9,6 +9,13 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 
 
+def load_scene(path: str | Path) -> Scene:
+    """Load a scene whose reduced model is there. Raises InputError."""
+    scene = Scene.load(path)
+    check_model(scene)
+    return scene
+
+
 def check_moved(scene: Scene) -> None:
     """Raise InputError for a scene in which nothing moves the structure."""
     if not scene.moved:

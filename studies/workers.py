@@ -9,22 +9,17 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from multiprocessing.context import BaseContext
-from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 from vanedamp.files.interrupts import uninterrupted
 
-#: folder that holds the package vanedamp
-_ROOT = Path(__file__).parents[2]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: what the server of workers loads before it forks the first one
 _PRELOADED = "vanedamp.studies.preloaded"
@@ -124,25 +119,6 @@ def workers(count: int | None) -> Iterator[Executor | None]:
         except BrokenExecutor as error:
             raise SweepError(f"the workers end as they begin: {error}") from error
         yield pool
-
-
-def run_module(
-    module: str, *arguments: str, threads: int | None = None, launcher: Sequence[str] = (),
-    variables: Mapping[str, str] | None = None, **options: Any,
-) -> CompletedProcess[str]:  # fmt: skip
-    """Run a module of ours in a process of its own and wait for its end.
-
-    threads: of each numerical library, left to them by default; launcher: a command before it, such as mpirun;
-    variables: of the environment, in addition; options: those of subprocess.run. Raises subprocess.TimeoutExpired.
-    """
-    environment = dict(os.environ) | dict(variables or {})
-    if threads is not None:
-        environment |= dict.fromkeys(_THREADS, str(threads))
-    paths = [str(_ROOT), *filter(None, [environment.get("PYTHONPATH")])]
-    return subprocess.run(
-        [*launcher, sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
-        capture_output=True, text=True, check=False, **options,
-    )  # fmt: skip
 
 
 def available_cores() -> int:

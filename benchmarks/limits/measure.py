@@ -16,11 +16,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.apart import run_module
 from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.limits.worker import LIMITS
 from benchmarks.tables import seconds_text, table
 from vanedamp.files.store import replacing
-from vanedamp.studies.workers import run_module
 
 #: what is started, and what it brings
 STARTS = {

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.methods.peers import DEEPEST, PeerRun
 from benchmarks.methods.siconos_steps import march
-from vanedamp.coupling.methods.equations_of_motion import time_grid
+from vanedamp.coupling.methods.time_stepping import time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.scene import Scene

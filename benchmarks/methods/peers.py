@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.methods.scenes import charted
-from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
+from vanedamp.coupling.methods.time_stepping import TimeGrid, time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene

@@ -22,7 +22,7 @@ from vanedamp.files.toml_input import validate
 from vanedamp.modal import petsc
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.rom.reduction import reduce
-from vanedamp.studies.case.stages import Structure, assemble, interface, reduced_case
+from vanedamp.studies.case.stages import Structure, assemble, interface, reduction
 from vanedamp.studies.case.tables import Case
 
 #: natural modes, modes of the reduced model, its patches with three displacements each, and hot spots
@@ -58,8 +58,8 @@ def tasks(structure: Structure) -> dict[str, Callable[[], Any]]:
         "reduction": reduced,
         "quasi_static": partial(reduced, quasi_static=1),
         "rubin": partial(reduced, "rubin"),
-        "estimate": partial(reduced_case, structure, MODES),
-        "hot_spots": partial(reduced_case, structure, MODES, spots=SPOTS),
+        "estimate": partial(reduction, structure, MODES),
+        "hot_spots": partial(reduction, structure, MODES, spots=SPOTS),
     }
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.apart import run_module
 from benchmarks.benchmark import Benchmark, Result
 from benchmarks.rows import Rows
 from benchmarks.sweep.simulation import Costs, simulated
@@ -29,7 +30,7 @@ from benchmarks.timing import format_spread, spread
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import write_json
-from vanedamp.studies.workers import available_cores, run_module
+from vanedamp.studies.workers import available_cores
 
 TARGET, MOST_MB = 0.95, 120
 _MODULE = "benchmarks.sweep.worker"

@@ -9,6 +9,7 @@ Gomes and others, Co-simulation: a survey (2018).
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,10 +17,9 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import TimeGrid, loads_at, start, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, penalty_laws, set_forces
-from vanedamp.coupling.methods.step_records import close_step, copy, open_step, record_start, set_gaps
-from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.methods.step_records import close_step, copy, open_step, set_gaps
+from vanedamp.coupling.methods.time_stepping import SteppedRun, TimeGrid, loads_at, start, time_grid
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
@@ -61,18 +61,13 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     times = time_grid(scene, system, options.steps_per_period)
     laws = penalty_laws(system, times.step, options)
     soft, motion = start(system, begun, records, laws.spring)
-    gauss_seidel, hold, substeps = options.exchange == "gauss_seidel", options.hold, options.substeps
-    matrices = cosimulation_matrices(scene, soft, times)
+    matrix, excited = cosimulation_matrices(scene, soft, times)
     fine = loads_at(scene, soft)(2 * np.pi * np.arange(options.smallest_steps) / options.smallest_steps)
     memory = np.zeros((3, 4 * soft.modes + 2 * len(soft.J)))
-    budget, deepest = options.max_events, options.penetration
-
-    def march(log: np.ndarray, until: int) -> int:
-        return march_cosimulation(
-            soft, times, motion, records, log, *matrices, fine, memory, laws, gauss_seidel, hold, substeps, until,
-            budget, deepest,
-        )  # fmt: skip
-
+    march = partial(
+        march_cosimulation, soft, times, motion, records, matrix, excited, fine, memory, laws,
+        options.exchange == "gauss_seidel", options.hold, options.substeps,
+    )  # fmt: skip
     return SteppedRun(system, march, motion, records, events, options)
 
 
@@ -105,7 +100,7 @@ def cosimulation_matrices(scene: Scene, system: System, times: TimeGrid) -> tupl
 
 @entry
 def march_cosimulation(
-    system, times, motion, records, log, matrix, excited, loads, memory, laws, gauss_seidel, hold, substeps, until,
+    system, times, motion, records, matrix, excited, loads, memory, laws, gauss_seidel, hold, substeps, log, until,
     budget, deepest,
 ):  # fmt: skip
     """Step until the bodies have done this many steps.
@@ -113,11 +108,10 @@ def march_cosimulation(
     loads: (steps * substeps, N) of the excitation on the bodies' grid; memory: (3, 4n + 4u) last velocities and mean
     forces; earlier ones; scratch.
     """
-    n, size, rows, h, steps = system.modes, len(motion.q), len(system.J), times.step, len(times.phase) - 1
+    n, size, rows, h = system.modes, len(motion.q), len(system.J), times.step
     q, v, known, impulse = motion.start[0], motion.start[1], memory[2], motion.rows[3]
     last_speed, last_force, older_force = memory[0, :n], memory[0, n : n + rows], memory[1, :rows]
     if motion.counters[STEPS] == 0:
-        record_start(system, motion, records)
         first_forces(system, times, motion, laws)
         for i in range(n, size):
             motion.half[i] = motion.v[i] + 0.5 * h / substeps * motion.half[i]
@@ -125,8 +119,7 @@ def march_cosimulation(
         copy(motion.force, last_force)
         copy(motion.force, older_force)
     while motion.counters[STEPS] < until:
-        k = motion.counters[STEPS] // substeps % steps
-        open_step(system, times, motion, records, k)
+        k = open_step(system, times, motion, records, substeps)
         _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k)
         for a in range(len(motion.live)):
             row, place, rate, bend = motion.live[a], 0.0, 0.0, 0.0

@@ -11,28 +11,16 @@ smaller by one factor then, as in planar.impacts.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Sparse, sparse, start, time_grid
-from vanedamp.coupling.methods.step_problem import (
-    couple_row,
-    list_row,
-    new_step_problem,
-    solve_rows,
-)
-from vanedamp.coupling.methods.step_records import (
-    close_step,
-    drag_sliders,
-    open_step,
-    product,
-    record_start,
-    set_gaps,
-)
-from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.methods.step_problem import list_row, list_slip, new_step_problem, solve_rows
+from vanedamp.coupling.methods.step_records import close_step, drag_sliders, open_step, product, set_gaps
+from vanedamp.coupling.methods.time_stepping import Sparse, SteppedRun, sparse, start, time_grid
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, inlined, kernel
 from vanedamp.coupling.response.evaluation import Run
@@ -82,13 +70,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     inverse, turned, mobility = moreau_matrices(moving, times.step, theta)
     exact = not system.in_plane if options.contacts is None else options.contacts == "exact"
     problem = new_step_problem(moving, mobility, exact)
-    budget, deepest = options.max_events, options.penetration
-
-    def march(log: np.ndarray, until: int) -> int:
-        return march_moreau(
-            moving, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest
-        )
-
+    march = partial(march_moreau, moving, times, motion, records, problem, inverse, turned, theta)
     return SteppedRun(system, march, motion, records, events, options)
 
 
@@ -101,16 +83,13 @@ def moreau_matrices(system: System, step: float, theta: float) -> tuple[Sparse, 
 
 
 @entry
-def march_moreau(system, times, motion, records, log, problem, inverse, turned, theta, until, budget, deepest):
+def march_moreau(system, times, motion, records, problem, inverse, turned, theta, log, until, budget, deepest):
     """Step until this many steps are done. Return the code of numerics.codes."""
-    size, h, steps = len(motion.q), times.step, len(times.phase) - 1
+    size, h = len(motion.q), times.step
     q, v, free = motion.start[0], motion.start[1], motion.coordinates[_FREE]
     load, ahead = motion.coordinates[1], motion.coordinates[2]
-    if motion.counters[STEPS] == 0:
-        record_start(system, motion, records)
     while motion.counters[STEPS] < until:
-        k = motion.counters[STEPS] % steps
-        open_step(system, times, motion, records, k)
+        k = open_step(system, times, motion, records, 1)
         for i in range(size):
             ahead[i] = q[i] + h * theta * v[i]
         for i in range(size):
@@ -214,7 +193,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
             if speed <= motion.slowest[0] or turn == _TURNS - 1:
                 list_row(problem, count, r, speed, 0.0, math.inf, 0.0)
                 approach[r] = -speed
-                count = _list_slip(system, problem, count, r, slip, 0.0, 0.0)
+                count = list_slip(system, problem, count, r, slip, 0.0, 0.0)
         if not approaching:
             return True
         for phase in range(2):
@@ -242,19 +221,6 @@ def _expand(system, problem, count, approach):
         if problem.friction[a] > 0.0:
             bound = problem.friction[a] * box.force[problem.normal[a]]
             box.low[a], box.high[a] = -bound, bound
-
-
-@kernel
-def _list_slip(system, problem, count, r, now, bound, had):
-    """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
-
-    bound, had: of its impulse by the normal impulse of the turns before, and that impulse, N s.
-    """
-    if system.friction[r] > 0.0:
-        list_row(problem, count + 1, len(system.rest) + r, now, -bound - had, bound - had, 0.0)
-        couple_row(problem, count + 1, count, system.friction[r])
-        return count + 2
-    return count + 1
 
 
 @kernel
@@ -297,7 +263,7 @@ def _list_rows(system, motion, problem, h, theta, turn):
             )
             list_row(problem, count, r, now, -motion.impulse[r], math.inf, soft)
             bound, had = system.friction[r] * motion.impulse[r], motion.impulse[u + r]
-        count = _list_slip(system, problem, count, r, row_speed(system, u + r, free), bound, had)
+        count = list_slip(system, problem, count, r, row_speed(system, u + r, free), bound, had)
     return count
 
 

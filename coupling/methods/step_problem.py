@@ -67,10 +67,17 @@ def list_row(problem, count, row, now, low, high, soft):
     box.matrix[count, count] += soft
 
 
-@inlined
-def couple_row(problem, count, normal, friction):
-    """Let the force of row number `normal` widen the bounds of row number `count`."""
-    problem.friction[count], problem.normal[count] = friction, normal
+@kernel
+def list_slip(system, problem, count, r, now, bound, had):
+    """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
+
+    bound, had: of its force by a normal force that has been applied already, and that friction.
+    """
+    if system.friction[r] == 0.0:
+        return count + 1
+    list_row(problem, count + 1, len(system.rest) + r, now, -bound - had, bound - had, 0.0)
+    problem.friction[count + 1], problem.normal[count + 1] = system.friction[r], count
+    return count + 2
 
 
 @kernel

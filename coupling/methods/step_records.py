@@ -72,8 +72,14 @@ def record_start(system, motion, records):
 
 
 @inlined
-def open_step(system, times, motion, records, k):
-    """Keep the state at the start of step k of the period in motion.start; take a sample."""
+def open_step(system, times, motion, records, substeps):
+    """Keep the state as a step begins in motion.start; take a sample. Return the number of the step in its period.
+
+    substeps: of which motion.counters counts so many per step.
+    """
+    k = motion.counters[STEPS] // substeps % (len(times.phase) - 1)
+    if motion.counters[STEPS] == 0:
+        record_start(system, motion, records)
     copy(motion.q, motion.start[0])
     copy(motion.v, motion.start[1])
     if k == 0:
@@ -82,6 +88,7 @@ def open_step(system, times, motion, records, k):
     if each > 0 and k % ((len(times.phase) - 1) // each) == 0:
         row = motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)
         put_sample(system, motion, records, row, motion.response[0], motion.q, motion.active, 0)
+    return k
 
 
 @inlined

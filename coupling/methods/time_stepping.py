@@ -1,28 +1,147 @@
-"""Runs of methods that take time steps, from the same system to the same records as those of the exact engine."""
+"""What methods with time steps share: the grid of a period with its loads, matrices, the motion, and the run.
+
+Runs go from the same system to the same records as those of the exact engine.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import Motion
-from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
+from vanedamp.coupling.numerics.codes import COUNTERS, DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
 from vanedamp.coupling.response.recorder import plane_of
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.records import ENERGIES, Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.response.restart import motion_of
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import Loads, loads_of
+from vanedamp.coupling.system.system import System, on_structure
 
 #: imbalance of the ledger above which a response is not to be used
 _OPEN_LEDGER = 0.1
 #: steps of all contacts after which compiled functions return to Python, which sees interrupts and empties the log
 _SLICE = 100_000
 
-#: step the motion until a number of steps is done, with this log; returns a code of numerics.codes
-March = Callable[[np.ndarray, int], int]
+#: marches with a log (k, WIDTH) until a number of steps, of impacts or a penetration relative to the free travel is
+#: reached; returns a code of numerics.codes
+March = Callable[[np.ndarray, int, int, float], int]
+
+
+@record
+class Sparse(NamedTuple):
+    """A square matrix (N, N) without its zeros: up to k entries in each row, the others zeros in column 0."""
+
+    column: np.ndarray  # (N, k) unsigned: no place from the end
+    value: np.ndarray  # (N, k)
+
+
+@record
+class TimeGrid(NamedTuple):
+    """The steps of an excitation period, and what acts on N coordinates and u contacts in them."""
+
+    step: float  # s
+    phase: np.ndarray  # (steps + 1, 2) cos and sin of omega t within a period
+    load: np.ndarray  # (steps + 1, N) of the excitation, N
+    table: np.ndarray  # (steps + 1, 2) displacement and velocity of a base whose motion is the response
+    travel: np.ndarray  # (u,) free travel of a rigid contact, m; inf: nothing to check
+    stiffness: Sparse  # (N, N)
+    damping: Sparse  # (N, N)
+
+
+@record
+class Motion(NamedTuple):
+    """The state of a run, advanced in place. Sizes as in System."""
+
+    # changes in every step
+    q: np.ndarray  # (N,)
+    v: np.ndarray  # (N,)
+    half: np.ndarray  # (N,) velocity half a step later (central differences), or acceleration (Newmark)
+    force: np.ndarray  # (2u,) of rows, N
+    counters: np.ndarray  # (COUNTERS,) int
+    ledger: np.ndarray  # (6,) J
+    deepest: np.ndarray  # (1,) largest penetration relative to the free travel
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
+    lifted: np.ndarray  # (periods + 1, b) time without an impulse at the floor, s
+    sampled: np.ndarray  # (samples, N) coordinates
+    shut: np.ndarray  # (samples, u) int: whether contacts carry force
+
+    # constant
+    spring: np.ndarray  # (u,) stiffness of contacts, N/m; 0: rigid
+    live: np.ndarray  # int: rows that may carry a force
+
+    # changes with the contacts
+    active: np.ndarray  # (u,) int: contacts that carry force
+    speed: np.ndarray  # (u,) at the beginning of the present contact, m/s
+    begun: np.ndarray  # (u,) time of that, s
+    total: np.ndarray  # (2u,) impulse since then, N s
+    lost: np.ndarray  # (u,) energy that it took since then, J
+
+    # of a step
+    start: np.ndarray  # (2, N) coordinates and velocities as it begins
+    response: np.ndarray  # (2,) displacement and velocity of the response then
+    before: np.ndarray  # (2u,) speeds of the rows then
+    gap: np.ndarray  # (2, u) gaps of the contacts as it ends, and as it began, m
+    impulse: np.ndarray  # (2u,) of the rows
+    slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
+
+    # scratch, named where each method takes it
+    coordinates: np.ndarray  # (5, N)
+    rows: np.ndarray  # (4, 2u)
+
+
+def sparse(matrix: np.ndarray) -> Sparse:
+    """Return a square matrix without its zeros."""
+    most = int((matrix != 0.0).sum(axis=1).max(initial=0))
+    column, value = np.zeros((len(matrix), most), np.uint64), np.zeros((len(matrix), most))
+    for i, row in enumerate(matrix):
+        found = np.flatnonzero(row)
+        column[i, : len(found)], value[i, : len(found)] = found, row[found]
+    return Sparse(column, value)
+
+
+def time_grid(scene: Scene, system: System, steps: int) -> TimeGrid:
+    """Return the grid of `steps` steps per period."""
+    angle = 2 * np.pi * np.arange(steps + 1) / steps
+    table = np.column_stack([system.table, 1j * system.frequency * system.table])
+    load = loads_at(scene, system)(angle[:-1])
+    return TimeGrid(
+        step=system.period / steps, phase=np.column_stack([np.cos(angle), np.sin(angle)]),
+        load=np.vstack([load, load[:1]]), table=np.ascontiguousarray((system.phases(angle) @ table).real),
+        travel=np.where(np.isinf(system.spring), system.free_travel, np.inf),
+        stiffness=sparse(system.stiffness), damping=sparse(system.damping),
+    )  # fmt: skip
+
+
+def loads_at(scene: Scene, system: System) -> Loads:
+    """Return the loads (k, N) of the excitation at angles omega t (k,), sum of sines or not."""
+    signal = scene.excitation.signal
+    return loads_of(scene, signal) if signal else lambda angle: (system.phases(angle) @ system.load).real
+
+
+def start(system: System, begun: RestartState, records: Records, spring: np.ndarray) -> tuple[System, Motion]:
+    """Return the system whose slips of Jenkins elements are those of what draws them, and its motion at time zero.
+
+    spring: (u,) as in Motion.
+    """
+    initial = motion_of(system, begun)
+    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
+    contact, samples = np.arange(u) < system.contacts, len(records.samples)
+    return on_structure(system), Motion(
+        q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
+        counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
+        tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies), sampled=np.zeros((samples, size)),
+        shut=np.zeros((samples, u), np.int8), spring=spring,
+        live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
+        speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
+        response=np.zeros(2), before=np.zeros(2 * u), gap=np.zeros((2, u)), impulse=np.zeros(2 * u),
+        slowest=np.zeros(1), coordinates=np.zeros((5, size)), rows=np.zeros((4, 2 * u)),
+    )  # fmt: skip
 
 
 class SteppedRun:
@@ -31,8 +150,7 @@ class SteppedRun:
     def __init__(
         self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
     ) -> None:
-        self.system, self.march, self.motion, self.records = system, march, motion, records
-        self.steps = options.smallest_steps
+        self.system, self.march, self.motion, self.records, self.options = system, march, motion, records, options
         self.plane = plane_of(system, motion, options.linearisation) if system.in_plane else None
         # a contact logs at most one impact per step
         self.slice = max(_SLICE // max(system.contacts, 1), 1)
@@ -43,8 +161,8 @@ class SteppedRun:
         """Continue to the end of `periods`, unless the run ends before."""
         counters = self.motion.counters
         while counters[PERIOD] < periods:
-            until = min(periods * self.steps, int(counters[STEPS]) + self.slice)
-            code = self.march(self.log, until)
+            until = min(periods * self.options.smallest_steps, int(counters[STEPS]) + self.slice)
+            code = self.march(self.log, until, self.options.max_events, self.options.penetration)
             self.chunks.append(self.log[: counters[LOGGED], : WIDTH if self.plane else LINE_WIDTH].copy())
             counters[LOGGED] = 0
             if code != DONE:

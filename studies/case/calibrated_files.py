@@ -23,22 +23,6 @@ _GAPS, _BODY, _RANGE = (1.0, 0.5, 0.1), 0.02, (0.95, 1.03)
 _SCHEMA = "#:schema "
 
 
-def save_calibration(
-    source: str | Path,
-    calibration: Calibration,
-    record: str | Path | None,
-    case: str | Path | None,
-    scene: str | Path | None,
-) -> None:
-    """Write the record, the tuned case and the rigid scene of a calibrated case file `source`; None: not that one."""
-    if record is not None:
-        calibration.save(record)
-    if case is not None:
-        save_tuned_case(source, calibration, case)
-    if scene is not None:
-        save_rigid_scene(source, calibration, scene)
-
-
 def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write the case file of a calibration with its tuned numbers, and all else as it was.
 
@@ -87,7 +71,7 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
 
     A case without cavities that move across gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
     """
-    rigid, amplitude = calibration.rigid, calibration.analysis.amplitude
+    rigid, fatigue = calibration.rigid, calibration.analysis.fatigue
     structure: dict[str, Any] = {
         "model": "rigid", "mass": rigid.mass, "stiffness": rigid.stiffness, "damping_ratio": rigid.damping_ratio
     }  # fmt: skip
@@ -95,7 +79,8 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
         structure["base_mass"] = rigid.base_mass
     force = 1.0 if calibration.force is None else calibration.force
     # without a strength the level is free: gaps then suit the force
-    reference = amplitude or force / (2.0 * max(rigid.damping_ratio, 1e-3) * rigid.stiffness)
+    free = force / (2.0 * max(rigid.damping_ratio, 1e-3) * rigid.stiffness)
+    reference = free if fatigue is None else fatigue.amplitude
     gaps = [_rounded(share * reference) for share in _GAPS]
     motions = {
         label: {"normal_motion": motion.normal_motion, "rotation": motion.rotation}
@@ -118,10 +103,10 @@ def _scene_notes(calibration: Calibration) -> dict[str, str]:
     """Return comments on the tables of the scene, by their names."""
     rigid, analysis = calibration.rigid, calibration.analysis
     force = "No fatigue strength in the case: 1 N, put the force of your excitation in its place."
-    if analysis.amplitude is not None:
+    if analysis.fatigue is not None:
         force = (
-            f"The force brings the resonance without bodies to {analysis.amplitude:.6g} m at {rigid.at}, "
-            f"{analysis.share:.0%} of the fatigue strength."
+            f"The force brings the resonance without bodies to {analysis.fatigue.amplitude:.6g} m at {rigid.at}, "
+            f"{analysis.fatigue.share:.0%} of the fatigue strength."
         )
     motions = [f"{label} moves by {motion.along:.4g} of {rigid.at}" for label, motion in analysis.cavities.items()]
     plane = f"Along itself {', '.join(motions)}, in this scene by 1; normal_motion and rotation are for planar bodies."

@@ -18,7 +18,6 @@ from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify, is_in_deci
 from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
-from vanedamp.modal.stress import HotSpot
 from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
@@ -100,8 +99,8 @@ class Calibration:
     @property
     def force(self) -> float | None:
         """N, at resonance gives the fatigue amplitude; None without a fatigue strength."""
-        amplitude = self.analysis.amplitude
-        return None if amplitude is None else self.rigid.resonance_force(amplitude)
+        fatigue = self.analysis.fatigue
+        return None if fatigue is None else self.rigid.resonance_force(fatigue.amplitude)
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
@@ -160,15 +159,16 @@ class Calibration:
         return damping
 
     def _excitation(self) -> dict[str, Any] | None:
-        spot, amplitude = self.analysis.hot_spot, self.analysis.amplitude
-        if spot is None or amplitude is None:
+        fatigue = self.analysis.fatigue
+        if fatigue is None:
             return None
-        return {
-            "share": self.analysis.share,
-            "amplitude": amplitude,
-            "force": self.force,
-            "hot_spot": _spot(spot, self.analysis.share, amplitude),
+        spot = {
+            "stress_per_amplitude": fatigue.share * fatigue.spot.strength / fatigue.amplitude,
+            "strength": fatigue.spot.strength,
+            "coordinates": list(fatigue.spot.coordinates),
+            "group": fatigue.spot.group,
         }
+        return {"share": fatigue.share, "amplitude": fatigue.amplitude, "force": self.force, "hot_spot": spot}
 
 
 def calibrate(case: Case) -> Calibration:
@@ -290,15 +290,6 @@ def _check_near(measured: float, computed: float) -> None:
             f"calibration.damping: the nearest pole of the response lies at {measured:.6g} Hz, the first bending at "
             f"{computed:.6g} Hz; check the band, or tune the frequencies first"
         )
-
-
-def _spot(spot: HotSpot, share: float, amplitude: float) -> dict[str, Any]:
-    return {
-        "stress_per_amplitude": share * spot.strength / amplitude,
-        "strength": spot.strength,
-        "coordinates": list(spot.coordinates),
-        "group": spot.group,
-    }
 
 
 def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:

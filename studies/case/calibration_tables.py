@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, Positive, Real, Whole
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -21,16 +21,17 @@ from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
-from vanedamp.modal.elasticity import Solid
+from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
-from vanedamp.modal.measurements import read_shapes
+from vanedamp.modal.measurements import read_shapes, read_temperature
 from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
+from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis import basis_named
 from vanedamp.rom.basis_ladder import BLOCKS, basis_ladder, basis_model, rich_model
@@ -47,6 +48,7 @@ from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
 # a mode so near the first bending, relative, that moves its point with such a share of its compliance, is reported
@@ -75,8 +77,15 @@ def assemble(case: Case) -> Structure:
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
         scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
-        heat = None if case.temperature is None else case.temperature.temperature
-        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale, heat)
+        materials = {
+            name: Material(table.young, table.poisson, table.density, table.expansion, table.young_at)
+            for name, table in case.material.items()
+        }
+        springs = {
+            name: ElasticSupport(table.stiffness, table.normal, table.tangential)
+            for name, table in case.support.elastic.items()
+        }
+        solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature))
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
@@ -86,6 +95,15 @@ def assemble(case: Case) -> Structure:
         return Structure(case, solid, matrices)
     rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point)
     return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
+
+
+def _temperature(table: TemperatureTable | None) -> Temperature | None:
+    """Return the temperature as the finite elements take it. Raises what read_temperature raises."""
+    if table is None:
+        return None
+    if table.file is not None:
+        return read_temperature(table.file, table.reference)
+    return Temperature(table.reference, np.array(table.uniform))
 
 
 @contextlib.contextmanager
@@ -153,6 +171,16 @@ def _direction(
         raise InputError(f"interface.{label}.{key}: {error}") from None
 
 
+@dataclass(frozen=True)
+class Fatigue:
+    """Where the first bending's stress reaches a share of the fatigue strength (spot), and the displacement (amplitude,
+    m) of the response coordinate at which it does."""
+
+    share: float
+    amplitude: float
+    spot: HotSpot
+
+
 @dataclass(frozen=True, eq=False)
 class ModalAnalysis:
     """Modes and their figures.
@@ -163,10 +191,7 @@ class ModalAnalysis:
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
     cavities        how that mode moves the case's cavities, those interface coordinates that move across, too, by label
     functional      (N,) that coordinate; None without
-    amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
-                    without one
-    hot_spot        where it does; None without
-    share           of the fatigue strength
+    fatigue         of that mode; None without a rigid model or a fatigue strength
     warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
     gyroscopic      as many modes with the gyroscopic coupling, if the case wants them
     """
@@ -178,9 +203,7 @@ class ModalAnalysis:
     rigid: RigidModel | None
     cavities: dict[str, CavityMotion]
     functional: np.ndarray | None
-    amplitude: float | None
-    hot_spot: HotSpot | None
-    share: float
+    fatigue: Fatigue | None
     warnings: tuple[str, ...]
     wall_time_s: float
     gyroscopic: GyroscopicModes | None = None
@@ -207,14 +230,14 @@ class ModalAnalysis:
                 "whirl": self.gyroscopic.whirl.tolist(),
                 "residual": self.gyroscopic.residuals.tolist(),
             }
-        if self.amplitude is not None:
-            assert self.hot_spot is not None
+        if self.fatigue is not None:
+            spot = self.fatigue.spot
             data["fatigue"] = {
-                "strength": self.hot_spot.strength,
-                "share": self.share,
-                "amplitude": self.amplitude,
-                "coordinates": list(self.hot_spot.coordinates),
-                "group": self.hot_spot.group,
+                "strength": spot.strength,
+                "share": self.fatigue.share,
+                "amplitude": self.fatigue.amplitude,
+                "coordinates": list(spot.coordinates),
+                "group": spot.group,
             }
         return data
 
@@ -257,10 +280,9 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Return modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
+    label, rigid, fatigue = case.response_label, None, None
     cavities: dict[str, CavityMotion] = {}
-    if label is not None:
-        functional = _functional(case, matrices, label)
+    functional = None if label is None else _functional(case, matrices, label)
     modes = _modes(case, matrices, functional)
     bending, warnings = _first_bending(case, modes, matrices)
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
@@ -276,18 +298,14 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         if strengths:
             spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
             amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
-    gyroscopic = _gyroscopic(structure, len(modes))
+            fatigue = Fatigue(table.share, amplitude, spot)
+    gyroscopic = None
+    if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
+        gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
     return ModalAnalysis(
-        structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, amplitude, spot,
-        table.share, warnings, time.perf_counter() - started, gyroscopic,
+        structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, fatigue, warnings,
+        time.perf_counter() - started, gyroscopic,
     )  # fmt: skip
-
-
-def _gyroscopic(structure: Structure, count: int) -> GyroscopicModes | None:
-    rotation, rotating = structure.case.rotation, structure.rotating
-    if rotation is None or rotating is None or not rotation.gyroscopic:
-        return None
-    return gyroscopic_modes(rotating, rotation.omega, count)
 
 
 def _cavities(
@@ -374,38 +392,36 @@ def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | 
     return replace(diagram, provenance={"matrices": dict(diagram.provenance), "versions": versions()})
 
 
-def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
+def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) -> ReducedModel:
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
-    A hot spot is where a natural mode of the model at the case's speed has its largest von Mises stress, or the largest
-    one away from the spots before it; the first `modes` modes have `spots` each. Of places with equal stress it is the
-    first. Needs a model with its recovery.
+    A hot spot is where the first natural mode of the model at the case's speed has its largest von Mises stress, or the
+    largest one away from the spots before it. Of places with equal stress it is the first. Needs a model with its
+    recovery.
     """
     assert model.recovery is not None
     solid = structure.solid
     places = solid.stress_points()
     apart = 0.02 * np.ptp(places, axis=0).max()
     at_speed = model if structure.case.rotation is None else model.at_speed(structure.case.rotation.omega)
-    shapes = linalg.eigh(at_speed.stiffness, at_speed.mass)[1][:, :modes]
+    shape = linalg.eigh(at_speed.stiffness, at_speed.mass)[1][:, 0]
+    stress = np.array(solid.von_mises(model.recovery @ shape))
     picked: list[int] = []
-    for shape in shapes.T:
-        stress = np.array(solid.von_mises(model.recovery @ shape))
-        for place in picked:
-            stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
-        for _ in range(spots):
-            if not stress.any():
-                raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
-            picked.append(first_largest(stress))
-            stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
-    values = solid.stress_components(model.recovery.T, np.array(picked))
-    residual = None
-    if model.residual_recovery is not None:
-        static = solid.stress_components(model.residual_recovery.T, np.array(picked))
-        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(picked))}
-    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(picked))}
-    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(picked)}
-    model = replace(model, provenance=dict(model.provenance) | {"hot_spots": spots_at})
-    return with_stresses(model, stresses, residual)
+    for _ in range(spots):
+        if not stress.any():
+            raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
+        picked.append(first_largest(stress))
+        stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
+    names = [f"hot{index + 1}" for index in range(spots)]
+
+    def stresses(vectors: np.ndarray) -> dict[str, np.ndarray]:
+        values = solid.stress_components(vectors.T, np.array(picked))
+        return {name: values[:, :, index].T for index, name in enumerate(names)}
+
+    residual = None if model.residual_recovery is None else stresses(model.residual_recovery)
+    spots_at = {name: places[place].tolist() for name, place in zip(names, picked, strict=True)}
+    provenance = dict(model.provenance) | {"hot_spots": spots_at}
+    return with_stresses(replace(model, provenance=provenance), stresses(model.recovery), residual)
 
 
 def reduction(
@@ -414,9 +430,13 @@ def reduction(
     basis: str = "craig-bampton",
     tolerance: float = 0.01,
     max_frequency: float | None = None,
+    spots: int = 0,
     keep_recovery: bool = False,
 ) -> ReducedModel:
     """Reduce the case's structure to its interface, with `modes` modes or (None) as many as a tolerance needs.
+
+    spots: places of its first mode whose stresses are outputs; keep_recovery: keep the basis, by which responses are
+    shown on the mesh.
 
     The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
     max_frequency, by default 1.5 times the first bending (of most effective mass along the case's direction; of a free
@@ -426,6 +446,7 @@ def reduction(
     InputError for a structure that rotates with another basis, or up to no speed.
     """
     rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
+    recovery = keep_recovery or bool(spots)
     speeds = basis_named(basis).speeds
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
@@ -434,7 +455,7 @@ def reduction(
     while True:
         if rotating is None:
             bases = None
-            rich = [rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)]
+            rich = [rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=recovery)]
         else:
             assert speeds is not None  # as _greatest_speed has checked
             bases = speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
@@ -454,27 +475,11 @@ def reduction(
         model = basis_model(rich[0], basis, choice.chosen.modes)
     else:
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
-        model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, keep_recovery)
-    return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
-
-
-def reduced_case(
-    structure: Structure,
-    modes: int | None,
-    basis: str = "craig-bampton",
-    tolerance: float = 0.01,
-    max_frequency: float | None = None,
-    spots: int = 0,
-    recovery: bool = False,
-) -> ReducedModel:
-    """Return what `vanedamp reduce` writes: a reduction with the stresses at `spots` places of its first mode.
-
-    recovery: keep the basis, by which responses are shown on the mesh.
-    """
-    model = reduction(structure, modes, basis, tolerance, max_frequency, recovery or bool(spots))
+        model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
+    model = replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
     if spots:
         model = with_hot_spots(structure, model, spots)
-    return model if recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
+    return model if keep_recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:

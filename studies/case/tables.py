@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field, fields
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, Tag
@@ -32,12 +32,7 @@ from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.modal.units import absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable
-from vanedamp.studies.case.campbell_tables import CampbellTable
-from vanedamp.studies.case.rotation_tables import RotationTable
-from vanedamp.studies.case.temperature_tables import TemperatureTable
-
-if TYPE_CHECKING:
-    from vanedamp.modal.elasticity import ElasticSupport, Material
+from vanedamp.studies.case.operation_tables import CampbellTable, RotationTable, TemperatureTable
 
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
@@ -114,15 +109,14 @@ class BlockMesh(_Generated):
         return benchmarks.build(self.parameters, path)
 
 
-#: keys that name a file of measurements
-_MEASURED = (
+#: keys that name a file: the mesh, and measurements
+FILES = (
+    ("mesh", "file"),
     ("modes", "shape"),
     ("calibration", "damping", "frf"),
     ("calibration", "tune", "shapes"),
     ("temperature", "file"),
 )
-#: keys that name a file
-FILES = (("mesh", "file"), *_MEASURED)
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
@@ -179,13 +173,6 @@ class MaterialTable:
         if len(temperatures) == 1 or any(b <= a for a, b in pairwise(temperatures)):
             raise ValueError("young_at: expected [[temperature, modulus], ...], at least two, temperatures ascending")
 
-    @property
-    def elastic(self) -> Material:
-        """Return it as the finite elements take it."""
-        from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
-
-        return Material(self.young, self.poisson, self.density, self.expansion, self.young_at)
-
 
 #: facet groups with the components that are held
 _Components = dict[str, Annotated[str, Field(pattern="^[xyz]+$")]]
@@ -227,13 +214,6 @@ class ElasticTable:
     def __post_init__(self) -> None:
         if not any((*self.stiffness, self.normal, self.tangential)):
             raise ValueError("stiffness: expected N/m^3, such as 1e12 or [1e12, 5e11, 1e12], or normal and tangential")
-
-    @property
-    def springs(self) -> ElasticSupport:
-        """Return it as the finite elements take it."""
-        from vanedamp.modal.elasticity import ElasticSupport
-
-        return ElasticSupport(self.stiffness, self.normal, self.tangential)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -368,8 +348,9 @@ class Case:
         given = {table.damping_ratio for table in self.material.values()} - {None}
         if self.modes.damping_ratio is None and len(given) > 1:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
-        if self.modes.at is not None and self.modes.at not in self.interface:
-            raise ValueError(f"modes.at: no interface '{self.modes.at}'; {_known(self.modes.at, self.interface)}")
+        at, labels = self.modes.at, list(self.interface)
+        if at is not None and at not in labels:
+            raise ValueError(f"modes.at: no interface '{at}'; {nearest(at, labels)}")
         if self.campbell is not None and self.rotation is None:
             raise ValueError("campbell: needs a table [rotation] with the axis of the speeds, such as axis = [1, 0, 0]")
         if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
@@ -389,7 +370,7 @@ class Case:
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
-        for keys in _MEASURED:
+        for keys in FILES:
             _find_file(data, keys, path)
         case = validate(cls, data, str(path))
         for group, table in case.material.items():
@@ -402,10 +383,8 @@ class Case:
     def files(self) -> list[str]:
         """The files that the case names: mesh, with those that it includes, and measurements. Raises MeshError."""
         mesh = self.mesh.files if isinstance(self.mesh, MeshFile) else []
-        damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
-        tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
-        heat = self.temperature.file if self.temperature else None
-        return mesh + [file for file in (self.modes.shape, damping, tune, heat) if file is not None]
+        measured = (_value(self, keys) for keys in FILES[1:])
+        return mesh + [file for file in measured if file is not None]
 
     @property
     def damping_ratio(self) -> float:
@@ -426,16 +405,6 @@ class Case:
             return {}
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
-
-    @property
-    def materials(self) -> dict[str, Material]:
-        """Elastic materials by volume group."""
-        return {name: table.elastic for name, table in self.material.items()}
-
-    @property
-    def elastic_supports(self) -> dict[str, ElasticSupport]:
-        """Springs by facet group."""
-        return {name: table.springs for name, table in self.support.elastic.items()}
 
     @property
     def response_label(self) -> str | None:
@@ -482,6 +451,13 @@ class Case:
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
 
 
+def _value(table: Any, keys: Iterable[str]) -> Any:
+    """Return what a key of tables within tables has; None where one of them is not given."""
+    for key in keys:
+        table = getattr(table, key, None)
+    return table
+
+
 def check_interface(case: Case) -> None:
     """Raise InputError for a case without interface coordinates, which cannot be reduced."""
     if not case.interface:
@@ -516,7 +492,8 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
     if isinstance(name, str):
         table[keys[-1]] = str(Path(path).parent / name)
         if not Path(table[keys[-1]]).is_file():
-            raise InputError(f"{path}: {'.'.join(keys)}: no such file {table[keys[-1]]}")
+            remedy = "; `vanedamp mesh` writes one" if keys[0] == "mesh" else ""
+            raise InputError(f"{path}: {'.'.join(keys)}: no such file {table[keys[-1]]}{remedy}")
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
@@ -528,7 +505,7 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
     if generator is not None:
         if str(generator) not in GENERATORS:
             raise InputError(
-                f"{path}: mesh.generator: no generator {generator!r}; {_known(str(generator), GENERATORS)}"
+                f"{path}: mesh.generator: no generator {generator!r}; {nearest(str(generator), list(GENERATORS))}"
             )
         known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
     for key in mesh:
@@ -537,10 +514,6 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
             raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
         if key not in known:
             raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
-    if isinstance(file, str):
-        mesh["file"] = str(Path(path).parent / file)
-        if not Path(mesh["file"]).is_file():
-            raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
 
 
 def _names(record: Any) -> list[str]:
@@ -556,7 +529,3 @@ def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
     raise InputError(
         f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{elsewhere}"
     )
-
-
-def _known(word: str, known: Iterable[str]) -> str:
-    return nearest(word, list(known))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
 
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.terminal import progress
 
 #: columns of modes beside each other, and speeds below each other
@@ -25,46 +26,41 @@ def run(arguments: Namespace, case: Case) -> None:
     seconds = time.perf_counter() - started
     warnings = [*diagram.warnings, *unit_doubts(structure)]
 
-    def files() -> None:
-        if arguments.output:
-            diagram.save(arguments.output)
-        if arguments.picture:
-            from vanedamp.studies.report.campbell_picture import campbell_picture  # matplotlib, for this file only
+    def picture(path: str) -> None:
+        from vanedamp.studies.report.campbell_picture import campbell_picture  # matplotlib, for this file only
 
-            campbell_picture(diagram, Path(arguments.picture))
+        campbell_picture(diagram, Path(path))
 
-    write_result(arguments.json, diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}, files)
-    print_warnings(arguments.input, warnings)
-    if arguments.json != "-":
-        _print_summary(diagram)
-        print(
-            f"{len(diagram.solved)} solutions of the full structure in {seconds:.1f} s, their modes the basis for all "
-            f"speeds: estimated error {diagram.error:.1e} of the frequencies"
-        )
+    result = diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}
+    write_result(arguments, result, _summary(diagram, seconds), warnings, output=diagram.save, picture=picture)
 
 
-def _print_summary(diagram: Campbell) -> None:
-    """Print modes over speeds, crossings with engine orders, and veerings."""
+def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:
+    """Yield modes versus speed, crossings with engine orders, and veerings."""
     shown = diagram.modes[:_MOST_COLUMNS]
     kind = ", with gyroscopic coupling" if diagram.gyroscopic else ""
-    print(f"natural frequencies in Hz over the speed{kind}")
-    print("       rpm     rad/s" + "".join(f"    mode {mode + 1:2}" for mode in shown))
+    yield f"natural frequencies in Hz over the speed{kind}"
+    yield "       rpm     rad/s" + "".join(f"    mode {mode + 1:2}" for mode in shown)
     rows = diagram.asked.nonzero()[0]
     for row in rows[:: -(-len(rows) // _MOST_ROWS)]:
         values = "".join(f"  {frequency:9.2f}" for frequency in diagram.frequencies_hz[: len(shown), row])
-        print(f"{diagram.rpm[row]:10.1f}{diagram.speeds[row]:10.2f}{values}")
+        yield f"{diagram.rpm[row]:10.1f}{diagram.speeds[row]:10.2f}{values}"
     if diagram.orders:
-        print("crossings with engine orders\n  mode  order         rpm       rad/s          Hz")
+        yield "crossings with engine orders\n  mode  order         rpm       rad/s          Hz"
     for crossing in diagram.crossings:
-        print(
+        yield (
             f"{crossing.mode + 1:6}{crossing.order:7g}{crossing.rpm:12.3f}{crossing.speed:12.4f}"
             f"{crossing.frequency_hz:12.4f}"
         )
     if diagram.orders and not diagram.crossings:
-        print("  none")
+        yield "  none"
     for veering in diagram.veerings:
-        print(
+        yield (
             f"veering: modes {veering.first + 1} and {veering.second + 1} at {veering.rpm:.1f} rpm "
             f"({veering.speed:.2f} rad/s), {veering.frequency_hz:.2f} Hz, {veering.gap_hz:.3g} Hz apart; they exchange "
             f"{veering.exchange:.0%} of their shapes"
         )
+    yield (
+        f"{len(diagram.solved)} solutions of the full structure in {seconds:.1f} s, their modes the basis for all "
+        f"speeds: estimated error {diagram.error:.1e} of the frequencies"
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -20,22 +20,21 @@ def run(arguments: Namespace) -> None:
     kind = kind_of(tables, arguments.input)
     found = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)
     left = facts.defaults(kind, tables)
-    write_result(arguments.json, {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left})
-    if arguments.json != "-":
-        commands = ", ".join(found[0].value) or "nothing as it is"
-        print(f"{arguments.input}: {a(kind)}, for vanedamp {commands}")
-        _print(found[1:])
-        if left:
-            print("left at their defaults: " + ", ".join(f"{key} = {_word(value)}" for key, value in left.items()))
+    result = {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left}
+    commands = ", ".join(found[0].value) or "nothing as it is"
+    write_result(arguments, result, _lines(f"{arguments.input}: {a(kind)}, for vanedamp {commands}", found[1:], left))
 
 
-def _print(facts: Iterable[Fact]) -> None:
-    for key, value, unit, text in facts:
+def _lines(head: str, found: Iterable[Fact], left: Mapping[str, Any]) -> Iterator[str]:
+    yield head
+    for key, value, unit, text in found:
         if key == "warnings":
             for warning in value:
-                print(f"warning: {warning}")
+                yield f"warning: {warning}"
         elif _known(value):
-            print(f"  {key:21} {f'{_word(value)} {unit}':26} {text}".rstrip())
+            yield f"  {key:21} {f'{_word(value)} {unit}':26} {text}".rstrip()
+    if left:
+        yield "left at their defaults: " + ", ".join(f"{key} = {_word(value)}" for key, value in left.items())
 
 
 def _known(value: Any) -> bool:

@@ -7,22 +7,21 @@ from __future__ import annotations
 
 from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
-    add_json,
-    add_resume,
-    add_workers,
     count,
     hertz,
     input_file,
+    json_file,
     mode_count,
     output_file,
     ratio,
+    resume,
     spot_count,
+    workers,
 )
 from vanedamp.studies.commands.support.declaration import Command, Function, argument
 
 #: endings of a result, which is HDF5 (a device has none); an output that is a folder
 _RECORD, _FOLDER = (".h5", ".hdf5", ".nc", ""), ("/",)
-_BENCHMARKS, _PAPER = CheckoutCommand("benchmarks"), CheckoutCommand("paper")
 _CASE, _SCENE = Function("support.cases:read_case"), Function("support.scenes:read_scene")
 
 COMMANDS = (
@@ -33,38 +32,36 @@ COMMANDS = (
             output_file("FILE.toml"),
             argument("--rom", metavar="ROM.h5", help="reduced model that a scene or study is to have"),
         ),
-        Function("new:run"), writes=None,
+        writes=None,
     ),
     Command(
         "check", "say what an input file means, without running it", 4,
-        (input_file("FILE.toml"), add_json),
-        Function("check:run"),
+        (input_file("FILE.toml"), json_file),
     ),
     Command(
         "schema", "JSON Schema of a kind of input file, for editors", 5,
         (Function("schema:add_kind"), output_file("FILE.json")),
-        Function("schema:run"),
     ),
     Command(
         "mesh", "write the mesh of a case that names a generator", 10,
         (input_file("CASE.toml"), output_file("MESH.msh", required=True)),
-        Function("mesh:run"), writes={"output": (".msh",)}, reads=_CASE,
+        writes={"output": (".msh",)}, reads=_CASE,
     ),
     Command(
         "modal", "natural frequencies, effective masses, rigid model of the first bending", 20,
         (
-            input_file("CASE.toml"), output_file("MODES.h5"), add_json,
+            input_file("CASE.toml"), output_file("MODES.h5"), json_file,
             argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)"),
         ),
-        Function("modal:run"), writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE,
+        writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE,
     ),
     Command(
         "campbell", "natural frequencies over the speed of rotation, and where engine orders meet them", 25,
         (
-            input_file("CASE.toml"), output_file("CAMPBELL.h5"), add_json,
+            input_file("CASE.toml"), output_file("CAMPBELL.h5"), json_file,
             argument("--picture", metavar="FILE.png", help="the diagram as a picture"),
         ),
-        Function("campbell:run"), writes={"output": _RECORD, "picture": (".png",)},
+        writes={"output": _RECORD, "picture": (".png",)},
         reads=Function("support.cases:read_campbell_case"),
     ),
     Command(
@@ -73,19 +70,19 @@ COMMANDS = (
             input_file("CASE.toml"), output_file("CALIBRATION.h5"),
             argument("--case", metavar="TUNED.toml", help="the case with the tuned numbers"),
             argument("--scene", metavar="RIGID.toml", help="a scene of the calibrated rigid model"),
-            add_json,
+            json_file,
         ),
-        Function("calibrate:run"), writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, reads=_CASE,
+        writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, reads=_CASE,
     ),
     Command(
         "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", 40,
         (input_file("CASE.toml"), output_file("DIR", required=True)),
-        Function("matrices:run"), writes={"output": _FOLDER}, reads=_CASE,
+        writes={"output": _FOLDER}, reads=_CASE,
     ),
     Command(
         "reduce", "reduced model at the case's interface", 50,
         (
-            input_file("CASE.toml"), output_file("ROM.h5"), add_json,
+            input_file("CASE.toml"), output_file("ROM.h5"), json_file,
             argument(
                 "--modes", type=mode_count, default=12, metavar="N|auto",
                 help="modes to keep, or as few as the tolerance needs (default: %(default)s)",
@@ -111,33 +108,33 @@ COMMANDS = (
                 help="keep the basis, so that `vanedamp export` can show responses on the mesh",
             ),
         ),
-        Function("reduce:run"), writes={"output": _RECORD}, reads=Function("support.cases:read_reducible_case"),
+        writes={"output": _RECORD}, reads=Function("support.cases:read_reducible_case"),
     ),
     Command(
         "import", "reduced model of another code: dense matrices with a meaning", 60,
-        (input_file("EXTERNAL.toml"), output_file("ROM.h5"), add_json),
-        Function("import_model:run"), writes={"output": _RECORD},
+        (input_file("EXTERNAL.toml"), output_file("ROM.h5"), json_file),
+        writes={"output": _RECORD}, module="import_model",
     ),
     Command(
         "run", "one scene at one excitation frequency", 70,
         (
-            input_file("SCENE.toml"), output_file("RESPONSE.h5"), add_json,
+            input_file("SCENE.toml"), output_file("RESPONSE.h5"), json_file,
             argument("--events", action="store_true", help="keep the list of events"),
             argument("--samples", type=count, default=0, metavar="N", help="keep N samples of every period"),
         ),
-        Function("run:run"), writes={"output": _RECORD}, reads=_SCENE,
+        writes={"output": _RECORD}, reads=_SCENE,
     ),
     Command(
         "sweep", "a run at every point of the scene's [sweep] grid", 80,
         (
-            input_file("SCENE.toml"), output_file("SWEEP.h5"), add_json, add_workers,
+            input_file("SCENE.toml"), output_file("SWEEP.h5"), json_file, workers,
             argument(
                 "--peak", metavar="RESPONSE.h5",
                 help="run the point with the highest mean once more and keep its events and samples, for the report",
             ),
-            add_resume,
+            resume,
         ),
-        Function("sweep:run"), writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_SCENE,
+        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_SCENE,
     ),
     Command(
         "explore", "sliders, and a forced response that follows them, in the browser", 85,
@@ -149,31 +146,31 @@ COMMANDS = (
             output_file("SCENE.toml"),
             argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)"),
             argument("--no-browser", action="store_true", help="only print the address"),
-            add_workers,
+            workers,
         ),
-        Function("explore:run"), writes={"output": (".toml",)},
+        writes={"output": (".toml",)},
     ),
     Command(
         "orbits",
         "branches of periodic orbits, their stability and bifurcations, as the scene's [orbit] table says", 85,
-        (input_file("SCENE.toml"), output_file("BRANCH.h5"), add_json, add_resume),
-        Function("orbits:run"), writes={"output": _RECORD}, checkpoint=True, reads=_SCENE,
+        (input_file("SCENE.toml"), output_file("BRANCH.h5"), json_file, resume),
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE,
     ),
     Command(
         "ramp", "run-up and run-down through resonance, as the scene's [ramp] table says", 87,
-        (input_file("SCENE.toml"), output_file("RAMP.h5"), add_json),
-        Function("ramp:run"), writes={"output": _RECORD}, reads=_SCENE,
+        (input_file("SCENE.toml"), output_file("RAMP.h5"), json_file),
+        writes={"output": _RECORD}, reads=_SCENE,
     ),
     Command(
         "ringdown",
         "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping over the amplitude", 88,
-        (input_file("SCENE.toml"), output_file("RINGDOWN.h5"), add_json),
-        Function("ringdown:run"), writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"),
+        (input_file("SCENE.toml"), output_file("RINGDOWN.h5"), json_file),
+        writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"),
     ),
     Command(
         "optimise", "mass, gap and number of bodies that reduce most", 90,
-        (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), add_json, add_workers),
-        Function("optimise:run"), writes={"output": _RECORD},
+        (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers),
+        writes={"output": _RECORD},
     ),
     Command(
         "report", "one HTML page of results", 100,
@@ -184,38 +181,32 @@ COMMANDS = (
                 help="results (.h5), claims of studies (.claims.json), or folders",
             ),
         ),
-        Function("report:run"), writes={"output": (".html", ".htm")},
+        writes={"output": (".html", ".htm")},
     ),
     Command(
         "pipeline", "case, calibration, reduction, sweeps and report; redoes only what changed", 105,
         (
             argument("pipeline", metavar="PIPELINE.toml", help="stages, case and scenes"),
-            output_file("DIR"), add_json, add_workers,
+            output_file("DIR"), json_file, workers,
             argument("--dry-run", action="store_true", help="say what would run and why, and run nothing"),
         ),
-        Function("pipeline:run"), writes=None,
+        writes=None,
     ),
     Command(
         "export", "a result in a file of another program: ParaView, MATLAB, test systems, Abaqus, Nastran, tables", 110,
         (Function("export:add_arguments"),),
-        Function("export:run"), writes=None,
+        writes=None,
     ),
     Command(
         "demo", "the whole pipeline on the shipped mesh", 120,
         (
-            output_file("DIR", default="out"), add_workers,
+            output_file("DIR", default="out"), workers,
             argument("--rigid", action="store_true", help="its rigid model only, without finite elements"),
         ),
-        Function("demo:run"), writes={"output": _FOLDER},
+        writes={"output": _FOLDER},
     ),
-    Command(
-        "paper", "the paper's figures as studies, each claim with a verdict", 110,
-        (_PAPER.add_arguments,), _PAPER.run, writes=None,
-    ),
-    Command(
-        "bench", "how fast and how exact the methods are, measured here", 130,
-        (_BENCHMARKS.add_arguments,), _BENCHMARKS.run, writes=None,
-    ),
+    CheckoutCommand("paper", "the paper's figures as studies, each claim with a verdict", 110, "paper"),
+    CheckoutCommand("bench", "how fast and how exact the methods are, measured here", 130, "benchmarks"),
 )  # fmt: skip
 
 #: by name

@@ -9,11 +9,11 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import print_note
 from vanedamp.studies.commands.support.outputs import Outputs
-from vanedamp.studies.commands.support.scenes import load_scene
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.explore.page import Exploration
 from vanedamp.studies.explore.server import serve
 from vanedamp.studies.explore.sweep_files import open_sweeps
+from vanedamp.studies.scene_checks import check_moved, load_scene
 from vanedamp.studies.workers import available_cores
 
 
@@ -35,13 +35,12 @@ def run(arguments: Namespace) -> None:
 def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> Exploration:
     """Return the exploration of a scene's file, or of the shipped rigid model. Raises InputError."""
     if source is None:
-        figure, name = (
-            FigureScenes.load(FOLDER / "fig9.toml", Structure.shipped()),
-            "rigid model of the shipped cluster",
-        )
-        scene = figure.scenes[""].replace({"sweep": {}})
+        figure = FigureScenes.load(FOLDER / "fig9.toml", Structure.shipped())
+        scene, name = figure.scenes[""].replace({"sweep": {}}), "rigid model of the shipped cluster"
     else:
-        scene, name = load_scene(str(source), outputs), str(source)
+        scene, name = load_scene(source), str(source)
+        outputs.keep(scene.files)
+        check_moved(scene)
     return Exploration.of(scene, name, None if output is None else Path(output))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from vanedamp.studies.commands.support.arguments import add_output
+from vanedamp.studies.commands.support.arguments import output_file
 from vanedamp.studies.commands.support.messages import print_warnings
 from vanedamp.studies.commands.support.outputs import check_outputs
 from vanedamp.studies.export.export import FORMATS, format_of, write
@@ -17,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("input", metavar="RESULT.h5", help="result of a command")
     formats = FORMATS.all().values()
     endings = "; ".join(f"{' or '.join(part.ENDINGS)}: {part.SUMMARY}" for part in formats)
-    add_output(parser, "FILE", required=True)
+    output_file("FILE", required=True)(parser)
     parser.epilog = f"The format follows the ending of FILE. {endings}."
     for option in _options():
         parser.add_argument(

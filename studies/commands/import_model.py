@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import asdict
-from functools import partial
 
+from vanedamp.rom.external import Findings
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.external_model import External
-from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.messages import write_result
 
 
 def run(arguments: Namespace) -> None:
@@ -21,13 +23,13 @@ def run(arguments: Namespace) -> None:
         "checks": asdict(findings),
         "warnings": list(warnings),
     }
-    files = partial(model.save, arguments.output) if arguments.output else None
-    write_result(arguments.json, result, files)
-    print_warnings(arguments.input, warnings)
-    if arguments.json != "-":
-        print(f"{model.size} coordinates; interface: {', '.join(model.interface)}")
-        print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
-        print(
-            f"checks: asymmetry {findings.asymmetry:.1e}, {findings.rigid_motions} rigid motions, "
-            f"{findings.condensed} coordinates without mass condensed"
-        )
+    write_result(arguments, result, _summary(model, findings), warnings, output=model.save)
+
+
+def _summary(model: ReducedModel, findings: Findings) -> Iterator[str]:
+    yield f"{model.size} coordinates; interface: {', '.join(model.interface)}"
+    yield "frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8])
+    yield (
+        f"checks: asymmetry {findings.asymmetry:.1e}, {findings.rigid_motions} rigid motions, "
+        f"{findings.condensed} coordinates without mass condensed"
+    )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vanedamp.studies.case.stages import assemble, modal_analysis
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import print_cavities, print_warnings, write_result
+from vanedamp.studies.commands.support.messages import cavity_lines, write_result
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -20,43 +20,37 @@ def run(arguments: Namespace, case: Case) -> None:
     analysis = modal_analysis(assemble(case))
     result = analysis.to_json()
 
-    def files() -> None:
-        if arguments.output:
-            analysis.save(arguments.output)
-        if arguments.vtk:
-            mesh, cell_type = analysis.mesh()
-            save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, arguments.vtk)
+    def vtk(path: str) -> None:
+        mesh, cell_type = analysis.mesh()
+        save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, path)
 
-    write_result(arguments.json, result, files)
-    print_warnings(arguments.input, analysis.warnings)
-    if arguments.json != "-":
-        _print_summary(result)
+    write_result(arguments, result, _summary(result), analysis.warnings, output=analysis.save, vtk=vtk)
 
 
-def _print_summary(result: Mapping[str, Any]) -> None:
-    """Print modes, effective masses and the rigid model."""
+def _summary(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield modes, effective masses and the rigid model."""
     if "speed" in result:
-        print(f"at {result['speed']:.6g} rad/s ({result['speed'] * 30 / math.pi:.6g} rpm)")
-    print("mode  frequency/Hz   effective mass x, y, z / kg        residual")
+        yield f"at {result['speed']:.6g} rad/s ({result['speed'] * 30 / math.pi:.6g} rpm)"
+    yield "mode  frequency/Hz   effective mass x, y, z / kg        residual"
     rows = zip(result["frequency_hz"], result["effective_mass"], result["residual"], strict=True)
     for index, (frequency, masses, residual) in enumerate(rows):
         mark = "  first bending" if index == result["first_bending"] else ""
-        print(
+        yield (
             f"{index + 1:4}  {frequency:12.2f}   " + "  ".join(f"{m:9.5f}" for m in masses) + f"   {residual:.1e}{mark}"
         )
     rigid = result["rigid"]
     if rigid:
-        print(
+        yield (
             f"rigid model at {rigid['at']}: mass {rigid['mass']:.5g} kg, stiffness {rigid['stiffness']:.5g} N/m, "
             f"damping {rigid['damping']:.4g} N s/m"
         )
-        print_cavities(result)
+        yield from cavity_lines(result)
     if "gyroscopic" in result:
         found = result["gyroscopic"]
-        print("with the gyroscopic coupling, in the rotating frame (whirl 1: with the rotation, -1: against it):")
-        print("mode  frequency/Hz      whirl   residual")
+        yield "with the gyroscopic coupling, in the rotating frame (whirl 1: with the rotation, -1: against it):"
+        yield "mode  frequency/Hz      whirl   residual"
         for index, row in enumerate(zip(found["frequency_hz"], found["whirl"], found["residual"], strict=True)):
-            print("{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row))
+            yield "{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row)
     if "fatigue" in result:
         fatigue = result["fatigue"]
-        print(f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m")
+        yield f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m"

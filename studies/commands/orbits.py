@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from functools import partial
+from collections.abc import Iterator
 
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
@@ -13,7 +13,7 @@ from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.terminal import progress
 
@@ -26,20 +26,16 @@ def run(arguments: Namespace, scene: Scene) -> None:
     with progress("orbits") as report:
         result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
     seconds = time.perf_counter() - started
-    print_warnings(arguments.input, result.warnings)
     # times are not kept in the result, which is the same however it came about
-    files = partial(result.save, arguments.output) if arguments.output else None
-    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance, files)
+    data = result.to_json() | {"wall_time_s": seconds} | resonance
+    write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
     if arguments.checkpoint is not None:
         clear(arguments.checkpoint)
         clear_leftovers(arguments.output)
-    if arguments.json != "-":
-        _print_summary(result)
-        print(f"{sum(len(branch.parameter) for branch in result.branches)} orbits in {seconds:.1f} s")
 
 
-def _print_summary(result: Branches) -> None:
-    """Print where branches run, and their special points."""
+def _summary(result: Branches, seconds: float) -> Iterator[str]:
+    """Yield where branches run, and their special points."""
     name = result.parameter
     for number, branch in enumerate(result.branches):
         source = ""
@@ -48,10 +44,11 @@ def _print_summary(result: Branches) -> None:
             source = f", from the {result.branches[parent].special[place].kind} of branch {parent}"
         low, high = branch.parameter.min(), branch.parameter.max()
         open_ones = f", {branch.undetermined.sum()} undetermined" if branch.undetermined.any() else ""
-        print(
+        yield (
             f"branch {number}{source}: {len(branch.parameter)} orbits of {branch.periods} period(s), {name} = "
             f"{low:.6g} to {high:.6g}, {branch.stable.sum()} of them stable{open_ones}; {branch.end}"
         )
         for point in branch.special:
             if point.kind != "end":
-                print(f"  {point.kind} at {name} = {point.parameter:.9g}" + (f": {point.note}" if point.note else ""))
+                yield f"  {point.kind} at {name} = {point.parameter:.9g}" + (f": {point.note}" if point.note else "")
+    yield f"{sum(len(branch.parameter) for branch in result.branches)} orbits in {seconds:.1f} s"

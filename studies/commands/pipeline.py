@@ -12,6 +12,7 @@ from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.outputs import check_outputs, output_folder
 from vanedamp.studies.pipeline.pipeline import pipeline
 from vanedamp.studies.sweep_steps import PEAK_SAMPLES
+from vanedamp.studies.workers import available_cores
 
 
 def run(arguments: Namespace) -> None:
@@ -21,10 +22,10 @@ def run(arguments: Namespace) -> None:
     check_outputs(arguments)
 
     def check(scene: Scene, peak: bool) -> None:
-        check_sweep(scene, arguments.workers)
+        check_sweep(scene, arguments.workers or available_cores())
         if peak:
             check_run(scene, PEAK_SAMPLES)
 
     note = partial(print, file=sys.stderr if arguments.json == "-" else sys.stdout, flush=True)
     result = pipeline(arguments.pipeline, folder, arguments.workers, arguments.dry_run, note, check)
-    write_result(arguments.json, result.to_json())
+    write_result(arguments, result.to_json())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from functools import partial
+from collections.abc import Iterator
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.files.provenance import versions
-from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.terminal import progress
 
@@ -23,27 +23,23 @@ def run(arguments: Namespace, scene: Scene) -> None:
     with progress("ramp") as report:
         result = ramp(scene, report, {"versions": versions()})
     seconds = time.perf_counter() - started
-    print_warnings(arguments.input, result.warnings)
     # times are not kept in the result, which is the same however it came about
-    files = partial(result.save, arguments.output) if arguments.output else None
-    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance, files)
-    if arguments.json != "-":
-        _print_table(result)
-        periods = sum(len(run.time) for run in result.runs)
-        print(f"{periods} periods in {seconds:.1f} s")
+    data = result.to_json() | {"wall_time_s": seconds} | resonance
+    write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
 
 
-def _print_table(result: Ramp) -> None:
-    """Print the peak of every run, and how it compares with that of the steady state without bodies."""
-    print(
+def _summary(result: Ramp, seconds: float) -> Iterator[str]:
+    """Yield the peak of every run, and how it compares with that of the steady state without bodies."""
+    yield (
         f"{f'rate, {result.table.unit}/s':>18} direction {'peak, m':>12} {'at, Hz':>10} "
         f"{'of the steady-state peak':>24}  status"
     )
     for run in result.runs:
-        print(
+        yield (
             f"{abs(run.rate):18.6g} {run.direction:9} {run.peak:12.5g} {run.at_peak('frequency'):10.6g} "
             f"{result.share(run):24.4f}  {run.status}"
         )
     tops = result.tops
     for name, what in (("undamped", "without bodies"), ("fixed", "bodies fixed")):
-        print(f"steady state, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz")
+        yield f"steady state, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz"
+    yield f"{sum(len(run.time) for run in result.runs)} periods in {seconds:.1f} s"

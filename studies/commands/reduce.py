@@ -4,30 +4,30 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from functools import partial
+from collections.abc import Iterator
 
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.case.stages import assemble, reduced_case, unit_doubts
+from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.messages import write_result
 
 
 def run(arguments: Namespace, case: Case) -> None:
     """Reduce the case."""
     started = time.perf_counter()
     structure = assemble(case)
-    model = reduced_case(
+    model = reduction(
         structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots,
         arguments.recovery,
     )  # fmt: skip
-    estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
+    rotation = model.provenance.get("rotation")
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
         "modes": model.modes,
         "basis": arguments.basis,
         "interface": list(model.interface),
         "outputs": list(model.outputs),
-        "estimate": estimate,
+        "estimate": model.provenance["estimate"],
         "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
         "wall_time_s": time.perf_counter() - started,
     }
@@ -36,18 +36,20 @@ def run(arguments: Namespace, case: Case) -> None:
         result["rotation"] = rotation | {"frequency_hz": fastest.natural_frequencies_hz.tolist()}
         if case.rotation is not None and case.rotation.gyroscopic:
             result["warnings"].append("rotation.gyroscopic: the reduced model leaves the gyroscopic coupling out")
-    files = partial(model.save, arguments.output) if arguments.output else None
-    write_result(arguments.json, result, files)
-    print_warnings(arguments.input, result["warnings"])
-    if arguments.json != "-":
-        kind = "natural" if model.free_modes else "fixed-interface"
-        print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
-        print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
-        if rotation is not None:
-            print(rotation["sentence"])
-        print("frequencies, Hz: " + _listed(model))
-        if rotation is not None:
-            print(f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest))
+    write_result(arguments, result, _summary(model, fastest), result["warnings"], output=model.save)
+
+
+def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
+    """Yield sizes, the estimates of errors, and natural frequencies: at rest, and at the greatest speed."""
+    estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
+    kind = "natural" if model.free_modes else "fixed-interface"
+    yield f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}"
+    yield f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz"
+    if rotation is not None:
+        yield rotation["sentence"]
+    yield "frequencies, Hz: " + _listed(model)
+    if rotation is not None:
+        yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest)
 
 
 def _listed(model: ReducedModel) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from functools import partial
+from collections.abc import Iterator
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ring_down import ring_down
@@ -29,27 +29,24 @@ def run(arguments: Namespace, scene: Scene) -> None:
     with progress("ringdown") as report:
         result = ring_down(scene, report, {"versions": versions()})
     print_choices(arguments.input, result.estimate, result.advice, result.warnings)
-    files = partial(result.save, arguments.output) if arguments.output else None
-    write_result(arguments.json, result.to_json() | resonance, files)
-    if arguments.json != "-":
-        _print_summary(result)
+    write_result(arguments, result.to_json() | resonance, _summary(result), output=result.save)
 
 
-def _print_summary(result: RingDown) -> None:
-    """Print the linear mode, and frequency and damping at some amplitudes."""
+def _summary(result: RingDown) -> Iterator[str]:
+    """Yield the linear mode, and frequency and damping at some amplitudes."""
     linear, half, cycles = result.linear, result.half_cycles, result.cycles
-    print(
+    yield (
         f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; bodies fixed: "
         f"{linear.fixed_frequency:.6g} Hz, {linear.fixed_damping_ratio:.6g}"
     )
-    print(f"status {result.status.value}: {len(half.time)} half cycles, {result.impacts.sum()} impacts")
+    yield f"status {result.status.value}: {len(half.time)} half cycles, {result.impacts.sum()} impacts"
     if len(cycles.time):
-        print(f"{'time, s':>12} {'amplitude, m':>14} {'frequency, Hz':>14} {'damping ratio':>14} {'by energy':>12}")
+        yield f"{'time, s':>12} {'amplitude, m':>14} {'frequency, Hz':>14} {'damping ratio':>14} {'by energy':>12}"
     for k in range(0, len(cycles.time), max(-(-len(cycles.time) // _ROWS), 1)):
         frequency = result.table.cycles / (result.time[k + 2 * result.table.cycles] - result.time[k])
-        print(
+        yield (
             f"{cycles.time[k]:12.6g} {cycles.amplitude[k]:14.6g} {frequency:14.8g} {cycles.damping_ratio[k]:14.6g} "
             f"{cycles.damping_ratio_energy[k]:12.6g}"
         )
     if result.rest_time is not None:
-        print(f"at rest from {result.rest_time:.6g} s on, at {result.displacement[-1]:.6g} m")
+        yield f"at rest from {result.rest_time:.6g} s on, at {result.displacement[-1]:.6g} m"

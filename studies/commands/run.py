@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from functools import partial
 from typing import Any
 
 from vanedamp.coupling.response.response import UNITS
@@ -24,16 +23,16 @@ def run(arguments: Namespace, scene: Scene) -> None:
         response = simulate(scene, arguments.events, arguments.samples, progress=report)
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
-    files = (
-        partial(response.save, arguments.output, {"versions": versions(), "scene": scene.to_dict()})
-        if arguments.output
-        else None
-    )
-    write_result(arguments.json, result, files)
-    if arguments.json != "-":
-        for name, value in result.items():
-            if not isinstance(value, dict | list):
-                print(f"{name:26} {_format(value)} {UNITS.get(name, '')}".rstrip())
+    lines = [
+        f"{name:26} {_format(value)} {UNITS.get(name, '')}".rstrip()
+        for name, value in result.items()
+        if not isinstance(value, dict | list)
+    ]
+
+    def save(path: str) -> None:
+        response.save(path, {"versions": versions(), "scene": scene.to_dict()})
+
+    write_result(arguments, result, lines, output=save)
 
 
 def _format(value: Any) -> str:

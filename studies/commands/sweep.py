@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from vanedamp.coupling.scene.scene import Scene
@@ -14,7 +14,7 @@ from vanedamp.studies.commands.support.messages import print_note, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
 from vanedamp.studies.sweep_steps import PEAK_SAMPLES, finish, prepare, run_peak, run_points
-from vanedamp.studies.workers import workers
+from vanedamp.studies.workers import available_cores, workers
 
 #: curves whose headlines are printed
 _MOST_LINES = 12
@@ -22,7 +22,7 @@ _MOST_LINES = 12
 
 def run(arguments: Namespace, scene: Scene) -> None:
     """Run the grid."""
-    check_sweep(scene, arguments.workers)
+    check_sweep(scene, arguments.workers or available_cores())
     if arguments.peak is not None:
         check_run(scene, PEAK_SAMPLES)
     prepared = prepare(scene, arguments.checkpoint, arguments.peak is not None)
@@ -41,25 +41,26 @@ def run(arguments: Namespace, scene: Scene) -> None:
     }  # fmt: skip
     responses = forced_responses(result)
     headlines = [response.to_json() for response in responses]
-    write_result(arguments.json, result.to_json() | speed | resonance | {"headlines": headlines})
+    lines = [
+        *_summary(result, responses),
+        f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s",
+    ]
+    write_result(arguments, result.to_json() | speed | resonance | {"headlines": headlines}, lines)
     finish(prepared, arguments.output)
-    if arguments.json != "-":
-        _print_summary(result, responses)
-        print(f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s")
 
 
-def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:
-    """Print the headlines, best first, and how many points are not ok."""
+def _summary(result: Sweep, responses: Sequence[ForcedResponse]) -> Iterator[str]:
+    """Yield the headlines, best first, and how many points are not ok."""
     if len(responses) > _MOST_LINES:
-        print(f"the {_MOST_LINES} best of {len(responses)} curves; --json and the report have all:")
+        yield f"the {_MOST_LINES} best of {len(responses)} curves; --json and the report have all:"
     for response in best_first(responses)[:_MOST_LINES]:
         if not response.reference > 0:
-            print(
+            yield (
                 f"{response.name}: nothing excites the structure, or a waveform without linear curves: there is no "
                 "maximum without bodies to compare with"
             )
             continue
-        print(response.sentence)
+        yield response.sentence
     bad = [status for status in result.status.ravel() if status != "ok"]
     if bad:
-        print(f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}")
+        yield f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}"

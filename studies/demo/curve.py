@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,33 +100,17 @@ def curves(sweep: Sweep, name: str) -> list[Curve]:
     Along an engine order the last axis is the speed, and the frequency the excitation's.
     """
     responses = forced_responses(sweep, name)
-    count = len(responses[0].x)
-    confidence, harmonic, classification = (
-        values.reshape(-1, count)
-        for values in (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
-    )
+    measures = (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
+    confidence, harmonic, kinds = (values.reshape(len(responses), -1) for values in measures)
     unit = sweep.scene.excitation.resonance_amplitude
     return [
-        _curve(*parts, unit or parts[0].reference)
-        for parts in zip(responses, confidence, harmonic, classification, strict=True)
+        _curve(response, confidence[row], harmonic[row], kinds[row], unit or response.reference)
+        for row, response in enumerate(responses)
     ]
 
 
-def means_of(curves: Sequence[Curve]) -> np.ndarray:
-    """Return the means (k, f) of k curves at all f frequencies that one of them has; nan where a run is not ok."""
-    frequencies = np.unique(np.concatenate([curve.frequency for curve in curves]))
-    means = np.full((len(curves), len(frequencies)), np.nan)
-    for row, curve in zip(means, curves, strict=True):
-        row[np.searchsorted(frequencies, curve.frequency)] = curve.mean
-    return means
-
-
 def _curve(
-    response: ForcedResponse,
-    confidence: np.ndarray,
-    harmonic: np.ndarray,
-    classification: np.ndarray,
-    unit: float,
+    response: ForcedResponse, confidence: np.ndarray, harmonic: np.ndarray, classification: np.ndarray, unit: float
 ) -> Curve:
     done = np.isfinite(response.damped_mean)
 

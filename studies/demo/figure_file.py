@@ -2,12 +2,8 @@
 
 The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
-none, and a curve may have `frequencies` of its own: along an engine order they are those of its speeds. Quantities in
-quotes are multiples of what the structure is like: "0.5 amplitude". A cavity or damper with a `count` stands for that
-number of equal cavities, or of bodies in a row.
-
-A `[bar]` (density in kg/m^3, section in m^2) is a body that fills its cavity but for the gap: a curve that is `longer`
-by a share of its tangential length is heavier by that share, and its gap is less by as much as the bar is longer.
+none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of what the structure is like:
+"0.5 amplitude". A cavity or damper with a `count` stands for that number of equal cavities, or of bodies in a row.
 """
 
 from __future__ import annotations
@@ -15,16 +11,16 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
-from vanedamp.coupling.scene.rotation import FREQUENCY, speed_of
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
 from vanedamp.coupling.system.reduced_model_file import reduced_model
@@ -34,8 +30,6 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.report.forced_response import resonance_grid
 
 FOLDER = Path(__file__).with_name("scenes")
-#: axis of a curve along an engine order
-SPEED = "rotation.speed"
 _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
 
 
@@ -97,18 +91,6 @@ class Frequencies:
     points: Annotated[Whole, Field(gt=4)]
 
 
-@checked(frozen=True, config=STRICT)
-class Bar:
-    """A bar of given density (kg/m^3) and section (m^2) whose tangential length goes with its mass."""
-
-    density: Positive
-    section: Positive
-
-    def length(self, mass: float) -> float:
-        """Return the length along the cavity, m."""
-        return mass / (self.density * self.section)
-
-
 @dataclass(frozen=True)
 class Effort:
     """Less than a figure's file says: frequencies per curve, periods of a run and its transient (None: the file's)."""
@@ -133,76 +115,50 @@ class FigureScenes:
     scenes: dict[str, Scene]
 
     @classmethod
-    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> FigureScenes:
+    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> Self:
         """Read a figure, on a structure. Raises InputError, naming the file."""
-        data = read_toml(file)
+        data, scenes = read_toml(file), {}
         try:
-            return cls._made(file.stem, _scaled(data, structure), structure, effort)
+            data = _scaled(data, structure)
+            for curve, changes in data.get("curve", {"": {}}).items():
+                tables = _merged(data["scene"], changes)
+                chosen = validate(Frequencies, tables.pop("frequencies", data["frequencies"]), f"{curve}.frequencies")
+                if tables["structure"].get("model") == "rom":
+                    tables["structure"]["file"] = str(structure.rom)
+                scene = cls.scene(tables, curve, data)
+                scene = scene if effort is None else effort.of(scene)
+                scenes[curve] = cls.swept(scene, chosen, effort.points if effort else chosen.points)
+            return cls(file.stem, data["title"], scenes)
         except InputError as error:
             raise InputError(f"{file}: {error}") from error
 
     @classmethod
-    def _made(cls, name: str, data: dict[str, Any], structure: Structure, effort: Effort | None) -> FigureScenes:
-        bar = validate(Bar, data["bar"], "bar") if "bar" in data else None
-        scenes = {}
-        for curve, changes in data.get("curve", {"": {}}).items():
-            changes = dict(changes)
-            longer = changes.pop("longer", None)
-            chosen = validate(Frequencies, changes.pop("frequencies", data["frequencies"]), f"{curve}.frequencies")
-            tables = _expanded(_merged(data["scene"], changes))
-            if tables["structure"].get("model") == "rom":
-                tables["structure"]["file"] = str(structure.rom)
-            scene = validate(Scene, tables, curve or "scene")
-            if longer is not None:
-                assert bar is not None
-                scene = with_length(scene, bar, longer)
-            scene = scene if effort is None else effort.of(scene)
-            scenes[curve] = with_frequencies(scene, chosen, effort.points if effort else chosen.points)
-        return cls(name, data["title"], scenes)
+    def scene(cls, tables: dict[str, Any], curve: str, data: dict[str, Any]) -> Scene:
+        """Return the scene of a curve from its tables; data: of the figure."""
+        return validate(Scene, _expanded(tables), curve or "scene")
+
+    @classmethod
+    def swept(cls, scene: Scene, frequencies: Frequencies, points: int) -> Scene:
+        """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances."""
+        grid = frequency_grid(scene, frequencies, linear_peaks(scene), points)
+        return scene.replace({"sweep": {**scene.to_dict()["sweep"], FREQUENCY: grid}})
 
     def stem(self, curve: str) -> str:
         """Return the name of the files of a curve, without suffix."""
         return f"{self.name}_{curve}" if curve else self.name
 
 
-def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
-    """Return the scene with a bar longer by a share of its length: heavier by that share, the gap less by the same.
-
-    Of a scene with one cavity and one body. Raises InputError if it does not fit.
-    """
-    (cavity,), (damper,) = scene.cavity, scene.damper
-    change = longer * bar.length(damper.mass)
-    gap = cavity.gap - change
-    if gap <= 0:
-        raise InputError(f"longer: by {change:g} m, which is more than the gap of {cavity.gap:g} m")
-    # a body at a wall stays there
-    values = {"cavity.0.gap": gap, "damper.0.mass": damper.mass * (1 + longer)}
-    if damper.length is not None:
-        values["damper.0.length"] = damper.length * (1 + longer)
-    return scene.replace(values | {"damper.0.position": damper.position * gap / cavity.gap})
-
-
-def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Scene:
-    """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances.
-
-    Along an engine order it is one of the speeds that have these frequencies.
-    """
-    peaks = [peak for peak in linear_peaks(scene) if frequencies.start < peak < frequencies.stop]
+def frequency_grid(scene: Scene, frequencies: Frequencies, peaks: Sequence[float], points: int) -> list[float]:
+    """Return ascending frequencies, Hz, finer around those of the peaks (Hz) that lie between the ends."""
+    peaks = [peak for peak in peaks if frequencies.start < peak < frequencies.stop]
     if not peaks:
-        grid = np.linspace(frequencies.start, frequencies.stop, points)
-    else:
-        grid = resonance_grid(frequencies.start, frequencies.stop, peaks, 2 * _damping_ratio(scene), points)
-    path, values = FREQUENCY, grid.tolist()
-    if (order := scene.excitation.engine_order) is not None:
-        path, values = SPEED, [speed_of(order, frequency) for frequency in values]
-    return scene.replace({"sweep": {**scene.to_dict()["sweep"], path: values}})
+        return np.linspace(frequencies.start, frequencies.stop, points).tolist()
+    grid = resonance_grid(frequencies.start, frequencies.stop, peaks, 2 * _damping_ratio(scene), points)
+    return list(grid.tolist())
 
 
 def linear_peaks(scene: Scene) -> list[float]:
-    """Return the first natural frequencies with all bodies fixed and without them, Hz, of any structure.
-
-    Of a rigid one along an engine order those where the order meets them: m (2 pi f)^2 = c + c1 (2 pi f / order)^2.
-    """
+    """Return the first natural frequencies with all bodies fixed and without them, Hz."""
     structure = scene.structure
     if isinstance(structure, Rom):
         floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
@@ -210,9 +166,11 @@ def linear_peaks(scene: Scene) -> list[float]:
         fixed = model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
         return sorted({float(item.natural_frequencies_hz[0]) for item in (fixed, model)})
     assert isinstance(structure, Rigid)
-    order, mass, stiffness = scene.excitation.engine_order, structure.mass, structure.stiffness_at(scene.speed)
-    if order is not None:
-        mass, stiffness = mass - structure.centrifugal_stiffness / order**2, structure.stiffness
+    return rigid_peaks(structure.mass, structure.stiffness_at(scene.speed), scene)
+
+
+def rigid_peaks(mass: float, stiffness: float, scene: Scene) -> list[float]:
+    """Return the natural frequencies, Hz, of a mass on a spring with all bodies of a scene fixed and without them."""
     masses = {mass, mass + sum(damper.mass for damper in scene.damper)}
     return sorted(math.sqrt(stiffness / mass) / (2 * math.pi) for mass in masses)
 

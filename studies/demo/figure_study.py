@@ -1,17 +1,13 @@
-"""A figure as a study: sweeps of its scenes, a picture, and claims with a verdict each.
-
-What was computed before with the same scene, model and versions can be taken over, so that an interrupted run resumes.
-"""
+"""A figure as a study: sweeps of its scenes, a picture, and claims with a verdict each."""
 
 from __future__ import annotations
 
-import json
 import shutil
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,11 +19,9 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import StoreError, digest, finite, load, write_json
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.store import digest, finite, write_json
 from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
-from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.demo.curve import Curve, curves
 from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Structure
 from vanedamp.studies.demo.pictures import responses_picture
@@ -37,14 +31,16 @@ from vanedamp.studies.terminal import progress
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
 MODES = 12
+#: text of the shipped cluster's case
+CASE = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
 class Session:
     """Folder, pool and effort of studies.
 
-    pool: of processes, None for this one; effort: less than the figures' files say; resume: take over what the folder
-    has of the same scene, model and versions; computed: sweeps of this session by the stem of their files.
+    pool: of processes, None for this one; effort: less than the figures' files say; resume: go on from the checkpoints
+    that the folder has.
     """
 
     structure: Structure
@@ -52,7 +48,24 @@ class Session:
     pool: Executor | None = None
     effort: Effort | None = None
     resume: bool = False
-    computed: dict[str, Sweep] = field(default_factory=dict)
+
+    def figure(self, file: Path) -> FigureScenes:
+        """Read a figure's scenes, on the structure."""
+        return FigureScenes.load(file, self.structure, self.effort)
+
+    def swept(self, figure: FigureScenes, curve: str) -> Sweep:
+        """Run the sweep of a curve, and write its scene (.toml) and result (.h5)."""
+        scene, stem = figure.scenes[curve], figure.stem(curve)
+        path = self.folder / f"{stem}.h5"
+        checkpoint = Path(f"{path}.partial")
+        if not self.resume:
+            clear(checkpoint)
+        write_scene(scene, path.with_suffix(".toml"), f"{figure.title}{f': {curve}' if curve else ''}")
+        with progress(stem) as report:
+            found = sweep(scene, self.pool, report, checkpoint, provenance(scene))
+        found.save(path)
+        clear(checkpoint)
+        return found
 
 
 @dataclass(frozen=True)
@@ -85,13 +98,14 @@ class FigureStudy(NamedTuple):
 
 def study(of: FigureStudy, session: Session) -> Study:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
-    figure = FigureScenes.load(of.file, session.structure, session.effort)
-    sweeps = {curve: swept(figure, curve, session) for curve in figure.scenes}
-    read = Read(
-        figure,
-        {curve: curves(sweep, curve.replace("_", " ") or figure.name) for curve, sweep in sweeps.items()},
-        {file.stem: _curves_of(file, names, session) for file, names in of.others.items()},
-    )
+    figure = session.figure(of.file)
+    sweeps = {curve: session.swept(figure, curve) for curve in figure.scenes}
+    mine = {curve: curves(sweep, curve.replace("_", " ") or figure.name) for curve, sweep in sweeps.items()}
+    others = {}
+    for file, names in of.others.items():
+        other = session.figure(file)
+        others[file.stem] = {name: curves(session.swept(other, name), name or other.name) for name in names}
+    read = Read(figure, mine, others)
     claims = of.claims(read)
     of.picture(read, session.folder / f"{figure.name}.png")
     trouble = [text for curve, sweep in sweeps.items() for text in _trouble(curve, sweep)]
@@ -104,30 +118,10 @@ def study(of: FigureStudy, session: Session) -> Study:
     return written(Study(figure.name, title, sources, claims), session.folder)
 
 
-def swept(figure: FigureScenes, curve: str, session: Session) -> Sweep:
-    """Return the sweep of a curve: of this session, of the folder with `resume`, or computed."""
-    scene, stem = figure.scenes[curve], figure.stem(curve)
-    path = session.folder / f"{stem}.h5"
-    checkpoint = Path(f"{path}.partial")
-    provenance: dict[str, Any] = {"versions": versions()}
-    if isinstance(scene.structure, Rom):
-        provenance["model"] = digest(scene.structure.file)
-    old = session.computed.get(stem) or (_kept(path) if session.resume else None)
-    if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
-        if not session.resume:
-            clear(checkpoint)
-        write_scene(scene, session.folder / f"{stem}.toml", f"{figure.title}{f': {curve}' if curve else ''}")
-        with progress(stem) as report:
-            old = sweep(scene, session.pool, report, checkpoint, provenance)
-        old.save(path)
-        clear(checkpoint)
-    session.computed[stem] = old
-    return old
-
-
-def _curves_of(file: Path, names: tuple[str, ...], session: Session) -> dict[str, list[Curve]]:
-    figure = FigureScenes.load(file, session.structure, session.effort)
-    return {curve: curves(swept(figure, curve, session), curve or figure.name) for curve in names}
+def provenance(scene: Scene) -> dict[str, Any]:
+    """Return what a sweep's result says of its making: versions, and the digest of its reduced model."""
+    model = {"model": digest(scene.structure.file)} if isinstance(scene.structure, Rom) else {}
+    return {"versions": versions()} | model
 
 
 def _trouble(curve: str, sweep: Sweep) -> list[str]:
@@ -137,38 +131,19 @@ def _trouble(curve: str, sweep: Sweep) -> list[str]:
     return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
 
 
-def _kept(path: Path) -> Sweep | None:
-    try:
-        return Sweep.load(path)
-    except (StoreError, KeyError, InputError):  # none, or of another version
-        return None
+def prepare(folder: Path) -> Structure:
+    """Make the shipped cluster's case, with its modes.h5 and rom.h5, in a folder."""
+    from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
+    from vanedamp.studies.case.tables import Case
 
-
-def prepare(folder: Path, resume: bool = False) -> Structure:
-    """Make the shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless those of this case are there."""
-    case, mesh, modes, reduced = (folder / name for name in ("case.toml", "vane_cluster.msh", "modes.h5", "rom.h5"))
-    text = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(encoding="utf-8")
-    same = case.is_file() and case.read_text(encoding="utf-8") == text
-    same = same and mesh.is_file() and mesh.read_bytes() == SHIPPED.read_bytes()
-    if not (resume and same and _made_by_us(modes, reduced, MODES)):
-        shutil.copyfile(SHIPPED, mesh)
-        case.write_text(text, encoding="utf-8")
-        write_schema(folder / schema_name("case"), KINDS["case"].schema)
-        from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
-        from vanedamp.studies.case.tables import Case
-
-        structure = assemble(Case.load(case))
-        modal_analysis(structure).save(modes)
-        reduction(structure, MODES).save(reduced)
+    shutil.copyfile(SHIPPED, folder / "vane_cluster.msh")
+    case, modes, reduced = (folder / name for name in ("case.toml", "modes.h5", "rom.h5"))
+    case.write_text(CASE, encoding="utf-8")
+    write_schema(folder / schema_name("case"), KINDS["case"].schema)
+    structure = assemble(Case.load(case))
+    modal_analysis(structure).save(modes)
+    reduction(structure, MODES).save(reduced)
     return Structure.load(modes, reduced)
-
-
-def _made_by_us(modes: Path, reduced: Path, count: int) -> bool:
-    try:
-        _, attributes = load(modes, "modes")
-        return json.loads(attributes["versions"]) == versions() and ReducedModel.load(reduced).modes == count
-    except (StoreError, KeyError):
-        return False
 
 
 def write_scene(scene: Scene, path: Path, title: str) -> None:

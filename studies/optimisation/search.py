@@ -21,9 +21,10 @@ from scipy.stats import qmc
 from vanedamp.coupling.sweep.sweep import run_list
 from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import finite, frozen
+from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
-from vanedamp.studies.optimisation.study import Design, Optimise, Study
+from vanedamp.studies.optimisation.study import Design, Study
 
 #: generations of a search, at least
 _GENERATIONS = 5
@@ -44,38 +45,36 @@ def optimise(
     started = time.perf_counter()
     table = study.table
     trial = _Trial(study, executor, progress, deviations(study))
-    first = trial.search(trial.nominal, None)
-    second = trial.search(trial.robust, trial.best_designs(first)) if len(trial.sample) > 1 else first
+    first = trial.search(False, None)
+    second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
     if robust.amplitude < nominal.amplitude:
         nominal = robust
-    axes = [np.linspace(*bounds, count) for bounds, count in (
-        (table.variables.mass_ratio, table.map.mass_ratio), (table.variables.gap_ratio, table.map.gap_ratio)
-    )]  # fmt: skip
-    designs = [Design(float(m), float(g), nominal.design.bodies) for m in axes[0] for g in axes[1]]
-    amplitudes = trial.nominal(designs).reshape(len(axes[0]), len(axes[1]))
-    responses = {name: trial.response(item.design) for name, item in (("nominal", nominal), ("robust", robust))}
-    headlines = {
-        name: trial.headline(item.design, responses[name][0])
-        for name, item in (("nominal", nominal), ("robust", robust))
-    }
+    masses = np.linspace(*table.variables.mass_ratio, table.map.mass_ratio)
+    gaps = np.linspace(*table.variables.gap_ratio, table.map.gap_ratio)
+    designs = [Design(float(mass), float(gap), nominal.design.bodies) for mass in masses for gap in gaps]
+    amplitudes = trial.judge(designs, robust=False).reshape(len(masses), len(gaps))
+    tried_designs, tried_amplitudes, tried_robust = zip(*trial.history, strict=True)
+    best = {"nominal": nominal.design, "robust": robust.design}
+    responses = {name: trial.response(design) for name, design in best.items()}
+    headlines = {name: trial.headline(design, responses[name][0]) for name, design in best.items()}
     took = time.perf_counter() - started
     return Optimisation(
-        study={"optimise": _given(table), "scene": study.scene.to_dict()},
+        study={"optimise": tables(table), "scene": study.scene.to_dict()},
         mass=study.mass,
         amplitude=study.amplitude,
         reference=study.reference,
         resonance_frequency=study.resonance.frequency,
         nominal=nominal,
         robust=robust,
-        map_mass_ratio=frozen(axes[0]),
-        map_gap_ratio=frozen(axes[1]),
+        map_mass_ratio=frozen(masses),
+        map_gap_ratio=frozen(gaps),
         map_amplitude=frozen(amplitudes),
-        history_design=frozen([design for design, _, _ in trial.history]),
-        history_amplitude=frozen([amplitude for _, amplitude, _ in trial.history]),
-        history_robust=frozen([robust for _, _, robust in trial.history]),
+        history_design=frozen(tried_designs),
+        history_amplitude=frozen(tried_amplitudes),
+        history_robust=frozen(tried_robust),
         frequency=study.frequencies,
         undamped=frozen(responses["nominal"][1]),
         nominal_response=frozen(responses["nominal"][0]),
@@ -118,20 +117,10 @@ class _Trial:
         designs = table.evaluations * (1 + len(sample) * (len(sample) > 1)) + table.map.mass_ratio * table.map.gap_ratio
         self._expected = len(study.frequencies) * designs
 
-    def nominal(self, designs: Sequence[Design]) -> np.ndarray:
-        """Return the amplitudes (d,) of designs as they are."""
-        return self._judge(designs, self.sample[:1])
-
-    def robust(self, designs: Sequence[Design]) -> np.ndarray:
-        """Return the amplitudes (d,) of designs within the tolerances."""
-        return self._judge(designs, self.sample)
-
     def optimum(self, design: Design) -> Optimum:
         """Return both amplitudes of a design."""
-        both = self.nominal([design]), self.robust([design])
-        for amplitudes, robust in zip(both, (False, True), strict=True):
-            self._remember([design], amplitudes, robust)
-        return Optimum(design, float(both[0][0]), float(both[1][0]))
+        nominal, robust = (float(self._tried([design], robust)[0]) for robust in (False, True))
+        return Optimum(design, nominal, robust)
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
         """Return the amplitudes (f,) of a design over the reference, nan where not ok, and those without bodies."""
@@ -140,13 +129,15 @@ class _Trial:
 
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
-        known, linear = self.study.reference * damped, self.study.linear(design, self.sample[0])
-        return headline(
-            self.study.frequencies, known, known, np.full(len(known), np.nan), *linear, along_frequency=True
-        )
+        known, (undamped, fixed, peaks) = self.study.reference * damped, self.study.linear(design, self.sample[0])
+        attached = np.full(len(known), np.nan)
+        return headline(self.study.frequencies, known, known, attached, undamped, fixed, peaks, along_frequency=True)
 
-    def search(self, judge: Callable[[Sequence[Design]], np.ndarray], first: np.ndarray | None) -> Design:
-        """Return the best design by differential evolution, from a first generation or from a Latin hypercube."""
+    def search(self, robust: bool, first: np.ndarray | None) -> Design:
+        """Return the best design by differential evolution, from a first generation or from a Latin hypercube.
+
+        robust: within the tolerances, or as designed.
+        """
         table, names = self.study.table, self._variables
         if not names:
             return self._design([])
@@ -156,10 +147,7 @@ class _Trial:
             first = qmc.scale(qmc.LatinHypercube(len(names), seed=table.seed).random(size), *np.transpose(bounds))
 
         def objective(columns: np.ndarray) -> np.ndarray:
-            designs = [self._design(column) for column in np.atleast_2d(columns.T)]
-            amplitudes = judge(designs)
-            self._remember(designs, amplitudes, judge == self.robust)
-            return amplitudes
+            return self._tried([self._design(column) for column in np.atleast_2d(columns.T)], robust)
 
         minimum = differential_evolution(
             objective, bounds, init=first[:size], maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
@@ -173,8 +161,11 @@ class _Trial:
         distinct = list(dict.fromkeys(design for design, _, _ in ordered))
         return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
 
-    def _remember(self, designs: Sequence[Design], amplitudes: np.ndarray, robust: bool) -> None:
+    def _tried(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
+        """Return the amplitudes of `judge`, and keep them in the history."""
+        amplitudes = self.judge(designs, robust)
         self.history += [(design, float(a), robust) for design, a in zip(designs, amplitudes, strict=True)]
+        return amplitudes
 
     def _design(self, values: Sequence[float] | np.ndarray) -> Design:
         """Return the design of the variables' values; the others are held."""
@@ -182,8 +173,9 @@ class _Trial:
         chosen = held | dict(zip(self._variables, map(float, values), strict=True))
         return Design(chosen["mass_ratio"], chosen["gap_ratio"], round(chosen["bodies"]))
 
-    def _judge(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> np.ndarray:
-        table, (damped, undamped) = self.study.table, self._run(designs, sample)
+    def judge(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
+        """Return the amplitudes (d,) of designs within the tolerances, or as they are."""
+        table, (damped, undamped) = self.study.table, self._run(designs, self.sample if robust else self.sample[:1])
         # a design with a run that is not ok has damped nothing
         bad = np.isnan(damped)
         damped = np.where(bad, np.fmax(undamped, 1.0), damped)
@@ -221,18 +213,6 @@ class _Trial:
         """Show progress: the runs done of the list at hand."""
         if self._progress is not None:
             self._progress(self.scenes + done, max(self._expected, self.scenes + done))
-
-
-def _given(table: Optimise) -> dict[str, Any]:
-    """Return a study's table as plain data, without what it leaves out."""
-    return {key: _plain(value) for key, value in asdict(table).items() if value is not None}
-
-
-def _plain(data: Any) -> Any:
-    """Return plain data with lists for tuples."""
-    if isinstance(data, dict):
-        return {key: _plain(value) for key, value in data.items()}
-    return [_plain(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 _KEYS = (

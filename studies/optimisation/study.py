@@ -188,14 +188,6 @@ class StudyFile(Scene):
     """what is best, and which designs are tried"""
 
 
-class LinearCurves(NamedTuple):
-    """Amplitudes (f,), m, at the points of a band without bodies and with glued ones, and their tops by PEAKS."""
-
-    undamped: np.ndarray
-    fixed: np.ndarray
-    peaks: dict[str, float]
-
-
 class Study(NamedTuple):
     """A scene, its [optimise] table, and what designs are measured in.
 
@@ -283,12 +275,12 @@ class Study(NamedTuple):
         )
         return replace(self.scene, damper=bodies)
 
-    def linear(self, design: Design, deviation: Mapping[str, float]) -> LinearCurves:
-        """Return the linear curves without bodies, and with those of a design glued to their floors."""
+    def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+        """Return the amplitudes (f,), m, without bodies, and with those of a design fixed, and their peaks by PEAKS."""
         point = self.point(design, deviation, float(self.frequencies[0]))
         scene = Points(self.with_bodies(design.bodies)).scene(point)
-        ends = _ends(scene, self.frequencies)
-        return LinearCurves(*linear_amplitudes(scene, self.frequencies), tops(*linear_peaks(scene, *ends)))
+        peaks = tops(*linear_peaks(scene, *_ends(scene, self.frequencies)))
+        return *linear_amplitudes(scene, self.frequencies), peaks
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
         """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""

@@ -80,7 +80,7 @@ def pipeline(
     target = Path(folder) if folder is not None else source.parent / table.folder
     if target.exists() and not target.is_dir():
         raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
-    listed = stages(table, source, target)
+    listed = list(stages(table, source, target))
     say = note or (lambda line: None)
     _check(listed, [source, *table.named_files.values()], source, check_scene or (lambda scene, peak: None))
     record = Record(target / f"{source.stem}.record.json")

@@ -6,12 +6,12 @@ import importlib.metadata
 import json
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
@@ -30,8 +30,6 @@ from vanedamp.studies.pipeline.tables import (
 )
 from vanedamp.studies.scene_checks import check_model, check_moved
 
-#: tables of a case that a stage does not read
-_OF_CALIBRATE, _OF_CAMPBELL = "calibration", "campbell"
 #: tables of a scene for other commands
 _OF_OTHERS = ("orbit", "ramp", "ring_down")
 #: keys of the rigid model that a scene takes
@@ -96,50 +94,45 @@ class Stage(ABC):
 class CaseStage(Stage):
     """A stage with finite elements."""
 
+    #: keys of the case's [calibration] that the stage reads; None: all of it, and the measurements
+    CALIBRATION_KEYS: ClassVar[Sequence[str] | None] = ()
+
     def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
         """Check the case, which a tuned one does not differ from but in numbers."""
-        if self.takes:
-            return []
-        return [self.file, *self._checked().files]
+        return [] if self.takes else [self.file, *self._checked().files]
 
     def _checked(self) -> Case:
         return Case.load(self.file)
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's tables without those of others, and the files that it names."""
+        """Return the case's tables without those of other stages, and the files that it names."""
         if not self.file.exists():
             return {}
-        tables, files = self.tables(read_toml(self.file)), self.files(Case.load(self.file))
-        return {f"case {self.file.name}": tables} | _digests(files, self.file.parent) | _software(*_DOLFINX)
-
-    def files(self, case: Case) -> list[str]:
-        """Return the files that the stage reads: those of the case without the measurements of its calibration."""
-        return replace(case, calibration=None).files
-
-    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return the tables that the stage reads."""
-        return {key: table for key, table in data.items() if key not in (_OF_CALIBRATE, _OF_CAMPBELL)}
+        tables, case = read_toml(self.file), Case.load(self.file)
+        tables.pop("campbell", None)
+        if self.CALIBRATION_KEYS is not None:
+            case, measured = replace(case, calibration=None), tables.pop("calibration", {})
+            kept = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
+            tables |= {"calibration": kept} if self.CALIBRATION_KEYS else {}
+        return {f"case {self.file.name}": tables} | _digests(case.files, self.file.parent) | _software(*_DOLFINX)
 
 
 @dataclass(frozen=True)
 class Calibrate(CaseStage):
     """From a case to its calibration, the tuned case and a scene of the rigid model."""
 
-    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return the tables that the stage reads: with the measurements."""
-        return {key: table for key, table in data.items() if key != _OF_CAMPBELL}
-
-    def files(self, case: Case) -> list[str]:
-        """Return the files that the stage reads."""
-        return case.files
+    CALIBRATION_KEYS = None
 
     def work(self, tools: Tools) -> str:
         """Calibrate."""
-        from vanedamp.studies.case.calibrated_files import save_calibration
+        from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
         from vanedamp.studies.case.calibration import calibrate
 
         found = calibrate(Case.load(self.file))
-        save_calibration(self.file, found, *self.outputs)
+        record, tuned, scene = self.outputs
+        found.save(record)
+        save_tuned_case(self.file, found, tuned)
+        save_rigid_scene(self.file, found, scene)
         _warn(tools, self.name, found.warnings)
         rigid, factors = found.rigid, ""
         if found.tuning is not None:
@@ -152,11 +145,7 @@ class Calibrate(CaseStage):
 class Modal(CaseStage):
     """From a case to its modes."""
 
-    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return the tables that the stage reads: with the share of the fatigue strength."""
-        own = super().tables(data)
-        table = data.get(_OF_CALIBRATE, {})
-        return own | {_OF_CALIBRATE: {key: table[key] for key in ("share", "hot_spot") if key in table}}
+    CALIBRATION_KEYS = ("share", "hot_spot")
 
     def work(self, tools: Tools) -> str:
         """Compute the modes."""
@@ -187,11 +176,11 @@ class Reduce(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
-        from vanedamp.studies.case.stages import assemble, reduced_case, unit_doubts
+        from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
-        model = reduced_case(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
+        model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
         model.save(self.outputs[0])
         _warn(tools, self.name, unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
         return str(model.provenance["estimate"]["sentence"])
@@ -208,8 +197,7 @@ class Sweep(Stage):
         """Check the scene, on any structure of the kind where its own is not made yet."""
         if self.file in self.takes:
             return []
-        reduced = str(self.products.get("reduced", REDUCED))
-        scene = Scene.of(self._tables(_ANY_RIGID, 1e-6, reduced), self.file)
+        scene = Scene.of(self._tables(_ANY_RIGID, 1e-6), self.file)
         self._check(scene)
         check_scene(scene, self.table.peak)
         made = {path.resolve() for path in self.takes}
@@ -272,13 +260,14 @@ class Sweep(Stage):
         rigid, amplitude = self._model()
         if (self.table.structure == "rigid" and not rigid) or (self.table.level is not None and amplitude is None):
             return None
-        return Scene.of(self._tables(rigid, amplitude, str(self.products.get("reduced", REDUCED))), self.file)
+        return Scene.of(self._tables(rigid, amplitude), self.file)
 
-    def _tables(self, rigid: dict[str, Any], amplitude: float | None, reduced: str) -> dict[str, Any]:
+    def _tables(self, rigid: dict[str, Any], amplitude: float | None) -> dict[str, Any]:
         """Return the scene's tables with the structure and the level that the pipeline gives."""
         tables = self._kept(read_toml(self.file))
         if self.table.structure is not None:
-            tables["structure"] |= rigid if self.table.structure == "rigid" else {"file": reduced}
+            reduced = {"file": str(self.products.get("reduced", REDUCED))}
+            tables["structure"] |= rigid if self.table.structure == "rigid" else reduced
         if self.table.level is not None:
             tables["excitation"]["resonance_amplitude"] = amplitude
         return tables
@@ -291,9 +280,9 @@ class Sweep(Stage):
         if self.table.structure is not None:
             model, replaced = _MODELS[self.table.structure]
             own = structure if structure.get("model") == model else {}
-            tables["structure"] = {"model": model} | _without(own, replaced)
+            tables["structure"] = {"model": model} | {key: own[key] for key in own if key not in replaced}
         if self.table.level is not None:
-            tables["excitation"] = _without(excitation, _LEVELS)
+            tables["excitation"] = {key: excitation[key] for key in excitation if key not in _LEVELS}
         return tables
 
     def _model(self) -> tuple[dict[str, Any], float | None]:
@@ -336,12 +325,9 @@ class Report(Stage):
         return f"{len(files)} results on {self.outputs[0].name}"
 
 
-def stages(pipeline: PipelineFile, source: Path, folder: Path) -> list[Stage]:
-    """Return the stages of a pipeline file with results in a folder, each after those that it takes from."""
-    return list(_stages(pipeline, source.resolve().parent, folder.resolve()))
-
-
-def _stages(pipeline: PipelineFile, base: Path, folder: Path) -> Iterator[Stage]:
+def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage]:
+    """Yield the stages of a pipeline file with results in a folder, each after those that it takes from."""
+    base, folder = source.resolve().parent, folder.resolve()
     made: list[Path] = []
     case, tuned = (base / (pipeline.case or "")).resolve(), tuple[Path, ...]()
     products: dict[str, Path] = {}
@@ -399,10 +385,6 @@ def _software(*packages: str) -> dict[str, Any]:
         with suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
     return {"version": found}
-
-
-def _without(table: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if key not in keys}
 
 
 def _warn(tools: Tools, name: str, warnings: Iterable[str]) -> None:

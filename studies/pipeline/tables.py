@@ -12,13 +12,8 @@ from vanedamp.files.toml_input import STRICT, InputError, Positive, Real, Whole,
 from vanedamp.rom.basis import basis_named
 
 #: what the stages write into the folder of the results, beside a file for every sweep
-CALIBRATION, TUNED_CASE, RIGID_SCENE, MODES, REDUCED = (
-    "calibration.h5",
-    "tuned.toml",
-    "rigid.toml",
-    "modes.h5",
-    "rom.h5",
-)
+CALIBRATION, TUNED_CASE, RIGID_SCENE = "calibration.h5", "tuned.toml", "rigid.toml"
+MODES, REDUCED = "modes.h5", "rom.h5"
 
 
 @dataclass(frozen=True, config=STRICT)

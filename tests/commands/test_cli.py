@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import h5py
@@ -385,7 +386,7 @@ def test_failing_write_leaves_the_old_files(folder, monkeypatch, capfd):
     assert capfd.readouterr().err == "vanedamp: no space left on device\n"
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(StoreError, match=r"response.json: cannot be written \(no space"):
-        write_result("response.json", {})
+        write_result(Namespace(json="response.json"), {})
     monkeypatch.undo()
     for name in ("response.h5", "response.json"):
         assert (folder / name).read_text() == "precious"

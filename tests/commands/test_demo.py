@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
+from paper.figure_scenes import PaperScenes
 from paper.scene_files import scene_file
 from tests.tools.schemas import faults
 from vanedamp.coupling.scene.scene import Scene
@@ -56,7 +57,7 @@ def test_rigid_model_shows_impact_mistuning():
 SCENES = [
     (name, curve, scene)
     for name in ("fig9", "fig10", "fig14", "mistuning", "blocks", "self_tuning", "rotating_body")
-    for curve, scene in FigureScenes.load(scene_file(name), STRUCTURE, demo.EFFORT).scenes.items()
+    for curve, scene in PaperScenes.load(scene_file(name), STRUCTURE, demo.EFFORT).scenes.items()
 ]
 
 

@@ -19,14 +19,14 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 COMMAND = '''
 """Masses of the bodies of a scene over that of the structure."""
 
-from vanedamp.studies.commands.support.arguments import add_input, add_output
+from vanedamp.studies.commands.support.arguments import input_file, output_file
 
 SUMMARY = "masses of the bodies over that of the structure"
 
 
 def add_arguments(parser):
-    add_input(parser, "SCENE.toml")
-    add_output(parser, "MASSES.h5")
+    input_file("SCENE.toml")(parser)
+    output_file("MASSES.h5")(parser)
     parser.add_argument("--table", metavar="FILE.csv", help="the ratios as a table")
 
 

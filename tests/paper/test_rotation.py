@@ -11,16 +11,17 @@ from paper import blade as study_of_blade
 from paper.blade import beam_southwell, southwell
 from paper.claims_rotation import campbell, friction_only, load_ratio, values
 from paper.claims_self_tuning import resonance_on_track, tuned_order
+from paper.figure_scenes import PaperScenes, order_peaks
 from paper.plots_rotation import campbell_picture
 from paper.runner import study
 from paper.scene_files import scene_file
+from paper.session import PaperSession
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.curve import curves
-from vanedamp.studies.demo.figure_file import Effort, FigureScenes, Structure, linear_peaks
-from vanedamp.studies.demo.figure_study import Session
+from vanedamp.studies.demo.figure_file import Effort, Structure
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
@@ -29,7 +30,7 @@ BOTH = ("rotating_body", "self_tuning")
 
 
 def scenes(name):
-    return FigureScenes.load(scene_file(name), STRUCTURE).scenes
+    return PaperScenes.load(scene_file(name), STRUCTURE).scenes
 
 
 def along(scene, frequencies, periods=1500, transient=800, sweep_of=None, **changes):
@@ -42,13 +43,13 @@ def along(scene, frequencies, periods=1500, transient=800, sweep_of=None, **chan
 
 @pytest.mark.parametrize("name", BOTH)
 def test_scenes_go_along_an_engine_order(name):
-    figure = FigureScenes.load(scene_file(name), STRUCTURE)
+    figure = PaperScenes.load(scene_file(name), STRUCTURE)
     for scene in figure.scenes.values():
         assert scene.excitation.resonance_amplitude == AMPLITUDE
         assert scene.cavity[0].radius == pytest.approx(4320 * AMPLITUDE, rel=1e-12)
         assert list(scene.sweep)[-1] == "rotation.speed"
         order = scene.excitation.engine_order
-        for frequency in linear_peaks(scene):
+        for frequency in order_peaks(scene):
             speed = 2 * math.pi * frequency / order
             masses = MASS, MASS + scene.damper[0].mass
             natural = [math.sqrt(scene.structure.stiffness_at(speed) / mass) / (2 * math.pi) for mass in masses]
@@ -71,7 +72,7 @@ def test_load_ratios_are_those_of_the_file():
 def test_friction_only_against_the_exact_engine():
     """The tops are flat, so that points 0.1 % apart find them; the closed form has the blade's first harmonic only."""
     scene = scenes("rotating_body")["open"]
-    (peak, _) = linear_peaks(scene)
+    (peak, _) = order_peaks(scene)
     for ratio in (0.05, 0.15):
         friction = ratio / load_ratio(scene, 1.0)
         (curve,) = along(scene, peak * np.linspace(0.999, 1.011, 13), **{"damper.0.friction": friction})
@@ -88,7 +89,7 @@ def test_friction_only_has_its_limits():
 
 def test_a_body_sticks_where_the_amplitude_is_below_friction_times_radius_over_the_squared_order():
     scene = scenes("rotating_body")["open"]
-    (peak, _) = linear_peaks(scene)
+    (peak, _) = order_peaks(scene)
     (curve,) = along(scene, peak * np.array([0.97, 0.99, 1.0, 1.01, 1.03]), **{"damper.0.friction": 0.25})
     below = curve.fixed < load_ratio(scene, 0.25)
     assert below.tolist() == [True, True, False, True, True]
@@ -148,7 +149,7 @@ def test_there_is_no_resonance_for_a_track_little_below_its_order():
 
 @pytest.mark.parametrize("name", ["rotating_body", pytest.param("self_tuning", marks=pytest.mark.slow)])
 def test_claims_of_quick_studies(name, tmp_path, pictures):
-    found = study(name, Session(STRUCTURE, tmp_path, effort=Effort(points=5)))
+    found = study(name, PaperSession(STRUCTURE, tmp_path, effort=Effort(points=5)))
     assert all(panel.x and panel.y for panel in pictures[name]) and any(panel.curves for panel in pictures[name])
     assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
     for claim in found.claims:

@@ -11,9 +11,11 @@ import pytest
 
 from paper import claims_blocks
 from paper.claims_rigid import attached_closed_form, regime
+from paper.figure_scenes import Bar, PaperScenes, with_length
 from paper.plots import blocks_picture
 from paper.runner import STUDIES, run_paper, study
 from paper.scene_files import FOLDER, scene_file
+from paper.session import PaperSession
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
@@ -24,15 +26,8 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.demo import figure_study
 from vanedamp.studies.demo.claims import verdict
 from vanedamp.studies.demo.curve import curves
-from vanedamp.studies.demo.figure_file import (
-    Bar,
-    Effort,
-    FigureScenes,
-    Structure,
-    linear_peaks,
-    with_length,
-)
-from vanedamp.studies.demo.figure_study import Read, Session
+from vanedamp.studies.demo.figure_file import Effort, Structure, linear_peaks
+from vanedamp.studies.demo.figure_study import Read
 from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
@@ -43,7 +38,7 @@ RIGID = ("fig9", "fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "f
 
 @pytest.mark.parametrize("name", RIGID)
 def test_scenes_are_in_units_of_the_structure(name):
-    figure = FigureScenes.load(scene_file(name), STRUCTURE)
+    figure = PaperScenes.load(scene_file(name), STRUCTURE)
     assert figure.title
     for curve, scene in figure.scenes.items():
         assert scene.excitation.resonance_amplitude == AMPLITUDE
@@ -56,7 +51,7 @@ def test_scenes_are_in_units_of_the_structure(name):
 
 
 def test_gaps_of_fig9_and_its_frequencies():
-    (scene,) = FigureScenes.load(scene_file("fig9"), STRUCTURE).scenes.values()
+    (scene,) = PaperScenes.load(scene_file("fig9"), STRUCTURE).scenes.values()
     axes, _ = scene.sweep_points()
     np.testing.assert_allclose(axes["cavity.c1.gap"] / AMPLITUDE, [1.0, 0.5, 0.1])
     peaks = linear_peaks(scene)
@@ -65,7 +60,7 @@ def test_gaps_of_fig9_and_its_frequencies():
 
 
 def test_counted_bodies_and_cavities():
-    scenes = FigureScenes.load(scene_file("systems"), STRUCTURE).scenes
+    scenes = PaperScenes.load(scene_file("systems"), STRUCTURE).scenes
     many, row = scenes["many_cavities"], scenes["particles"]
     assert [cavity.name for cavity in many.cavity] == [f"c{k}" for k in range(1, 9)]
     assert [damper.cavity for damper in many.damper] == [cavity.name for cavity in many.cavity]
@@ -78,7 +73,7 @@ def test_counted_bodies_and_cavities():
 
 
 def test_mass_of_fig19_moves_the_gap_by_the_length():
-    scenes = FigureScenes.load(scene_file("fig19"), STRUCTURE).scenes
+    scenes = PaperScenes.load(scene_file("fig19"), STRUCTURE).scenes
     bar = Bar(**tomllib.loads((FOLDER / "fig19.toml").read_text())["bar"])
     nominal = scenes["nominal"]
     mass, gap = nominal.damper[0].mass, nominal.cavity[0].gap
@@ -94,7 +89,7 @@ def test_mass_of_fig19_moves_the_gap_by_the_length():
 
 
 def test_blocks_are_the_bar_cut_across_its_length():
-    figure = FigureScenes.load(scene_file("blocks"), STRUCTURE)
+    figure = PaperScenes.load(scene_file("blocks"), STRUCTURE)
     bar = Bar(**tomllib.loads((FOLDER / "blocks.toml").read_text())["bar"])
     for curve, scene in figure.scenes.items():
         for damper in scene.damper:
@@ -107,7 +102,7 @@ def test_blocks_are_the_bar_cut_across_its_length():
 
 
 def test_a_bar_that_does_not_fit_is_refused():
-    scene = FigureScenes.load(scene_file("fig10"), STRUCTURE).scenes["single"]
+    scene = PaperScenes.load(scene_file("fig10"), STRUCTURE).scenes["single"]
     with pytest.raises(InputError, match="more than the gap"):
         with_length(scene, Bar(density=8190.0, section=1e-5), 0.06)
 
@@ -118,14 +113,14 @@ def test_unknown_unit_is_refused():
 
 
 def test_written_scene_is_the_scene(tmp_path):
-    scene = FigureScenes.load(scene_file("fig10"), STRUCTURE).scenes["shared"]
+    scene = PaperScenes.load(scene_file("fig10"), STRUCTURE).scenes["shared"]
     scene.save(tmp_path / "scene.toml")
     assert Scene.load(tmp_path / "scene.toml") == scene
 
 
 def damped(name, curve, frequencies, periods=1500, transient=700, **changes):
     """A curve of a figure at some frequencies, relative to that of its undamped resonance."""
-    scene = FigureScenes.load(scene_file(name), STRUCTURE).scenes[curve]
+    scene = PaperScenes.load(scene_file(name), STRUCTURE).scenes[curve]
     axes = {**scene.to_dict()["sweep"], "excitation.frequency": [share * FREQUENCY for share in frequencies]} | changes
     return curves(sweep(scene.replace({"sweep": axes, "time.periods": periods, "time.transient": transient})), curve)
 
@@ -180,7 +175,7 @@ def test_a_cavity_that_turns_sets_a_flat_block_tilting():
 
 
 def test_high_centrifugal_load_is_the_fixed_curve():
-    scene = FigureScenes.load(scene_file("systems"), STRUCTURE).scenes["rotating"]
+    scene = PaperScenes.load(scene_file("systems"), STRUCTURE).scenes["rotating"]
     loads = scene.sweep["damper.0.normal_load"]
     (stuck,) = damped("systems", "rotating", [0.96, 0.985, 1.0, 1.02], **{"damper.0.normal_load": [loads[-1]]})
     np.testing.assert_allclose(stuck.mean, stuck.fixed, rtol=1e-3)
@@ -212,7 +207,7 @@ def test_verdicts():
 def folder(tmp_path_factory):
     """Claims of figures with few frequencies and periods."""
     folder = tmp_path_factory.mktemp("paper")
-    session = Session(STRUCTURE, folder, effort=Effort(points=9, periods=430, transient=390))
+    session = PaperSession(STRUCTURE, folder, effort=Effort(points=9, periods=430, transient=390))
     for name in ("fig9", "fig10", "fig19"):
         study(name, session)
     return folder
@@ -243,7 +238,7 @@ def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path, pictures):
     shares = [0.96, 0.98, 0.9875, 1.0, 1.01]
     block, gaps = (damped("blocks", name, shares, 600, 390) for name in ("single", "gap"))
     slider = damped("fig9", "", shares, 600, 390)
-    scenes = FigureScenes.load(scene_file("blocks"), STRUCTURE).scenes
+    scenes = PaperScenes.load(scene_file("blocks"), STRUCTURE).scenes
     mine = dict.fromkeys(scenes, block) | {"gap": gaps}
     others = {figure: dict.fromkeys(of, slider) for figure, of in claims_blocks.SLIDERS["blocks"].items()}
     bar, mass = Bar(**tomllib.loads((FOLDER / "blocks.toml").read_text())["bar"]), scenes["nominal"].damper[0].mass
@@ -266,7 +261,7 @@ def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path, p
     of = STUDIES[name].args[0]
 
     def alike(file):
-        figure = FigureScenes.load(file, STRUCTURE)
+        figure = PaperScenes.load(file, STRUCTURE)
         axes = {name: list(scene.sweep_points()[0].values())[:-1] for name, scene in figure.scenes.items()}
         return figure, {name: [curve] * math.prod(map(len, values)) for name, values in axes.items()}
 
@@ -280,7 +275,7 @@ def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path, p
 
 
 def test_map_of_fit_and_friction(tmp_path, pictures):
-    found = study("fit", Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=430, transient=390)))
+    found = study("fit", PaperSession(STRUCTURE, tmp_path, effort=Effort(points=5, periods=430, transient=390)))
     *panels, bar = pictures["fit"]
     assert {panel.x for panel in panels} == {"coefficient of friction"} and "maximum without bodies, %" in bar.y
     assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 5)
@@ -289,7 +284,7 @@ def test_map_of_fit_and_friction(tmp_path, pictures):
 
 
 def test_points_that_failed_are_named():
-    scene = FigureScenes.load(scene_file("fit"), STRUCTURE).scenes["map"].replace(
+    scene = PaperScenes.load(scene_file("fit"), STRUCTURE).scenes["map"].replace(
         {"solver.linearisation": 1e-6, "time.periods": 20, "time.transient": 5,
          "sweep": {"excitation.frequency": [0.99 * FREQUENCY, FREQUENCY]}}
     )  # fmt: skip
@@ -299,14 +294,14 @@ def test_points_that_failed_are_named():
 def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
     effort = Effort(points=9, periods=430, transient=390)
     monkeypatch.setattr(figure_study, "sweep", None)
-    study("fig9", Session(STRUCTURE, folder, effort=effort, resume=True))
+    study("fig9", PaperSession(STRUCTURE, folder, effort=effort, resume=True))
     with pytest.raises(TypeError):  # another scene, and so another sweep
-        study("fig9", Session(replace(STRUCTURE, amplitude=60e-6), folder, effort=effort, resume=True))
+        study("fig9", PaperSession(replace(STRUCTURE, amplitude=60e-6), folder, effort=effort, resume=True))
 
 
 def test_confidence_goes_with_the_mean():
     (curve,) = damped("fig9", "", [0.99], **{"cavity.c1.gap": [0.5 * AMPLITUDE]})
-    scene = FigureScenes.load(scene_file("fig10"), STRUCTURE).scenes["single"]
+    scene = PaperScenes.load(scene_file("fig10"), STRUCTURE).scenes["single"]
     single = scene.replace({"sweep": {}, "excitation.frequency": 0.99 * FREQUENCY})
     response = simulate(single.replace({"time.periods": 1500, "time.transient": 700}))
     assert curve.confidence[0] * AMPLITUDE == pytest.approx(response.amplitude_mean_confidence)

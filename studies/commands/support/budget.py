@@ -6,6 +6,7 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vanedamp.coupling.scene.scene import Scene
@@ -42,36 +43,34 @@ def check_run(scene: Scene, samples: int = 0) -> None:
     _check_time("time.periods", f"{periods:.3g} periods", run_seconds(scene))
 
 
-def check_sweep(scene: Scene, workers: int | None) -> None:
+def check_sweep(scene: Scene, workers: int) -> None:
     """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
-    from vanedamp.studies.workers import available_cores
-
-    points, count = scene.points, workers or available_cores()
-    seconds = sweep_seconds(scene, count)
+    points, seconds = scene.points, sweep_seconds(scene, workers)
     if points > MOST_POINTS:
         raise InputError(
-            f"sweep: {points:.3g} points take {duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
+            f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
     check_run(scene)
-    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {count} workers", seconds)
+    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {workers} workers", seconds)
 
 
-def check_optimise(study: Study, workers: int | None) -> None:
+def check_optimise(study: Study, workers: int) -> None:
     """Refuse an optimisation that takes a month. Raises InputError."""
-    from vanedamp.studies.workers import available_cores
-
-    scenes, count = scenes_of(study), workers or available_cores()
+    scenes = scenes_of(study)
     check_run(study.scene)
-    _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
+    _check_time("optimise", f"{scenes:.3g} scenes on {workers} workers", scenes * run_seconds(study.scene) / workers)
 
 
 def _modes(scene: Scene) -> int:
     """Return the number of modal coordinates that samples have: at most those of the model's file."""
-    if not isinstance(scene.structure, Rom):
+    structure = scene.structure
+    if not isinstance(structure, Rom):
         return 0
-    modes = scene.structure.modes
-    return modes if isinstance(modes, int) else coordinates_in_file(scene.structure)
+    if isinstance(structure.modes, int):
+        return structure.modes
+    # a pipeline checks its scenes before it makes their model
+    return coordinates_in_file(structure) if Path(structure.file).is_file() else 0
 
 
 def designs_of(study: Study) -> int:

@@ -43,21 +43,26 @@ class Command:
 
     NAME, SUMMARY, ORDER  as `studies.commands` says of all commands
     arguments             in the order of --help
-    work                  the function of the arguments, and of what `reads` returns
     writes                files of options, each with the endings that they may have: checked before anything is read;
                           None: the work checks
     checkpoint            whether the result has a checkpoint beside it, by which `--resume` goes on
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
+    module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
     """
 
     NAME: str
     SUMMARY: str
     ORDER: int
     arguments: Sequence[Argument]
-    work: Callable[..., None]
     writes: Mapping[str, tuple[str, ...]] | None = field(default_factory=dict)
     checkpoint: bool = False
     reads: Callable[[Namespace], Any] | None = None
+    module: str = ""
+
+    @property
+    def work(self) -> Function:
+        """The function that does the work."""
+        return Function(f"{self.module or self.NAME}:run")
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Declare the arguments."""

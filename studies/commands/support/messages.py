@@ -1,26 +1,44 @@
-"""Results for machines on standard output or in a file, and warnings on standard error."""
+"""Results of a command: its files, JSON for machines, lines for people, warnings on standard error."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from vanedamp.files.store import finite, json_text, together, write_json
 
 
-def write_result(target: str | None, result: Mapping[str, Any], files: Callable[[], object] | None = None) -> None:
-    """Write a result as JSON: to a file, to standard output (-), or nowhere.
+def write_result(
+    arguments: Namespace,
+    result: Mapping[str, Any],
+    lines: Iterable[str] = (),
+    warnings: Iterable[str] = (),
+    **files: Callable[[str], object],
+) -> None:
+    """Write what a command has found. All files appear together, or none.
 
-    files: writes the command's other files; all of them appear together, or none.
+    result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
+    lines: for people, on standard output
+    warnings: about the input file, on standard error
+    files: by the option that names the file, if it is given, the function of its path that writes it
     """
+    target = arguments.json
     with together():
-        if files is not None:
-            files()
+        for option, write in files.items():
+            path = getattr(arguments, option)
+            if path is not None:
+                write(path)
         if target is not None and target != "-":
             write_json(target, finite(result))
     if target == "-":
         print(json_text(finite(result)), end="")
+    for warning in warnings:
+        print_note(arguments.input, f"warning: {warning}")
+    if target != "-":
+        for line in lines:
+            print(line)
 
 
 def print_note(source: str, message: str) -> None:
@@ -34,10 +52,10 @@ def print_warnings(source: str, warnings: Iterable[str]) -> None:
         print_note(source, f"warning: {warning}")
 
 
-def print_cavities(result: Mapping[str, Any]) -> None:
-    """Print how the rigid model's mode moves the cavities, with the keys of [[cavity]]."""
+def cavity_lines(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the rigid model's mode moves the cavities, with the keys of [[cavity]]."""
     for label, motion in result["cavity"].items():
-        print(
+        yield (
             f"cavity {label}: moves by {motion['along']:.4g} of {result['rigid']['at']}, normal_motion = "
             f"{motion['normal_motion']:.5g}, rotation = {motion['rotation']:.5g} rad/m"
         )

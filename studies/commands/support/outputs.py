@@ -22,8 +22,9 @@ class Outputs(NamedTuple):
 
     def keep(self, inputs: Iterable[str | Path]) -> None:
         """Refuse outputs that would take the place of an input. Raises InputError."""
-        for option, path in self.files:
-            refuse_input(option, path, inputs)
+        for (option, path), file in itertools.product(self.files, inputs):
+            if path.exists() and os.path.exists(file) and _same(path, Path(file)):
+                raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
 
 
 def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkpoint: bool) -> None:
@@ -35,10 +36,15 @@ def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkp
     if endings.get("output") == ("/",):
         arguments.folder, arguments.outputs = output_folder(arguments), Outputs(())
         return
-    arguments.checkpoint = checkpoint_file(arguments.output) if checkpoint else None
-    arguments.outputs = check_outputs(arguments, arguments.checkpoint, **endings)
-    if checkpoint:
-        check_resume(arguments, arguments.checkpoint)
+    arguments.checkpoint = beside = _checkpoint_file(arguments.output) if checkpoint else None
+    arguments.outputs = check_outputs(arguments, beside, **endings)
+    if checkpoint and arguments.resume:
+        if beside is None:
+            raise InputError("--resume: name the result with -o, its checkpoint lies beside it")
+        if not beside.exists():
+            raise InputError(
+                f"--resume: nothing to resume, there is no checkpoint {beside}; leave --resume out to begin"
+            )
 
 
 def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
@@ -50,14 +56,8 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
     if _is_stdout(getattr(arguments, "json", None) or "-"):
         arguments.json = "-"
     named = [(option, getattr(arguments, option, None)) for option in dict.fromkeys(("output", "json", *suffixes))]
-    given = [*named, ("output", beside)]
-    outputs = Outputs(
-        tuple(
-            (f"--{option}", Path(name))
-            for option, name in given
-            if name is not None and (option, name) != ("json", "-")
-        )
-    )
+    given = [(option, name) for option, name in (*named, ("output", beside)) if name is not None]
+    outputs = Outputs(tuple((f"--{option}", Path(name)) for option, name in given if (option, name) != ("json", "-")))
     for option, path in outputs.files:
         trouble = _trouble(path)
         if trouble is not None:
@@ -67,21 +67,13 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
     for (one, first), (other, second) in itertools.combinations(outputs.files, 2):
         if _same(first, second):
             raise InputError(f"{one} and {other}: both are {second}; name two files")
-    named_input = getattr(arguments, "input", None)
-    outputs.keep(getattr(arguments, "inputs", []) if named_input is None else [named_input])
+    outputs.keep([arguments.input] if hasattr(arguments, "input") else getattr(arguments, "inputs", []))
     for option, path in outputs.files:
         endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
         if path.suffix not in endings and path != beside:
             expected = " or ".join(filter(None, endings))
             raise InputError(f"{option} {path}: expected a file name ending in {expected}")
     return outputs
-
-
-def refuse_input(option: str, path: Path, inputs: Iterable[str | Path]) -> None:
-    """Refuse an output that would take the place of an input."""
-    for file in inputs:
-        if path.exists() and os.path.exists(file) and _same(path, Path(file)):
-            raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
 
 
 def output_folder(arguments: Namespace) -> Path:
@@ -92,19 +84,9 @@ def output_folder(arguments: Namespace) -> Path:
     return folder
 
 
-def checkpoint_file(output: str | None) -> Path | None:
+def _checkpoint_file(output: str | None) -> Path | None:
     """Return where a command keeps what is finished: beside its result, if that is a file."""
     return None if output is None or destination(output) is None else Path(f"{output}.partial")
-
-
-def check_resume(arguments: Namespace, checkpoint: Path | None) -> None:
-    """Refuse `--resume` where there is nothing to resume. Raises InputError."""
-    if arguments.resume and (checkpoint is None or not checkpoint.exists()):
-        raise InputError(
-            "--resume: name the result with -o, its checkpoint lies beside it"
-            if checkpoint is None
-            else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
-        )
 
 
 def _trouble(path: Path) -> str | None:

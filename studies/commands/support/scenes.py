@@ -11,32 +11,20 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.studies.commands.support.messages import print_note, print_warnings
-from vanedamp.studies.commands.support.outputs import Outputs
-from vanedamp.studies.scene_checks import check_model, check_moved
+from vanedamp.studies.scene_checks import check_moved, load_scene
 
 
 def read_scene(arguments: Namespace) -> Scene:
-    """Load the scene of a command; as load_scene."""
-    return load_scene(arguments.input, arguments.outputs)
-
-
-def read_any_scene(arguments: Namespace) -> Scene:
-    """Load the scene of a command; as load_any_scene."""
-    return load_any_scene(arguments.input, arguments.outputs)
-
-
-def load_scene(path: str, outputs: Outputs) -> Scene:
-    """Load a scene that moves and whose files are there; none of them may be an output. Raises InputError."""
-    scene = load_any_scene(path, outputs)
+    """Load the scene of a command, which something moves; as read_any_scene."""
+    scene = read_any_scene(arguments)
     check_moved(scene)
     return scene
 
 
-def load_any_scene(path: str, outputs: Outputs) -> Scene:
-    """Load a scene whose files are there, whether or not something moves it; as load_scene."""
-    scene = Scene.load(path)
-    outputs.keep(scene.files)
-    check_model(scene)
+def read_any_scene(arguments: Namespace) -> Scene:
+    """Load the scene of a command. Its files must be there, and none of them may be an output. Raises InputError."""
+    scene = load_scene(arguments.input)
+    arguments.outputs.keep(scene.files)
     return scene
 
 

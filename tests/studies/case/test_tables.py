@@ -24,7 +24,7 @@ def test_reads_a_case(tmp_path):
     assert case.fatigue_strength is None
     assert case.support.clamped == {"clamp": "xyz"}
     assert case.response_label == "c1"
-    assert case.materials["default"].density == 8190.0
+    assert case.material["default"].density == 8190.0
 
 
 def test_mesh_is_found_beside_the_case(tmp_path):
@@ -202,7 +202,7 @@ def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
 )
 def test_elastic_supports(table, axes, across, along, tmp_path):
     case = load(changed(CLUSTER, ('clamped = ["clamp"]', f"[support.elastic.clamp]\n{table}")), tmp_path)
-    springs = case.elastic_supports["clamp"]
+    springs = case.support.elastic["clamp"]
     assert (springs.stiffness, springs.normal, springs.tangential) == (axes, across, along)
 
 

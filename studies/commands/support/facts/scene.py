@@ -23,8 +23,7 @@ from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run, check_sweep, run_seconds, sweep_seconds
 from vanedamp.studies.commands.support.facts import Fact
-from vanedamp.studies.commands.support.outputs import Outputs
-from vanedamp.studies.commands.support.scenes import load_any_scene
+from vanedamp.studies.scene_checks import load_scene
 from vanedamp.studies.workers import available_cores
 
 #: natural frequencies that are listed
@@ -35,9 +34,9 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 
 def facts(path: str | Path) -> list[Fact]:
     """Return what the scene in a file means. Raises InputError, as its commands do."""
-    scene = load_any_scene(str(path), Outputs(()))
+    scene = load_scene(path)
     if scene.sweep:
-        check_sweep(scene, None)
+        check_sweep(scene, available_cores())
     else:
         check_run(scene)
     commands = [name for table, name in _COMMANDS.items() if getattr(scene, table)]
@@ -62,8 +61,11 @@ def facts_of(scene: Scene) -> list[Fact]:
         scene = _closed(scene)
     else:
         warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
-    found = [*_of_structure(scene), *_of_level(scene, warnings), *_of_bodies(scene), *_of_cost(scene, whole)]
-    return [*found, Fact("warnings", warnings)]
+    if scene.excitation.signal is not None:
+        warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
+    resonance = _resonance(scene)
+    found = [*_of_structure(scene), *_of_level(scene, resonance), *_of_bodies(scene, resonance)]
+    return [*found, *_of_cost(scene, whole), Fact("warnings", warnings)]
 
 
 def _closed(scene: Scene) -> Scene:
@@ -91,23 +93,20 @@ def _of_structure(scene: Scene) -> Iterator[Fact]:
     yield Fact("damping_ratio", ratios.tolist(), "", "of these modes")
 
 
-def _of_level(scene: Scene, warnings: list[str]) -> Iterator[Fact]:
+def _of_level(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
     """Yield the excitation, and the linear amplitudes of the response."""
     yield Fact("frequency_hz", scene.frequency, "Hz", "of the excitation")
     if scene.excitation.signal is not None:
-        warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
         return
     undamped, fixed = linear_amplitudes(scene, np.array([scene.frequency]))
-    resonance = _resonance(scene)
     if not isinstance(scene.structure, Prescribed):
         name, unit = ("load_factor", "") if scene.excitation.distributed else ("force", "N")
         yield Fact(name, excitation_force(scene), unit)
         static = linear_responses(scene)[0].amplitude(np.zeros(1))
         yield Fact("static_amplitude", float(static[0]), "m", "under the same load at rest")
     if resonance is not None:
-        at_top = linear_amplitudes(scene, np.array([resonance.frequency]))[0]
         yield Fact("resonance_hz", resonance.frequency, "Hz", f"mode {resonance.mode + 1}, without bodies")
-        yield Fact("resonance_amplitude", float(at_top[0]), "m", "X, there")
+        yield Fact("resonance_amplitude", _top(scene, resonance), "m", "X, there")
         yield Fact("modal_mass", resonance.mass, "kg", "of that mode at the response")
     yield Fact("amplitude_undamped", float(undamped[0]), "m", "at the excitation's frequency, without bodies")
     yield Fact("amplitude_fixed", float(fixed[0]), "m", "there, with all bodies fixed")
@@ -123,17 +122,22 @@ def _resonance(scene: Scene) -> Resonance | None:
         return None
 
 
-def _of_bodies(scene: Scene) -> Iterator[Fact]:
+def _top(scene: Scene, resonance: Resonance) -> float:
+    """Return the amplitude without bodies at the resonance, m."""
+    return float(linear_amplitudes(scene, np.array([resonance.frequency]))[0][0])
+
+
+def _of_bodies(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
     if not scene.damper:
         return
-    resonance, masses = _resonance(scene), [damper.mass for damper in scene.damper]
+    masses = [damper.mass for damper in scene.damper]
     if resonance is not None:
         system = assemble(scene)
         squares = eigh(np.diag(system.of_structure.stiffness), glued_mass(system), eigvals_only=True)
         yield Fact("mass_ratio", sum(masses) / resonance.mass, "", "of all bodies to the modal mass")
         yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies fixed")
         if scene.excitation.signal is None:
-            amplitude = float(linear_amplitudes(scene, np.array([resonance.frequency]))[0][0])
+            amplitude = _top(scene, resonance)
             ratios = [cavity.gap / amplitude for cavity in scene.cavity] if amplitude else []
             yield Fact("gap_ratio", ratios, "", "gap over X, of each cavity")
     found = onsets(scene)
