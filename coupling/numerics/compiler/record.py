@@ -84,7 +84,7 @@ def room(kind: type[Named], sizes: Mapping[str, int], **given: Any) -> Named:
     `Annotated[np.ndarray, "s 2m", complex]` is of shape (sizes["s"], 2 * sizes["m"]).
     """
     known = {"": 1, **sizes}
-    made = {
+    made: dict[str, np.ndarray] = {
         name: np.zeros([factor * known[size] for factor, size in shape], number)
         for name, shape, number in _fields_with_room(kind)
         if name not in given
