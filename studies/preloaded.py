@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gc
 
-from vanedamp.coupling.numerics.compiler.loading import loading_only
+from vanedamp.coupling.numerics.compiler.jit import loading_only
 from vanedamp.coupling.sweep.sweep import warm_up
 
 

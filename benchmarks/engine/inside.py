@@ -17,7 +17,7 @@ from vanedamp.coupling.engine.line.energy_balance import account
 from vanedamp.coupling.engine.line.event_driven import EngineRun, is_common
 from vanedamp.coupling.engine.line.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
-from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
+from vanedamp.coupling.numerics.codes import ACTIVE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.scene.scene import Scene
 
@@ -30,7 +30,7 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
     total = 0
     for period in range(first, last):
         run.advance(period, scene.solver.max_events)
-        total += int(run.state.counters[AWAKE]) - 1  # the first is the excitation
+        total += int(run.state.counters[ACTIVE]) - 1  # the first is the excitation
     return total / (last - first)
 
 

@@ -8,7 +8,7 @@ step that ends before the first root of this lower polynomial provably holds no 
 of the fastest motion, and where the remainder is round-off the polynomial's root is the function's. No event can be
 missed, and none is found twice. A double root is approached at a geometric rate.
 
-Modes that the excitation drives at their own frequency add terms in D(t) (exact.subsystem_assembly), bounded over two
+Modes that the excitation drives at their own frequency add terms in D(t) (line.subsystem_assembly), bounded over two
 periods.
 """
 
@@ -20,7 +20,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
-from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.exponentials import (
@@ -31,9 +30,9 @@ from vanedamp.coupling.numerics.exponentials import (
     minus_one,
     secular,
     secular_bound,
+    whole_vectors,
 )
 from vanedamp.coupling.numerics.tolerances import AT_ROOT, NEAR_ROOT, SUM_ROUND_OFF
-from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
 #: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
@@ -134,7 +133,7 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     value, noise, slope, amplitude = 0.0, 0.0, 0.0, g
     all_modes = whole_vectors(count, len(g))
     for j in range(count, all_modes):
-        g[j] = 0.0  # of modes that were awake before
+        g[j] = 0.0  # of modes that were active before
     if t > 0.0:
         amplitude = work.amplitude
         if order != POSITION:
@@ -381,26 +380,11 @@ def safe_step(a, sign, f, far, noise, second, longest):
     positive, clear = _without_root(a, sign, f, reach, noise, top)
     if positive:
         return reach, False, clear
-    root = min(reach, first_root_of_parabola(f, slope, 2.0 * sign * a[2]))
-    for _ in range(8):
-        if root <= 0.0:
-            break
-        falls = _slope(a, sign, root)
-        if falls >= 0.0:
-            break
-        change = -_value(a, sign, f, root) / falls
-        better = root + change
-        if not 0.0 < better <= reach:
-            break
-        root = better
-        if abs(change) < NEAR_ROOT * root:
-            if _remainder(a, root) > noise:
-                break
-            if abs(change) < AT_ROOT * root:
-                least, most = _bounds(a, sign, f, root)
-                if least > noise:
-                    return root, True, most <= top
-                break
+    root, sharp = _root_of_polynomial(a, sign, f, reach, noise)
+    if sharp:
+        least, most = _bounds(a, sign, f, root)
+        if least > noise:
+            return root, True, most <= top
     # short of the lower polynomial's root: from there the function's own is seen
     h = root * (1.0 - 0.1 * NEAR_ROOT)
     positive, clear = _without_root(a, sign, f, h, noise, top)
@@ -417,6 +401,39 @@ def safe_step(a, sign, f, far, noise, second, longest):
         best = max(best, _step_by_parabola(a, sign, f, h))
         h *= 0.5
     return best, False, False
+
+
+@inlined
+def _root_of_polynomial(a, sign, f, reach, noise):
+    """Return the lower polynomial's first root on [0, reach], and whether it is the function's; otherwise about it."""
+    root = min(reach, first_root_of_parabola(f, sign * a[1], 2.0 * sign * a[2]))
+    for _ in range(8):
+        if root <= 0.0:
+            break
+        falls = _slope(a, sign, root)
+        if falls >= 0.0:
+            break
+        change = -_value(a, sign, f, root) / falls
+        better = root + change
+        if not 0.0 < better <= reach:
+            break
+        root = better
+        if abs(change) < NEAR_ROOT * root:
+            if _remainder(a, root) > noise:
+                break
+            if abs(change) < AT_ROOT * root:
+                return root, True
+    return root, False
+
+
+@inlined
+def eighth_root_of_ratio(x, y):
+    """Return (x/y)^(1/8) of positive numbers to 7 percent, without a division or a root.
+
+    The bits of doubles are their logarithms, linear between powers of two.
+    """
+    eighth = (np.float64(x).view(np.int64) - np.float64(y).view(np.int64)) >> 3
+    return np.int64(eighth + (1023 << 52)).view(np.float64)
 
 
 @inlined

@@ -35,7 +35,7 @@ BOUNDED, EXPANDED, ROOT = np.arange(20, 23)
 # the sum with one conjugate, or that of one mode only; CALM: a mode whose square is integrated with others
 SUM, DIFFERENCE, SINGLE, CALM = range(4)
 
-# first columns of the linear maps of the amplitudes (exact.subsystem_assembly.Flows.linear): real maps of two numbers
+# first columns of the linear maps of the amplitudes (line.subsystem_assembly.Flows.linear): real maps of two numbers
 # have four columns, of one number two; WORK_MAP: of harmonic h from WORK_MAP + 4 h on
 HARMONIC_MAP, MOMENTUM_MAP, MEAN_MAP, FREE_MOMENTUM_MAP, WORK_MAP = 0, 4, 8, 10, 12
 
@@ -50,7 +50,7 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 
 # counters of a run, of any method
 (
-    PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED, CLOSED_ROWS, STEPS,
+    PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, ACTIVE, CARRIED, CLOSED_ROWS, STEPS,
     SOLVES, AT_ONCE, REDUCED,
 ) = range(15)  # fmt: skip
 COUNTERS = 15

@@ -35,27 +35,14 @@ def solve_box(problem, k, scale):
     DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
     Returns False if the budget of pivots is spent (a safeguard: positive semidefinite problems end).
     """
-    f, a, state, forced = problem.force, problem.acceleration, problem.state, problem.forced
-    for i in range(k):
-        f[i], state[i] = 0.0, OUT
-        if forced[i] == AT_LOW:
-            f[i], state[i] = problem.low[i], AT_LOW
-        elif forced[i] == AT_HIGH:
-            f[i], state[i] = problem.high[i], AT_HIGH
-    for i in range(k):
-        a[i] = problem.b[i]
-        for j in range(k):
-            a[i] += problem.matrix[i, j] * f[j]
-        scale = max(scale, abs(a[i]), abs(problem.b[i]))
-    tolerance = FORCE_ROUND_OFF * scale
+    a, state, forced = problem.acceleration, problem.state, problem.forced
+    tolerance = FORCE_ROUND_OFF * _begin(problem, k, scale)
     for i in range(k):
         if state[i] == OUT and not _drive(problem, k, i, tolerance):
             return False
     for i in range(k):
         # a row forced to its bound stays there only as long as its acceleration agrees
-        if forced[i] != 0 and (
-            (state[i] == AT_LOW and a[i] < -tolerance) or (state[i] == AT_HIGH and a[i] > tolerance)
-        ):
+        if forced[i] != 0 and _leaves(state[i], a[i], tolerance):
             forced[i], state[i] = 0, OUT
             if not _drive(problem, k, i, tolerance):
                 return False
@@ -70,6 +57,24 @@ def solve_box(problem, k, scale):
             elif state[i] != DEPENDENT:
                 forced[i] = state[i]
     return True
+
+
+@kernel
+def _begin(problem, k, scale):
+    """Set forces, states and accelerations with forced rows at their bounds. Return the size of the accelerations."""
+    f, a, state, forced = problem.force, problem.acceleration, problem.state, problem.forced
+    for i in range(k):
+        f[i], state[i] = 0.0, OUT
+        if forced[i] == AT_LOW:
+            f[i], state[i] = problem.low[i], AT_LOW
+        elif forced[i] == AT_HIGH:
+            f[i], state[i] = problem.high[i], AT_HIGH
+    for i in range(k):
+        a[i] = problem.b[i]
+        for j in range(k):
+            a[i] += problem.matrix[i, j] * f[j]
+        scale = max(scale, abs(a[i]), abs(problem.b[i]))
+    return scale
 
 
 @kernel
@@ -125,7 +130,7 @@ def _longest_step(problem, k, i, way, bound):
             # a row that FREE rows held takes over at once when they no longer do
             if abs(da[j]) > DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
                 step, stops, at_bound = 0.0, j, False
-        elif problem.forced[j] == 0 and _falls_to_zero(state[j], da[j]):
+        elif problem.forced[j] == 0 and _leaves(state[j], da[j], 0.0):
             room = max(-a[j] / da[j], 0.0)
             if room < step and not _dependent_beside(problem, k, j, i):
                 step, stops, at_bound = room, j, False
@@ -133,9 +138,9 @@ def _longest_step(problem, k, i, way, bound):
 
 
 @inlined
-def _falls_to_zero(state, change):
-    """Whether the acceleration of a row at a bound changes towards zero."""
-    return (state == AT_LOW and change < 0.0) or (state == AT_HIGH and change > 0.0)
+def _leaves(state, acceleration, tolerance):
+    """Whether the acceleration of a row at a bound, or its change, is one with which it does not stay there."""
+    return (state == AT_LOW and acceleration < -tolerance) or (state == AT_HIGH and acceleration > tolerance)
 
 
 @kernel

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.compiler.float_bits import power_of_two
+import numpy as np
+
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 
 # a sum with it has no digits behind the point left: it rounds to the nearest whole number
@@ -24,6 +25,16 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 _LONG = 0.25
 # e^x is 0 or inf to doubles beyond
 _LEAST, _MOST = -708.0, 709.0
+
+#: modes that a processor takes at once
+_LANES = 8
+
+
+@inlined
+def _power_of_two(k):
+    """Return 2^k of a whole number k from -1022 to 1023, by its bits."""
+    # with 2^52 + 1023 added, the last bits of the sum are those of the exponent
+    return np.int64(np.float64(k + (2.0**52 + 1023.0)).view(np.int64) << 52).view(np.float64)
 
 
 @inlined
@@ -56,7 +67,7 @@ def exp_minus_one(z):
         ((1 / 5040 + r * (1 / 40320)) + u * (1 / 362880 + r * (1 / 3628800)))
         + w * (1 / 39916800 + r * (1 / 479001600) + u * (1 / 6227020800))
     )
-    scale = power_of_two(k)
+    scale = _power_of_two(k)
     growth = scale * (r + u * (0.5 + r * tail)) + (scale - 1.0)
     return complex(growth * (1.0 - turn) - turn, (1.0 + growth) * 2.0 * sine * cosine)
 
@@ -102,6 +113,15 @@ def is_long(eigenvalue, harmonics, count, t):
     """
     first, other = eigenvalue[0], eigenvalue[min(harmonics, count - 1)]
     return t * min(abs(first.real) + abs(first.imag), abs(other.real) + abs(other.imag)) > _LONG
+
+
+@inlined
+def whole_vectors(count, length):
+    """Return the count of modes rounded up to whole vectors, within the arrays' length: what is there is zero.
+
+    Turns that fill no vector are made one by one, and take as long as many vectors. Few modes stay few.
+    """
+    return count if count <= _LANES else min((count + _LANES - 1) // _LANES * _LANES, length)
 
 
 @kernel

@@ -57,7 +57,7 @@ def solve_lemke(problem, k, first):
 def _solve(problem, k, attempt, grown):
     """Solve the problem by one covering vector: that of ones, or another one for later attempts.
 
-    grown: round-off relative to the largest entry so far, beside PIVOT.
+    grown: round-off relative to the largest entry so far, in addition to PIVOT.
     """
     t, basis, cover, last, noise = problem.tableau, problem.basis, 2 * k, 2 * k + 1, 0.0
     lowest, leaving = -PIVOT, -1

@@ -1,6 +1,6 @@
 """Tolerances that several layers share. Every comment says what the number is multiplied by, and what follows below.
 
-Those of one engine only are in exact.tolerances and planar.tolerances. Values are factors unless a unit is given.
+Those of one engine only are in line.tolerances and plane.tolerances. Values are factors unless a unit is given.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import (
-    AWAKE,
+    ACTIVE,
     CLOSED,
     DONE,
     EVENT_BUDGET,
@@ -200,7 +200,7 @@ class Stepper:
     def segment(self) -> Segment:
         """The segment that begins now."""
         run, state = self.run, self.run.state
-        s, awake = state.counters[FLOW], np.arange(state.counters[AWAKE])
+        s, awake = state.counters[FLOW], np.arange(state.counters[ACTIVE])
         flows = run.flows
         return Segment(
             system=run.system, begun=float(state.counters[PERIOD] * run.system.period + state.time[0]),

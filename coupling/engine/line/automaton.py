@@ -1,8 +1,8 @@
 """The compiled heart of the engine: a hybrid automaton that jumps from event to event.
 
-Between two events the state flows exactly (exact.subsystem_assembly); the next event is found with a guarantee
-(exact.event_functions); what happens there is decided by complementarity (exact.contact_states); every joule is
-accounted for (exact.energy_balance). No segment is longer than an excitation period, so that the phase is exact at
+Between two events the state flows exactly (line.subsystem_assembly); the next event is found with a guarantee
+(line.event_functions); what happens there is decided by complementarity (line.contact_states); every joule is
+accounted for (line.energy_balance). No segment is longer than an excitation period, so that the phase is exact at
 every period's start, where the section of the response is recorded.
 """
 
@@ -31,11 +31,11 @@ from vanedamp.coupling.engine.line.gap_kinematics import (
     shift_slip,
 )
 from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
-from vanedamp.coupling.engine.line.section import record_start, structure_state
+from vanedamp.coupling.engine.line.recording import record_start, structure_state
 from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
-    AWAKE,
+    ACTIVE,
     CLOSED,
     CLOSED_ROWS,
     CLOSES,
@@ -66,9 +66,15 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.compiler.jit import comparing, entry, inlined, kernel, summing
-from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, long_minus_line, secular
+from vanedamp.coupling.numerics.exponentials import (
+    exp_minus_line,
+    exp_minus_one,
+    is_long,
+    long_minus_line,
+    secular,
+    whole_vectors,
+)
 from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
-from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
 
 #: segments after which a run returns to Python, which sees interrupts
@@ -116,16 +122,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             for r in range(len(st.released)):
                 st.released[r] = 0
         if event < 0:
-            carry_over_period(system, st, watched, tau)
-            account_spell(system, flows, st, rec, scratch)
-            st.counters[PERIOD] += 1
-            st.time[0] = 0.0
-            for r in range(len(st.last_impact)):
-                st.last_impact[r] -= system.period
-            _set_phases(system, st)
-            _select_awake_modes(flows, st)
-            record_start(system, flows, st, rec, scratch)
-            align_gaps(system, st, scratch.coordinates)
+            _end_period(system, flows, st, watched, rec, scratch, tau)
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
@@ -139,14 +136,29 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         deciding = outcome == STATES_OPEN
         if deciding:
             account_spell(system, flows, st, rec, scratch)
-        if not deciding and not _within_walls(system, st):
+        elif not _within_walls(system, st):
             return ACCURACY_LOST
+
+
+@inlined
+def _end_period(system, flows, st, watched, rec, scratch, tau):
+    """Begin the next period after a segment of length tau, and record its start."""
+    carry_over_period(system, st, watched, tau)
+    account_spell(system, flows, st, rec, scratch)
+    st.counters[PERIOD] += 1
+    st.time[0] = 0.0
+    for r in range(len(st.last_impact)):
+        st.last_impact[r] -= system.period
+    _set_phases(system, st)
+    _select_active_modes(flows, st)
+    record_start(system, flows, st, rec, scratch)
+    align_gaps(system, st, scratch.coordinates)
 
 
 @entry
 def begin(system, st, rec, scratch):
     """Decide the contact states of the initial state. Return False if that fails."""
-    n, hit = len(st.constant), False
+    hit = False
     for r in range(system.friction_rows):
         if not rigid(system, r) and system.limit[r] > 0.0:
             st.state[r] = _jenkins_state(system, st, r)
@@ -165,9 +177,7 @@ def begin(system, st, rec, scratch):
     if hit:
         if not simultaneous_impacts(system, st, rec, scratch):
             return False
-        _structure_jump(system, scratch)
-        for i in range(n):
-            st.coordinates[n + i] += scratch.velocity_jump[i]
+        _push_structure(system, st, scratch)
     return resolve_contact_states(system, st, rec, scratch)
 
 
@@ -216,13 +226,27 @@ def _set_phases(system, st):
 @inlined
 def _begin_subsystem(system, flows, st, scratch, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
-    n, b, e, y = len(st.constant), system.bodies, len(system.frequency), st.coordinates
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
-    sprung = flows.sprung[s]
+    _set_constants(system, flows, st, scratch, s)
+    _set_phases(system, st)
+    _set_amplitudes(system, flows, st, scratch, s)
+    _set_free_accelerations(system, st)
+    _set_constant_forces(system, flows, st, scratch, s)
+    st.offset[0] = 0.0
+    for i in range(len(st.constant)):
+        st.offset[0] += system.response[i] * st.constant[i]
+    st.counters[ACTIVE] = flows.modes[s]
+    _select_active_modes(flows, st)
+
+
+@inlined
+def _set_constants(system, flows, st, scratch, s):
+    """Set what the constant loads give: displacements of structure and sprung bodies, accelerations of free ones."""
+    n, b, y = len(st.constant), system.bodies, st.coordinates
     constant_loads(system, st, scratch)
-    if sprung:
+    if flows.sprung[s]:
         _preload(system, flows, st, scratch, s, y)
-    for i in range(n + b if sprung else n):
+    for i in range(n + b if flows.sprung[s] else n):
         total = 0.0
         for k in range(n + b):
             total += flows.static[s, i, k] * scratch.loads[k]
@@ -236,7 +260,12 @@ def _begin_subsystem(system, flows, st, scratch, s):
         st.coordinate_acceleration[n + i] = 0.0
         for k in range(b):
             st.coordinate_acceleration[n + i] += flows.body_acceleration[s, i, k] * scratch.loads[n + k]
-    _set_phases(system, st)
+
+
+@inlined
+def _set_amplitudes(system, flows, st, scratch, s):
+    """Set the amplitudes of the free modes from the motion, less its constant part and that of the excitation."""
+    n, b, e, y, sprung = len(st.constant), system.bodies, len(system.frequency), st.coordinates, flows.sprung[s]
     for i in range(2 * n):
         scratch.coordinates[i] = y[i]
         for h in range(e):
@@ -260,12 +289,6 @@ def _begin_subsystem(system, flows, st, scratch, s):
         st.amplitude[j] = total
     for j in range(flows.modes[s], len(st.amplitude)):
         st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
-    _constant_forces(system, flows, st, scratch, s)
-    st.offset[0] = 0.0
-    for i in range(n):
-        st.offset[0] += system.response[i] * st.constant[i]
-    st.counters[AWAKE] = flows.modes[s]
-    _select_awake_modes(flows, st)
 
 
 @kernel
@@ -287,25 +310,30 @@ def _preload(system, flows, st, scratch, s, y):
 
 
 @kernel
-def _constant_forces(system, flows, st, scratch, s):
-    """Set the constant parts of the rows' accelerations and of the closed rows' forces."""
-    n, b, r_count = len(st.constant), system.bodies, len(st.state)
-    sprung = flows.sprung[s]
-    if sprung:
-        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
-    for r in range(r_count):
-        st.free_acceleration[r], st.constant_force[r] = 0.0, 0.0
-        if sprung and st.state[r] == SPRUNG:
-            st.constant_force[r] = spring_force(system, st, r)
-            for j in range(flows.modes[s]):
-                st.constant_force[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
-        size = 0.0
-        for i in range(n + b):
+def _set_free_accelerations(system, st):
+    """Set the constant parts of the rows' accelerations, by the free bodies."""
+    for r in range(len(st.state)):
+        st.free_acceleration[r], size = 0.0, 0.0
+        for i in range(len(st.coordinate_acceleration)):
             part = system.J[r, i] * st.coordinate_acceleration[i]
             st.free_acceleration[r] += part
             size += abs(part)
         if abs(st.free_acceleration[r]) <= CANCELLED * size:
             st.free_acceleration[r] = 0.0  # bodies that fall together
+
+
+@kernel
+def _set_constant_forces(system, flows, st, scratch, s):
+    """Set the constant parts of the closed rows' forces."""
+    n, b, r_count, sprung = len(st.constant), system.bodies, len(st.state), flows.sprung[s]
+    if sprung:
+        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
+    for r in range(r_count):
+        st.constant_force[r] = 0.0
+        if sprung and st.state[r] == SPRUNG:
+            st.constant_force[r] = spring_force(system, st, r)
+            for j in range(flows.modes[s]):
+                st.constant_force[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
     for i in range(n):
         scratch.loads[i] -= system.stiffness[i] * st.constant[i]
     for i in range(n, n + b):
@@ -331,36 +359,36 @@ def _constant_forces(system, flows, st, scratch, s):
 
 
 @inlined
-def _select_awake_modes(flows, st):
-    """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives.
+def _select_active_modes(flows, st):
+    """Make modes inactive whose acceleration is negligible relative to the largest, none that the excitation drives.
 
-    Modes are in order of their rates: what is awake are the first counters[AWAKE] of them.
+    Modes are in order of their rates: the first counters[ACTIVE] of them are active.
     """
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
-    largest = _largest_acceleration(flows, st, s, st.counters[AWAKE])
+    largest = _largest_acceleration(flows, st, s, st.counters[ACTIVE])
     last, count = flows.driven[s, e], flows.driven[s, e]
-    for j in range(last, st.counters[AWAKE]):
+    for j in range(last, st.counters[ACTIVE]):
         c = st.amplitude[j]
         if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > INACTIVE * largest:
             count = j + 1
         else:
             st.amplitude[j] = 0.0
-    st.counters[AWAKE] = count
+    st.counters[ACTIVE] = count
 
 
 @inlined
-def _wake_modes(flows, st):
-    """Wake the modes that an impulse has set in motion. None goes to sleep before its spell has ended."""
+def _activate_modes(flows, st):
+    """Activate the modes that an impulse has set in motion. None becomes inactive before its spell has ended."""
     s = st.counters[FLOW]
     largest, count = _largest_acceleration(flows, st, s, flows.modes[s]), flows.modes[s]
-    while count > st.counters[AWAKE]:
+    while count > st.counters[ACTIVE]:
         c = st.amplitude[count - 1]
         if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > INACTIVE * largest:
             break
         count -= 1
         st.amplitude[count] = 0.0
         st.change[2 * count], st.change[2 * count + 1] = 0.0, 0.0
-    st.counters[AWAKE] = count
+    st.counters[ACTIVE] = count
 
 
 @inlined
@@ -382,10 +410,10 @@ def _largest(amplitude, acceleration, speed, count):
 
 @inlined
 def amplitude_changes(flows, st, scratch, tau):
-    """Set the changes of the awake modes' amplitudes over the segment."""
+    """Set the changes of the active modes' amplitudes over the segment."""
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
-    count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
-    if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[AWAKE], tau):
+    count = whole_vectors(st.counters[ACTIVE], len(st.amplitude))
+    if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[ACTIVE], tau):
         _grow(long_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
     else:
         _grow(exp_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
@@ -408,7 +436,7 @@ def _grow(term, eigenvalue, amplitude, count, tau, gain, bend):
 
 @kernel
 def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
-    """Add the growth of the modes that the harmonics drive: the first ones, always awake."""
+    """Add the growth of the modes that the harmonics drive: the first ones, always active."""
     for h in range(len(driven) - 1):
         for j in range(driven[h], driven[h + 1]):
             growth, beyond = secular(eigenvalue[j], eigenvalue[h], tau)
@@ -419,7 +447,7 @@ def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
 @inlined
 def _advance_motion(system, flows, st, scratch, tau):
     """Advance rows and amplitudes by tau."""
-    s, count, friction = st.counters[FLOW], st.counters[AWAKE], system.friction_rows
+    s, count, friction = st.counters[FLOW], st.counters[ACTIVE], system.friction_rows
     for r in range(len(st.state)):
         state = st.state[r]
         if (r >= friction and (system.moves_with_floor[r] or state == CLOSED or state == TOUCHING)) or (
@@ -475,7 +503,7 @@ def _add_contact_impulses(system, flows, st, scratch, tau):
     for r in range(system.friction_rows, len(st.state)):
         if st.state[r] == SPRUNG:
             st.contact_impulse[r] += st.constant_force[r] * tau
-            for j in range(st.counters[AWAKE]):
+            for j in range(st.counters[ACTIVE]):
                 st.contact_impulse[r] += (flows.impulse[s, r, j] * scratch.gain[j]).real
 
 
@@ -496,7 +524,6 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
 
     Returns STATES_GO_ON, STATES_OPEN where contact states must be decided again, or NO_SOLUTION.
     """
-    n = len(st.constant)
     if order == POSITION and meaning == CLOSES and single_impact(system, st, rec, scratch, r):
         _change_amplitudes(system, flows, st, rec, scratch)
         return STATES_GO_ON
@@ -509,20 +536,14 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
             join_speeds(system, st, scratch)
         _close_gap(system, st, scratch, r)
     if order == POSITION and meaning == CLOSES and rigid(system, r):
-        for i in range(system.friction_rows, len(st.state)):
-            if st.state[i] == CLOSED:
-                st.capture_speed[i] = hop_speed(system, flows, st, i)
-            elif st.state[i] == TOUCHING:
-                st.capture_speed[i] = 0.0
+        _set_capture_speeds(system, flows, st)
         if not simultaneous_impacts(system, st, rec, scratch):
             return NO_SOLUTION
         if all_in_flight(system, st):
             _change_amplitudes(system, flows, st, rec, scratch)
             return STATES_GO_ON
         structure_state(flows, st, st.coordinates)
-        _structure_jump(system, scratch)
-        for i in range(n):
-            st.coordinates[n + i] += scratch.velocity_jump[i]
+        _push_structure(system, st, scratch)
         return STATES_OPEN
     if order == VELOCITY:
         st.velocity[r] = 0.0
@@ -539,6 +560,16 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
 
 
 @inlined
+def _set_capture_speeds(system, flows, st):
+    """Set the capture speeds of contacts that are closed."""
+    for r in range(system.friction_rows, len(st.state)):
+        if st.state[r] == CLOSED:
+            st.capture_speed[r] = hop_speed(system, flows, st, r)
+        elif st.state[r] == TOUCHING:
+            st.capture_speed[r] = 0.0
+
+
+@inlined
 def _change_amplitudes(system, flows, st, rec, scratch):
     """Apply the impulses of the rows to the amplitudes, within the same subsystem."""
     s = st.counters[FLOW]
@@ -551,13 +582,15 @@ def _change_amplitudes(system, flows, st, rec, scratch):
                 st.amplitude[j] += jump
                 st.change[2 * j] += jump.real
                 st.change[2 * j + 1] += jump.imag
-    _wake_modes(flows, st)
+    _activate_modes(flows, st)
 
 
 @inlined
-def _structure_jump(system, scratch):
-    """Set the jump of the structure's modal velocities under the impulses."""
-    for i in range(len(scratch.velocity_jump)):
-        scratch.velocity_jump[i] = 0.0
+def _push_structure(system, st, scratch):
+    """Add the impulses to the structure's modal velocities in st.coordinates."""
+    n = len(st.constant)
+    for i in range(n):
+        jump = 0.0
         for r in range(len(scratch.impulse)):
-            scratch.velocity_jump[i] += system.J[r, i] * scratch.impulse[r]
+            jump += system.J[r, i] * scratch.impulse[r]
+        st.coordinates[n + i] += jump

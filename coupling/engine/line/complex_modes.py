@@ -2,7 +2,7 @@
 
 Real modes come from the factors of mass and stiffness, never from these matrices: in a sum with a body of 1e12 times
 its mass nothing is left of the structure. Complex modes are computed in the coordinates of the real ones, ordered from
-quick to slow and measured by their energy, where a slow mode's small numbers stand beside those of its like (Demmel et
+quick to slow and measured by their energy, where a slow mode's small numbers stand among those of its like (Demmel et
 al., Linear Algebra Appl. 299, 1999, on factors; Tisseur and Meerbergen, SIAM Review 43, 2001, on quadratic eigenvalue
 problems).
 """
@@ -40,7 +40,7 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
 
     inertia: (k, q) and elastic: (e, q), both of rank q; loss: (e, e), s, such that the damping matrix is
     elastic^T loss elastic. The singular values of one factor over the other are the frequencies, by Jacobi's rotations,
-    which keep the digits of small ones beside large ones (Drmac and Veselic, SIAM J. Matrix Anal. Appl. 29, 2008).
+    which keep the digits of small ones among large ones (Drmac and Veselic, SIAM J. Matrix Anal. Appl. 29, 2008).
     Raises IllConditioned for a factor of lower rank.
     """
     if not inertia.shape[1]:
@@ -164,7 +164,7 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
         left = np.linalg.solve(product, left)
     if condition > NEARLY_EQUAL:
-        left += left @ (np.eye(2 * k) - right.T @ left)  # the shares of modes that nearly coalesce must cancel
+        left += left @ (np.eye(2 * k) - right.T @ left)  # the parts of modes that nearly coalesce must cancel
     return values, shapes, left
 
 
@@ -205,9 +205,9 @@ def _polish(
 def _inverse_step(
     values: np.ndarray, scale: np.ndarray, w: np.ndarray, damping: np.ndarray, right: np.ndarray
 ) -> np.ndarray:
-    """Solve the scaled quadratic problem beside each eigenvalue for right sides (m, k).
+    """Solve the scaled quadratic problem close to each eigenvalue for right sides (m, k).
 
-    Off it by round-off: the matrix must not be singular to the last bit, as it can be beside two that nearly coalesce.
+    Off it by round-off: the matrix must not be singular to the last bit, as it can be where two nearly coalesce.
     """
     diagonal = np.arange(len(w))
     for shift in SHIFTS:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.engine.line.event_log import log_event, log_impact
-from vanedamp.coupling.engine.line.gap_kinematics import rigid
+from vanedamp.coupling.engine.line.gap_kinematics import rigid, spring_energy
+from vanedamp.coupling.engine.line.recording import log_event, log_impact
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -24,12 +24,6 @@ from vanedamp.coupling.response.records import CONTACT, DETACHES
 def spring_force(system, st, r):
     """Return the force of the closed spring and dashpot of row r, N."""
     return -(system.spring[r] * st.displacement[r] + system.dashpot[r] * st.velocity[r])
-
-
-@kernel
-def spring_energy(system, st, r):
-    """Return the energy in the spring of row r, J."""
-    return 0.5 * system.spring[r] * st.displacement[r] * st.displacement[r]
 
 
 @kernel

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.engine.line.compliant_contacts import close_pressed_contacts, slide_or_hold, spring_force
-from vanedamp.coupling.engine.line.event_log import log_changes
 from vanedamp.coupling.engine.line.gap_kinematics import join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.engine.line.recording import log_changes
 from vanedamp.coupling.engine.line.tolerances import TRAVEL
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,

@@ -7,7 +7,7 @@ import math
 from vanedamp.coupling.engine.line.peaks import highest
 from vanedamp.coupling.engine.line.tolerances import LAST_TERM, SAMPLE
 from vanedamp.coupling.numerics.codes import (
-    AWAKE,
+    ACTIVE,
     CALM,
     DIFFERENCE,
     FLOW,
@@ -72,7 +72,7 @@ def account_spell(system, flows, st, rec, scratch):
     at its start, without the jumps of the form at impacts in between (`account_impact`). With c the amplitudes at the
     start, c + d at the end, the difference of a quadratic form Q is d Q (2 c + d): it does not cancel.
     """
-    s, period, count, e = st.counters[FLOW], st.counters[PERIOD], st.counters[AWAKE], len(system.frequency)
+    s, period, count, e = st.counters[FLOW], st.counters[PERIOD], st.counters[ACTIVE], len(system.frequency)
     change, total = st.change, scratch.total
     for j in range(count):
         total[2 * j] = 2.0 * st.amplitude[j].real - change[2 * j]
@@ -146,54 +146,47 @@ def _kicks(kick, amplitude, response, impulse, count):
 @inlined
 def _linear_forms(system, flows, st, rec, scratch, s, period, count):
     """Add harmonic, momentum, mean and work of the loads, by their linear maps of the amplitudes."""
-    change, total = st.change, scratch.total
-    harm_r, harm_i, mom_r, mom_i, mean = 0.0, 0.0, 0.0, 0.0, 0.0
-    old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0
+    linear, change, total, mean = flows.linear[s], st.change, scratch.total, 0.0
     for j in range(count):
-        row, dr, di, tr, ti = flows.linear[s, j], change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
-        harm_r += row[HARMONIC_MAP] * dr + row[HARMONIC_MAP + 1] * di
-        harm_i += row[HARMONIC_MAP + 2] * dr + row[HARMONIC_MAP + 3] * di
-        mom_r += row[MOMENTUM_MAP] * dr + row[MOMENTUM_MAP + 1] * di
-        mom_i += row[MOMENTUM_MAP + 2] * dr + row[MOMENTUM_MAP + 3] * di
-        mean += row[MEAN_MAP] * dr + row[MEAN_MAP + 1] * di
-        old_harm_r += row[HARMONIC_MAP] * tr + row[HARMONIC_MAP + 1] * ti
-        old_harm_i += row[HARMONIC_MAP + 2] * tr + row[HARMONIC_MAP + 3] * ti
-        old_mom_r += row[MOMENTUM_MAP] * tr + row[MOMENTUM_MAP + 1] * ti
-        old_mom_i += row[MOMENTUM_MAP + 2] * tr + row[MOMENTUM_MAP + 3] * ti
+        mean += linear[j, MEAN_MAP] * change[2 * j] + linear[j, MEAN_MAP + 1] * change[2 * j + 1]
     # mode 0: phase x + i y, with the sums and changes of both factors as in _quadratic_form
     turned, both = complex(change[0], -change[1]), complex(total[0], -total[1])
-    harmonic = both * complex(harm_r, harm_i) + turned * complex(old_harm_r, old_harm_i)
-    momentum = both * complex(mom_r, mom_i) + turned * complex(old_mom_r, old_mom_i)
+    new, old = _mapped(linear, HARMONIC_MAP, change, total, count)
+    harmonic = both * new + turned * old
+    new, old = _mapped(linear, MOMENTUM_MAP, change, total, count)
+    rec.momentum[period] += 0.5 * (both * new + turned * old)
     # integral of exp(-i omega t)
     flat = complex(0.0, 1.0 / system.omega) * turned
     rec.harmonic[period] += 0.5 * harmonic + st.offset[0] * flat
-    rec.momentum[period] += 0.5 * momentum
     rec.square[period] += st.offset[0] * mean
     if len(rec.swing) > 0:
         rec.swing[period, 2] += 0.5 * mean
     for h in range(len(system.frequency)):
-        st.ledger[EXCITATION] += _work_of_harmonic(flows.linear[s], change, total, count, h)
+        new, old = _mapped(linear, WORK_MAP + 4 * h, change, total, count)
+        x, y = 2 * h, 2 * h + 1
+        st.ledger[EXCITATION] += 0.5 * (
+            total[x] * new.real + total[y] * new.imag + change[x] * old.real + change[y] * old.imag
+        )
 
 
 @inlined
-def _work_of_harmonic(linear, change, total, count, h):
-    """Return the work of the loads of harmonic h on the modes."""
-    on_x, on_y, old_x, old_y, first = 0.0, 0.0, 0.0, 0.0, WORK_MAP + 4 * h
+def _mapped(linear, first, change, total, count):
+    """Return the map of two numbers in four columns from `first` of the changes, and that of the sums, each x + i y."""
+    on_x, on_y, old_x, old_y = 0.0, 0.0, 0.0, 0.0
     for j in range(count):
         row, dr, di, tr, ti = linear[j], change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
         on_x += row[first] * dr + row[first + 1] * di
         on_y += row[first + 2] * dr + row[first + 3] * di
         old_x += row[first] * tr + row[first + 1] * ti
         old_y += row[first + 2] * tr + row[first + 3] * ti
-    x, y = 2 * h, 2 * h + 1
-    return 0.5 * (total[x] * on_x + total[y] * on_y + change[x] * old_x + change[y] * old_y)
+    return complex(on_x, on_y), complex(old_x, old_y)
 
 
 @inlined
 def _free_bodies(system, flows, st, rec, scratch, s, period, tau):
     """Add momentum and work of the polynomial part of the bodies' motion."""
     n, drift = system.modes, 0.0
-    speed = -_free_momentum(flows.linear[s], st.amplitude, st.counters[AWAKE])
+    speed = -_free_momentum(flows.linear[s], st.amplitude, st.counters[ACTIVE])
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
@@ -234,7 +227,7 @@ def _work_on_bodies(system, flows, st, scratch, s, h, tau, flat):
         drift += load * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             own = st.velocity[b]
-            for j in range(st.counters[AWAKE]):
+            for j in range(st.counters[ACTIVE]):
                 own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
             speed += load * own
     # integral of t exp(-i omega t), as in _free_bodies
@@ -329,8 +322,8 @@ def _driven_integral(c, decay, drive, other, other_decay, other_drive):
         c, other = decay * c, other_decay * other
         if n == 1:
             c, other = c + drive, other + other_drive
-        share = 1.0 / n
-        product, c, other = share * product, share * c, share * other
+        part = 1.0 / n
+        product, c, other = part * product, part * c, part * other
         total += product * (1.0 / (n + 1.0))
         if n > 2 and abs(product.real) + abs(product.imag) <= LAST_TERM * (abs(total.real) + abs(total.imag)):
             break
@@ -355,7 +348,7 @@ def _sample(system, flows, st, rec, s, tau, constant):
             p[k] = st.constant[k]
         for r in range(system.bodies):
             entry[1 + r] = st.displacement[r] + t * (st.velocity[r] + 0.5 * st.free_acceleration[r] * t)
-        for j in range(st.counters[AWAKE]):
+        for j in range(st.counters[ACTIVE]):
             z = flows.eigenvalue[s, j] * t
             first = exp_minus_one(z)
             line = exp_minus_line(z, first)

@@ -14,9 +14,9 @@ from vanedamp.coupling.engine.root_search import (
     step_or_stop,
 )
 from vanedamp.coupling.numerics.codes import (
+    ACTIVE,
     AT_HIGH,
     AT_LOW,
-    AWAKE,
     BOUNDED,
     CARRIED,
     CLOSED,
@@ -84,7 +84,7 @@ def next_event(system, flows, st, watched):
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(
             watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], flows.eigenvalue[s],
-            flows.driven[s, flows.driven.shape[1] - 1], st.counters[AWAKE], tau, watched.expansion,
+            flows.driven[s, flows.driven.shape[1] - 1], st.counters[ACTIVE], tau, watched.expansion,
         )  # fmt: skip
         if driven:
             more, bound = add_secular(
@@ -94,7 +94,7 @@ def next_event(system, flows, st, watched):
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
         longest = max(longest - tau, shortest)
-        # the side that the motion approaches first: the other one is looked at until then
+        # the side that the motion approaches first: the other one is evaluated until then
         two = watched.sides[k] == 2
         side = 1 if two and taylor[0, 1] > 0.0 else 0
         step, found, clear = step_or_stop(
@@ -183,7 +183,7 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k)
     watched.k0[k, 0], watched.k1[k] = value, slope
     functional = flows.velocity[s, r] if order == VELOCITY else flows.motion[s, r]
     first, curvature, bound = _set_motion(
-        functional, st.amplitude, flows.eigenvalue[s], sign, watched.g[k], st.counters[AWAKE]
+        functional, st.amplitude, flows.eigenvalue[s], sign, watched.g[k], st.counters[ACTIVE]
     )
     if order == VELOCITY:
         slope, curvature = slope + first, 0.0
@@ -289,7 +289,7 @@ def _bounded_step(value, slope, bound):
 def _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k):
     """Set the first safe step of a row whose force was at its bound: at rest without acceleration, its jerk decides."""
     jerk, snap = 0.0, 0.0
-    for j in range(st.counters[AWAKE]):
+    for j in range(st.counters[ACTIVE]):
         rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
         square = rate.real * rate.real + rate.imag * rate.imag
         second = g * rate * rate
@@ -311,7 +311,7 @@ def hop_speed(system, flows, st, r):
     """Return the speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
     s = st.counters[FLOW]
     force = st.constant_force[r]
-    for j in range(st.counters[AWAKE]):
+    for j in range(st.counters[ACTIVE]):
         force += (flows.force[s, r, j] * st.amplitude[j]).real
     return max(0.0, force) * system.delassus[r, r] * 0.5 * CHATTER * system.period
 
@@ -323,7 +323,7 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
     watched.row[k, 0], watched.order[k], watched.meaning[k, 0], watched.sides[k] = r, POSITION, RECLOSES, 1
     watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
     acceleration = st.free_acceleration[r]
-    for j in range(st.counters[AWAKE]):
+    for j in range(st.counters[ACTIVE]):
         velocity = flows.velocity[s, r, j] * st.amplitude[j]
         watched.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
         acceleration += (flows.eigenvalue[s, j] * velocity).real
@@ -331,7 +331,7 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
     watched.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     watched.k2[k] = spring * st.free_acceleration[r]
     if _is_driven(flows, s):
-        # the row's velocity has its share of the growth already, its acceleration has not
+        # the row's velocity includes its growth already, its acceleration has not
         acceleration, _, _, _ = _add_drive(system, flows, st, watched, s, r, 0.0, 1.0, 0.0, k)
         watched.k1[k] += dashpot * acceleration
         _add_drive(system, flows, st, watched, s, r, spring, dashpot, 0.0, k)
@@ -347,7 +347,7 @@ def _add_force_bounds(system, flows, st, watched, s, r, limit, both, k):
     Bounds that the force never comes near are not watched.
     """
     swing, value, slope, bound = _set_force(
-        flows.force[s, r], st.amplitude, flows.eigenvalue[s], watched.g[k], st.counters[AWAKE]
+        flows.force[s, r], st.amplitude, flows.eigenvalue[s], watched.g[k], st.counters[ACTIVE]
     )
     low, high, driven = limit + st.constant_force[r], limit - st.constant_force[r], _is_driven(flows, s)
     # a force that grows is always watched
@@ -357,10 +357,10 @@ def _add_force_bounds(system, flows, st, watched, s, r, limit, both, k):
     if near_low:
         k = _add_force(system, flows, st, watched, s, r, AT_LOW, 1, low, high, value, slope, bound, k)
         if near_high:
-            for j in range(st.counters[AWAKE]):
+            for j in range(st.counters[ACTIVE]):
                 watched.g[k, j] = watched.g[k - 1, j]
     if near_high:
-        for j in range(st.counters[AWAKE]):
+        for j in range(st.counters[ACTIVE]):
             watched.g[k, j] = -watched.g[k, j]
         k = _add_force(system, flows, st, watched, s, r, AT_HIGH, 1, high, low, -value, -slope, bound, k)
     return k
@@ -402,7 +402,7 @@ def _add_force(system, flows, st, watched, s, r, side, sides, near, far, value, 
     if _is_driven(flows, s):
         watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:
-        for j in range(st.counters[AWAKE]):
+        for j in range(st.counters[ACTIVE]):
             rate = flows.eigenvalue[s, j]
             second = watched.g[k, j] * rate * rate
             curvature += second.real

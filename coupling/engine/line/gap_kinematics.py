@@ -141,3 +141,9 @@ def slowest(system, st):
 def rigid(system, r):
     """Whether row r is a constraint while it is closed, not a spring."""
     return system.spring[r] == math.inf
+
+
+@kernel
+def spring_energy(system, st, r):
+    """Return the energy in the spring of row r, J."""
+    return 0.5 * system.spring[r] * st.displacement[r] * st.displacement[r]

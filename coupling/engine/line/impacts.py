@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.event_log import log_impact
 from vanedamp.coupling.engine.line.gap_kinematics import close_gaps, join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.engine.line.recording import log_impact
 from vanedamp.coupling.engine.line.tolerances import JUMP
 from vanedamp.coupling.numerics.codes import AT_LOW, CLOSED, COAST, DEPENDENT, FREE, OPEN, SPRUNG, STICK
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
@@ -72,7 +72,7 @@ def simultaneous_impacts(system, st, rec, scratch):
 
     Velocities of rows jump; the impulses are left in scratch.impulse (r,). An impact at the end of a chatter or of an
     inelastic collapse is plastic. Contacts that would separate below their st.capture_speed end their chatter together
-    (`_complete_chatter`), so that bodies that chatter on one structure do not wake each other for ever.
+    (`_complete_chatter`), so that bodies that chatter on one structure do not set each other in motion for ever.
     Returns False if the problem cannot be solved.
     """
     problem = scratch.problem
@@ -85,7 +85,7 @@ def simultaneous_impacts(system, st, rec, scratch):
         scratch.jerk[p], scratch.acceleration[p] = speed, min(speed, 0.0)
         restitution = restitution_at(system, r, -speed)
         collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
-        if collapsed or -speed * restitution < _flight_share(restitution) * st.capture_speed[r]:
+        if collapsed or -speed * restitution < _flight_part(restitution) * st.capture_speed[r]:
             restitution = 0.0
         problem.restitution[p] = restitution
         # a contact that separates already may not be driven together: its law starts from zero
@@ -111,8 +111,8 @@ def simultaneous_impacts(system, st, rec, scratch):
 
 
 @inlined
-def _flight_share(restitution):
-    """Return the share of the rest of a chatter that its next flight takes.
+def _flight_part(restitution):
+    """Return the fraction of the rest of a chatter that its next flight takes.
 
     An elastic contact has no chatter of its own, but the losses of other contacts may shorten its flights without end.
     """
@@ -127,7 +127,7 @@ def _mark_slow_departures(system, st, scratch, k):
         r = scratch.listed[p]
         scratch.bound[p] = problem.restitution[p] == 0.0 or scratch.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * scratch.acceleration[p]
-        if problem.state[p] == AT_LOW and after < _flight_share(restitution_at(system, r, after)) * st.capture_speed[r]:
+        if problem.state[p] == AT_LOW and after < _flight_part(restitution_at(system, r, after)) * st.capture_speed[r]:
             scratch.bound[p], found = True, True
     return found
 

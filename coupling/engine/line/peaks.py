@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.engine.line.tolerances import PEAK
-from vanedamp.coupling.numerics.codes import AWAKE
+from vanedamp.coupling.numerics.codes import ACTIVE
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
-from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
-from vanedamp.coupling.numerics.vectors import whole_vectors
+from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound, whole_vectors
 
-#: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are known
+#: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are stored
 GRIDS = 5
 
 
@@ -22,7 +21,7 @@ def highest(system, flows, st, scratch, s, tau, constant, peak, side):
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
     Where interpolant and bound stay below the peak so far there is nothing to find.
     """
-    count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
+    count = whole_vectors(st.counters[ACTIVE], len(st.amplitude))
     x0, v0, x1, v1, size, fourth = _ends(
         flows.response[s], flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count
     )
@@ -57,7 +56,7 @@ def highest(system, flows, st, scratch, s, tau, constant, peak, side):
 
 @summing
 def _ends(response, eigenvalue, amplitude, gain, waves, count):
-    """Set each mode's share of the response. Return response and speed of the modes at both ends, and bounds.
+    """Set each mode's part of the response. Return response and speed of the modes at both ends, and bounds.
 
     The bounds are those of the response and of its fourth derivative.
     """
@@ -79,7 +78,7 @@ def _ends(response, eigenvalue, amplitude, gain, waves, count):
 
 @kernel
 def _set_drive(eigenvalue, response, driven, load, phase, change, period, drive):
-    """Set the share of the response in the growth of driven modes, drive, 1/s.
+    """Set the part of the response in the growth of driven modes, drive, 1/s.
 
     Returns its terms in the speed at both ends and in the bounds of the response, by time, and fourth derivative.
     """
@@ -128,7 +127,7 @@ def _search_grid(
 
 @summing
 def _next_point(rates, waves, ahead, turns, constant):
-    """Set the modes' shares of the response a step of the grid ahead. Return response and speed there."""
+    """Set the modes' parts of the response a step of the grid ahead. Return response and speed there."""
     x, v = constant, 0.0
     for j in range(len(rates)):
         wave, rate = waves[j] * turns[j], rates[j]

@@ -26,7 +26,7 @@ class State(NamedTuple):
     # changes in every segment
     counters: Annotated[np.ndarray, "counters", int]  # numerics.codes
     time: Annotated[np.ndarray, "1"]  # within the period, s
-    # modal amplitudes, the first e the phases of the excitation's harmonics; the first counters[AWAKE] are active, the
+    # modal amplitudes, the first e the phases of the excitation's harmonics; the first counters[ACTIVE] are active, the
     # others zero
     amplitude: Annotated[np.ndarray, "m", complex]
     # real and imaginary parts of their changes since the spell began (line.energy_balance)
@@ -94,16 +94,16 @@ class Scratch(NamedTuple):
     """Space for intermediate results: nothing in it outlives the handling of a segment or an event."""
 
     # a segment: changes of the amplitudes
-    gain: Annotated[np.ndarray, "m", complex]  # change of the awake modes' amplitudes
+    gain: Annotated[np.ndarray, "m", complex]  # change of the active modes' amplitudes
     bend: Annotated[np.ndarray, "m", complex]  # the same less its tangent, for displacements
 
     # a segment: energy balance and peak
     total: Annotated[np.ndarray, "2m"]  # sums of the amplitudes at both ends of a spell
-    wave: Annotated[np.ndarray, "m", complex]  # share of each awake mode in the response
+    wave: Annotated[np.ndarray, "m", complex]  # part of each active mode in the response
     ahead: Annotated[np.ndarray, "m", complex]  # that at the next point of a grid
     step_factor: Annotated[np.ndarray, "m", complex]  # exp(rate t) for one step of a grid
     growth: Annotated[np.ndarray, "m", complex]  # of driven modes over that step
-    drive: Annotated[np.ndarray, "m", complex]  # share of the response in the growth of driven modes, 1/s
+    drive: Annotated[np.ndarray, "m", complex]  # part of the response in the growth of driven modes, 1/s
 
     # a change of subsystem
     coordinates: Annotated[np.ndarray, "2n"]  # p and p'
@@ -118,7 +118,6 @@ class Scratch(NamedTuple):
 
     # impacts
     impulse: Annotated[np.ndarray, "r"]  # of each row, N s
-    velocity_jump: Annotated[np.ndarray, "n"]  # of the modal velocities
     touching: Annotated[np.ndarray, "r", int]  # contacts whose bodies are together
 
     # contact states: the listed rows may be at rest

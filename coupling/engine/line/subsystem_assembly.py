@@ -6,9 +6,9 @@ harmonics of the excitation (eigenvalues i omega_h), every displacement is  cons
 Re sum_j row_j c_j exp(lambda_j t),  exact for any t (quadratic eigenvalue problem of a viscously damped structure,
 Tisseur and Meerbergen 2001).
 
-In step with harmonic h a mode r would answer with load_r c_h/(i omega_h - lambda_r): near its own frequency, hardly
-damped, this and c_r are large and cancel. Such driven modes keep this motion in c_r, which the harmonic makes grow by
-c_r' = lambda_r c_r + load_r c_h: c_r(t) = c_r exp(lambda_r t) + load_r c_h D(t) with
+In the steady state of harmonic h, mode r would respond with load_r c_h/(i omega_h - lambda_r): near its own frequency,
+hardly damped, this and c_r are large and cancel. Such driven modes keep this motion in c_r, which the harmonic makes
+grow by c_r' = lambda_r c_r + load_r c_h: c_r(t) = c_r exp(lambda_r t) + load_r c_h D(t) with
 D(t) = (exp(i omega_h t) - exp(lambda_r t))/(i omega_h - lambda_r), which is t exp(i omega_h t) at resonance without
 damping (numerics.exponentials.secular). Harmonics lie further apart than that: each mode is driven by one of them. All
 rows stay functionals of c.
@@ -83,8 +83,8 @@ class Flows(NamedTuple):
     grid_factor: Annotated[np.ndarray, "s grids m", complex]  # of its amplitude over a step of each grid (line.peaks)
 
     # Antiderivatives of the terms of the ledger, as forms of c: an integral over a segment is the form at its end minus
-    # the form at its start. Where the rate by which a product of two modes changes vanishes beside the frequency, the
-    # form would cancel: such pairs are left out of the forms, and listed.
+    # the form at its start. Where the rate by which a product of two modes changes vanishes relative to the frequency,
+    # the form would cancel: such pairs are left out of the forms, and listed.
     linear: Annotated[np.ndarray, "s m maps"]  # linear maps, by the columns of numerics.codes
     loss: Annotated[np.ndarray, "s 2m 2m"]  # viscous loss of two modes, by their real and imaginary parts in turns
     dashpot: Annotated[np.ndarray, "s 2m 2m"]  # loss in the dashpots of contacts
@@ -99,7 +99,7 @@ class Flows(NamedTuple):
     slow: Annotated[np.ndarray, "s pairs 4", int]
     slow_loss: Annotated[np.ndarray, "s pairs", complex]  # viscous power of such a pair
     slow_dashpot: Annotated[np.ndarray, "s pairs", complex]  # power in the dashpots
-    slow_square: Annotated[np.ndarray, "s pairs", complex]  # its share of the squared response
+    slow_square: Annotated[np.ndarray, "s pairs", complex]  # its part of the squared response
 
 
 def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
@@ -140,7 +140,7 @@ def add_flow(
 
     known: subsystems of this system by their closed rows, or of one that differs by its frequency only, to which new
     ones are added. Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins
-    again. Raises IllConditioned (exact.complex_modes) for one that doubles cannot resolve.
+    again. Raises IllConditioned (line.complex_modes) for one that doubles cannot resolve.
     """
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
@@ -262,7 +262,7 @@ def _check_split(
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
-    Each coordinate counts by its share in the rows, the response and the motion of carried bodies (felt (n,)), its rate
+    Each coordinate counts by its part in the rows, the response and the motion of carried bodies (felt (n,)), its rate
     by its own frequency or that of the excitation.
     """
     n, b = system.modes, system.bodies
@@ -314,7 +314,7 @@ def _excite(
     system: LineSystem, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
     """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the
-    harmonics of a load (k, e), without the share of driven modes; harmonic and growth (d,) of each driven mode.
+    harmonics of a load (k, e), without the part of driven modes; harmonic and growth (d,) of each driven mode.
     """
     eigenvalue, shape, project = modes
     k, e = load.shape
@@ -410,11 +410,11 @@ def _fill_energy(flows: Flows, system: LineSystem, s: int, full: np.ndarray, bod
     flows.damped[s] = system.dashpot[sprung].any()
     flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + e
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
-    # is taken at once (exact.energy_balance)
+    # is taken at once (line.energy_balance)
     calm = np.abs(rate) * system.period < SLOW / 2
     products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
     listed = [(j, k, kind, -1) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
-    # a mode that is slow beside a harmonic, or beside modes that it drives, is seen from the harmonic's frame
+    # a mode that is slow relative to a harmonic, or to modes that it drives, is seen from the harmonic's frame
     listed = [(*pair[:3], frame[pair[1]] if pair[2] == DIFFERENCE and pair[0] >= e else -1) for pair in listed]
     count = len(listed)
     for i, (j, k, kind, _) in enumerate(listed):
@@ -568,7 +568,7 @@ def _sprung_bodies(system: LineSystem, cluster: np.ndarray, sprung: np.ndarray) 
 def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return displacements of k masses about their centre from coordinates (k, k-1), and these from those (k-1, k).
 
-    Each mass moves against all that are heavier: products of masses only, so that a light one beside a heavy one keeps
+    Each mass moves against all that are heavier: products of masses only, so that a light one next to a heavy one keeps
     its digits (Helmert's orthogonal contrasts).
     """
     order = np.argsort(mass, kind="stable")
@@ -593,6 +593,6 @@ def _one_of_each_pair(
 def _in_order(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, driven: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return modes in order of their rates, behind the driven ones: quick ones decay first and sleep at the end."""
+    """Return modes in order of their rates, behind the driven ones: quick ones decay first and become inactive."""
     order = np.r_[:driven, driven + np.argsort(np.abs(values[driven:]), kind="stable")]
     return values[order], vectors[:, order], inverse[order]

@@ -44,7 +44,7 @@ MIXED = 1e-3
 #: condition number of modes beyond which some nearly coalesce
 NEARLY_EQUAL = 1e2
 #: distances from an eigenvalue, times its size, at which an inverse step is tried: the matrix must not be singular to
-#: the last bit, as it can be beside two eigenvalues that nearly coalesce
+#: the last bit, as it can be close to two eigenvalues that nearly coalesce
 SHIFTS = (4 * float(np.finfo(float).eps), 1e-10, 1e-6)
 
 # --- searches and series

@@ -7,7 +7,8 @@ than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
 are numba's own but not documented. Where a version of numba lacks one of them, numba's compiler is taken:
-slower, with the same results.
+slower, with the same results. numba's own means do not replace it: numba 0.68 compiles the engine of sliders in 201 s
+in place of 41 s with its option `forceinline`; without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
 """
 
 from __future__ import annotations

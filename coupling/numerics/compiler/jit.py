@@ -1,4 +1,4 @@
-"""The decorators of compiled functions.
+"""The decorators of compiled functions, and the disk cache of those that Python calls.
 
 Those that Python calls are kept on disk between processes, with the code of those that they call. Divisions by zero
 give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than the
@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, partial, update_wrapper
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import config, njit, typeof, types
+from numba.core import event
 from numba.extending import typeof_impl
 
 from vanedamp.coupling.numerics.compiler.code_file import CodeFile
@@ -34,6 +36,18 @@ _NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[3]
+
+
+_Decorator = Callable[[Callable[..., Any]], Any]
+
+#: compiles a function that only compiled functions call, as a part of them
+kernel: _Decorator = njit(**_NOT_FROM_PYTHON, pipeline_class=KERNEL)
+#: the same into its callers: for functions that every segment runs
+inlined: _Decorator = njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)
+#: a kernel whose sums may be taken in any order, several terms at once
+summing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
+#: a kernel that compares many numbers, several at once; what it returns for NaN is anything
+comparing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS)
 
 
 class CacheError(VanedampError):
@@ -73,26 +87,6 @@ def entry(function: Callable[..., Any]) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return function
     return Entry(function)
-
-
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine that only compiled functions may call, as a part of them."""
-    return njit(**_NOT_FROM_PYTHON, pipeline_class=KERNEL)(function)
-
-
-def summing(function: Callable[..., Any]) -> Any:
-    """Compile a kernel whose sums may be taken in any order, several terms at once."""
-    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)(function)
-
-
-def comparing(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that compares many numbers, several at once; what it returns for NaN is anything."""
-    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS)(function)
-
-
-def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a kernel into its callers: for functions that every segment runs."""
-    return njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)(function)
 
 
 def _kept(function: Callable[..., Any]) -> Any:
@@ -142,3 +136,24 @@ def _sources(file: Path) -> str:
     for path in sorted(texts):
         digest.update(texts[path].encode())
     return digest.hexdigest()
+
+
+class NotCompiled(Exception):
+    """The disk cache lacks a function."""
+
+
+class _Refusal(event.Listener):
+    """Stops a compilation before it begins."""
+
+    def on_start(self, event: Any) -> None:
+        raise NotCompiled
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextmanager
+def loading_only() -> Iterator[None]:
+    """Raise NotCompiled where a function would be compiled."""
+    with event.install_listener("numba:compile", _Refusal()):
+        yield

@@ -1,9 +1,10 @@
 """Records of compiled functions: named tuples that are passed by their place.
 
 numba passes a named tuple by its items, an array as seven of them: the engine's records would be hundreds of arguments,
-which take longer to pass than many a function takes, and longer to compile. A record made with `record` is passed as
-one pointer to all of them. Records never change while compiled functions run: what is loaded once is known, whatever
-has been written to the arrays meanwhile.
+which take longer to pass than many a function takes, and longer to compile (numba 0.68: a period takes 2.5 us in place
+of 1.6 us, the first compilation 48 s in place of 41 s). A record made with `record` is passed as one pointer to all of
+them. Records never change while compiled functions run: what is loaded once is known, whatever has been written to the
+arrays meanwhile.
 
 A type may have the lengths of the arrays in it: functions are compiled for these lengths then.
 """
@@ -83,7 +84,7 @@ def room(kind: type[Named], sizes: Mapping[str, int], **given: Any) -> Named:
     `Annotated[np.ndarray, "s 2m", complex]` is of shape (sizes["s"], 2 * sizes["m"]).
     """
     known = {"": 1, **sizes}
-    made = {
+    made: dict[str, np.ndarray] = {
         name: np.zeros([factor * known[size] for factor, size in shape], number)
         for name, shape, number in _fields_with_room(kind)
         if name not in given

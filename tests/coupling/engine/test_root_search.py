@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 from numba import njit
 
-from vanedamp.coupling.engine.root_search import DEGREE, _bounds, expand, new_expansion, shift, step_or_stop
+from vanedamp.coupling.engine.root_search import (
+    DEGREE,
+    _bounds,
+    eighth_root_of_ratio,
+    expand,
+    new_expansion,
+    shift,
+    step_or_stop,
+)
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
-from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 
 
