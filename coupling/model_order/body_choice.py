@@ -26,7 +26,6 @@ from scipy.special import stdtrit
 
 from vanedamp.coupling.engine.backends import reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state, run_of, why_no_restart
-from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -36,6 +35,7 @@ from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.body_loads import greatest_pull
+from vanedamp.coupling.system.transient import short_transient
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -114,7 +114,7 @@ def with_blocks(scene: Scene, share: float = _LARGE) -> tuple[Scene, RestartStat
     bodies = [damper for damper in scene.damper if damper.shape == "auto"]
     if any(body.lift or body.tilt or body.lift_velocity or body.tilt_rate for body in bodies):
         return blocks, None
-    settled = settled_after(sliders)
+    settled = short_transient(sliders)
     slider = run_of(replace(sliders, time=Time(settled, 0)))
     if slider.advance_to(settled) is not Status.OK:
         return blocks, None
@@ -139,8 +139,9 @@ def judge(scene: Scene) -> Advice:
     """Return the advice for a scene with bodies of shape "auto", all of them alike. Raises InputError."""
     if reason := why_no_restart(scene):
         raise InputError(f'damper.shape: "auto" {reason}; say which body it is')
-    tolerance, sliders = _tolerance(scene), with_sliders(scene)
-    settled = settled_after(sliders)
+    tolerance = min(damper.tolerance or TOLERANCE for damper in scene.damper if damper.shape == "auto")
+    sliders = with_sliders(scene)
+    settled = short_transient(sliders)
     sliders = _watched(sliders, 2 * settled + _SLIDER_WINDOW + _LATER)
     slider = run_of(sliders)
     blocks: list[Run] = []
@@ -174,11 +175,6 @@ def judge(scene: Scene) -> Advice:
         confidence=confidence if known else None, tolerance=tolerance, slider_periods=slider.outcome().periods,
         block_periods=sum(block.outcome().periods for block in blocks),
     )  # fmt: skip
-
-
-def _tolerance(scene: Scene) -> float:
-    """Return the smallest tolerance of the bodies of shape "auto"."""
-    return min(damper.tolerance or TOLERANCE for damper in scene.damper if damper.shape == "auto")
 
 
 def _watched(scene: Scene, periods: int) -> Scene:
@@ -322,4 +318,4 @@ def _largest_tilts(scene: Scene) -> np.ndarray:
 
 def _blocks_in(scene: Scene, cavity: Cavity) -> list[int]:
     """Return the numbers of the bodies of shape "auto" in a cavity, from left to right."""
-    return [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name and damper.shape == "auto"]
+    return [k for k in scene.bodies_in(cavity) if scene.damper[k].shape == "auto"]

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
+from vanedamp.coupling.system.transient import short_transient
 from vanedamp.files.store import frozen
 from vanedamp.rom.error_estimate import Choice, Rung
 
@@ -65,17 +65,12 @@ def confirmed(choice: Choice, scenes: Sequence[Scene], peak: float) -> Confirmed
     for rung in tried:
         if (rung.modes, rung.attached) == (whole.modes, whole.attached):
             break
-        difference, several = _worst([pair.compare(rung) for pair in pairs])
+        difference, several = max(pair.compare(rung) for pair in pairs)
         found = _with(choice, rung, difference, several)
         if _SAFETY * difference <= tolerance:
             return found
         alike = alike or (found if several else None)
     return alike or _with(choice, whole, 0.0, False)
-
-
-def _worst(found: Sequence[tuple[float, bool]]) -> tuple[float, bool]:
-    """Return the largest difference, and whether it is one of common steady states."""
-    return max(found)
 
 
 def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confirmed:
@@ -99,7 +94,7 @@ class _Pair:
     def __init__(self, scene: Scene, whole: Rung, peak: float, tolerance: float) -> None:
         self.peak, self.tolerance = peak, tolerance
         self.scene = replace(scene, solver=options_of({}), sweep={})
-        settled = min(settled_after(self._with(whole)), _LONGEST)
+        settled = min(short_transient(self._with(whole)), _LONGEST)
         self.scene = replace(self.scene, time=Time(settled + _WINDOW, settled))
         self.whole = self._with(whole)
         self.reference = respond(self.whole)
@@ -133,9 +128,6 @@ def _in_modes(state: RestartState, before: ModalBasis, after: ModalBasis) -> Res
     one, other = (np.array(list(basis.rows.values())) for basis in (before, after))
     count = min(one.shape[1], other.shape[1])
     sign = np.where((one[:, :count] * other[:, :count]).sum(axis=0) < 0.0, -1.0, 1.0)
-    moved = []
-    for part in (state.displacement, state.velocity):
-        values = np.zeros(other.shape[1])
-        values[:count] = sign * part[:count]
-        moved.append(frozen(values))
-    return replace(state, displacement=moved[0], velocity=moved[1], speed=frozen(()))
+    moved = np.zeros((2, other.shape[1]))
+    moved[:, :count] = sign * np.array([state.displacement, state.velocity])[:, :count]
+    return replace(state, displacement=frozen(moved[0]), velocity=frozen(moved[1]), speed=frozen(()))

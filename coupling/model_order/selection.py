@@ -83,23 +83,17 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
     cannot try.
     """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
-    for scene in scenes:
-        if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
-            if any(element.on_structure for _, _, element in scene.elements):
-                raise InputError(
-                    'structure.modes: "auto" weighs collisions of bodies, not those of stops; give a number of modes'
-                )
-            if scene.excitation.signal is not None:
-                raise InputError(
-                    'structure.modes: "auto" weighs errors at the frequencies of sines, and a waveform has no highest '
-                    "one; give a number of modes"
-                )
-            if not _has_first_order(scene):
-                raise InputError(
-                    'structure.modes: "auto" tries the bodies at resonances that sines of order 1 meet, and this '
-                    "excitation has none; give a number of modes"
-                )
-            groups.setdefault(_group(scene), []).append(scene)
+    for scene in filter(needs_selection, scenes):
+        fault = ""
+        if any(element.on_structure for _, _, element in scene.elements):
+            fault = "weighs collisions of bodies, not those of stops"
+        elif scene.excitation.signal is not None:
+            fault = "weighs errors at the frequencies of sines, and a waveform has no highest one"
+        elif not _has_first_order(scene):
+            fault = "tries the bodies at resonances that sines of order 1 meet, and this excitation has none"
+        if fault:
+            raise InputError(f'structure.modes: "auto" {fault}; give a number of modes')
+        groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
 
 
@@ -126,13 +120,13 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
     if not isinstance(structure, Rom):
         return Selected(scene, None)
     if choice is None:
-        return Selected(scene, _warning(_shared(scene, structure)))
+        return Selected(scene, _shared_flexibility(scene, structure))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, reduced_model(structure, scene.speed))
     stiffness = min((collision.stiffness for collision in contacts), default=None)
     estimate = choice.to_json() | {"stiffness": stiffness}
-    warning = _warning(_shared(scene, structure))
+    warning = _shared_flexibility(scene, structure)
     sentences = [choice.sentence]
     if warning is not None:
         estimate |= warning
@@ -181,41 +175,37 @@ def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def _shared(scene: Scene, structure: Rom) -> float:
-    """Return the largest shared flexibility of two walls that can be touched at once, relative to their own."""
+def _shared_flexibility(scene: Scene, structure: Rom) -> dict[str, Any] | None:
+    """Return a warning of the largest shared flexibility of two walls that can be touched at once, over their own."""
     law = scene.contact
     if not law.takes_residual_flexibility:
-        return 0.0
+        return None
     model = reduced_model(structure, scene.speed)
     residual = model.residual_flexibility
     if residual is None:
-        return 0.0
+        return None
     own, largest = law.flexibility, 0.0
     for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
         if one != other:
             size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
             largest = max(largest, abs(float(residual[first, second])) / size if size > 0.0 else 0.0)
-    return largest
+    if largest <= _SHARED:
+        return None
+    return {
+        "shared_flexibility": largest,
+        "sentence": f"walls have up to {100 * largest:.0f} % of their residual flexibility in common, which contacts "
+        "closed at the same time do not feel; more modes lessen it",
+    }
 
 
 def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
     """Return (body, wall's place in the interface) of all contacts of bodies with walls."""
     found = []
     for cavity in scene.cavity:
-        bodies = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+        bodies = scene.bodies_in(cavity)
         ends = zip(bodies[:1] + bodies[-1:], cavity.labels()[:2], strict=False)
         found += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
     return found
-
-
-def _warning(shared: float) -> dict[str, Any] | None:
-    if shared <= _SHARED:
-        return None
-    return {
-        "shared_flexibility": shared,
-        "sentence": f"walls have up to {100 * shared:.0f} % of their residual flexibility in common, which contacts "
-        "closed at the same time do not feel; more modes lessen it",
-    }
 
 
 def _choice(scenes: Sequence[Scene]) -> Choice:
@@ -246,13 +236,8 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
     if any(scene.contact.rigid for scene in scenes):
         return replace(choice, sentence=choice.sentence + _NEWTON)
-    return _confirmed(choice, scenes)
-
-
-def _confirmed(choice: Choice, scenes: Sequence[Scene]) -> Choice:
-    """Return the choice as runs of bodies confirm it."""
-    peaks = [_peak(scene) for scene in scenes[:1] if scene.damper]
-    return confirmed(choice, scenes, peaks[0]) if any(peaks) else choice
+    peak = _peak(first) if first.damper else 0.0
+    return confirmed(choice, scenes, peak) if peak else choice
 
 
 def _peak(scene: Scene) -> float:
@@ -389,8 +374,7 @@ def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
     own = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
     found = []
     for damper in scene.damper:
-        cavity = next(item for item in scene.cavity if item.name == damper.cavity)
-        for label in dict.fromkeys(filter(None, cavity.labels()[:2])):
+        for label in dict.fromkeys(filter(None, scene.cavity[scene.cavity_of(damper)].labels()[:2])):
             reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
             lost = float(own[model.interface.index(label)])
             element = scene.contact.element(damper.restitution, reduced, lost)

@@ -59,42 +59,15 @@ def _solve(problem, k, attempt, grown):
 
     grown: round-off relative to the largest entry so far, in addition to PIVOT.
     """
-    t, basis, cover, last, noise = problem.tableau, problem.basis, 2 * k, 2 * k + 1, 0.0
-    lowest, leaving = -PIVOT, -1
-    for i in range(k):
-        for j in range(2 * k + 1):
-            t[i, j] = 0.0
-        t[i, i] = 1.0
-        for j in range(k):
-            t[i, k + j] = -problem.matrix[i, j]
-        covering = 1.0 + attempt * ((i + 1) * _GOLDEN % 1.0)
-        t[i, cover], t[i, last] = -covering, problem.q[i]
-        basis[i] = i
-        if problem.q[i] < lowest * covering:
-            lowest, leaving = problem.q[i] / covering, i
-        problem.z[i], problem.w[i] = 0.0, max(problem.q[i], 0.0)
+    t, basis, cover, noise = problem.tableau, problem.basis, 2 * k, 0.0
+    entering, leaving = cover, _fill_tableau(problem, k, attempt)
     if leaving < 0:
         return True
-    entering = cover
     for _ in range(50 + 20 * k):
-        pivot = t[leaving, entering]
-        for j in range(2 * k + 2):
-            t[leaving, j] /= pivot
-        for i in range(k):
-            factor = t[i, entering]
-            if i != leaving and factor != 0.0:
-                for j in range(2 * k + 2):
-                    t[i, j] -= factor * t[leaving, j]
-                t[i, entering] = 0.0
+        _pivot(t, leaving, entering, k)
         left, basis[leaving] = basis[leaving], entering
         if left == cover:
-            for i in range(k):
-                problem.w[i] = 0.0
-            for i in range(k):
-                if basis[i] < k:
-                    problem.w[basis[i]] = max(t[i, last], 0.0)
-                else:
-                    problem.z[basis[i] - k] = max(t[i, last], 0.0)
+            _take_solution(problem, k)
             return True
         entering = left + k if left < k else left - k
         if grown > 0.0:
@@ -108,6 +81,52 @@ def _solve(problem, k, attempt, grown):
         if leaving < 0:
             return False
     return False
+
+
+@kernel
+def _fill_tableau(problem, k, attempt):
+    """Begin with the slack variables w = q. Return the row that the covering variable replaces, -1 if q >= 0."""
+    t, cover, lowest, leaving = problem.tableau, 2 * k, -PIVOT, -1
+    for i in range(k):
+        for j in range(2 * k + 1):
+            t[i, j] = 0.0
+        t[i, i] = 1.0
+        for j in range(k):
+            t[i, k + j] = -problem.matrix[i, j]
+        covering = 1.0 + attempt * ((i + 1) * _GOLDEN % 1.0)
+        t[i, cover], t[i, cover + 1] = -covering, problem.q[i]
+        problem.basis[i] = i
+        if problem.q[i] < lowest * covering:
+            lowest, leaving = problem.q[i] / covering, i
+        problem.z[i], problem.w[i] = 0.0, max(problem.q[i], 0.0)
+    return leaving
+
+
+@kernel
+def _pivot(t, leaving, entering, k):
+    """Bring a column into the basis in place of that of a row."""
+    pivot = t[leaving, entering]
+    for j in range(2 * k + 2):
+        t[leaving, j] /= pivot
+    for i in range(k):
+        factor = t[i, entering]
+        if i != leaving and factor != 0.0:
+            for j in range(2 * k + 2):
+                t[i, j] -= factor * t[leaving, j]
+            t[i, entering] = 0.0
+
+
+@kernel
+def _take_solution(problem, k):
+    """Set w and z to the values of the basic variables; others are zero."""
+    for i in range(k):
+        problem.w[i] = 0.0
+    for i in range(k):
+        variable, value = problem.basis[i], max(problem.tableau[i, 2 * k + 1], 0.0)
+        if variable < k:
+            problem.w[variable] = value
+        else:
+            problem.z[variable - k] = value
 
 
 @kernel

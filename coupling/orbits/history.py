@@ -9,7 +9,7 @@ import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
-from vanedamp.coupling.scene.elements.registry import meets_body
+from vanedamp.coupling.scene.registration import meets_body
 from vanedamp.coupling.scene.scene import Time
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from vanedamp.coupling.scene.shapes.registry import SHAPES
+from vanedamp.coupling.scene.registration import SHAPES
 from vanedamp.coupling.scene.shapes.shape import Shape
 from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.reference import unit_in

@@ -11,8 +11,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.load_pattern import Load, pattern_loads, repeated
+from vanedamp.coupling.scene.registration import AnyWaveform
 from vanedamp.coupling.scene.waveform import Waveform
-from vanedamp.coupling.scene.waveforms.registry import AnyWaveform
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
 

@@ -1,23 +1,69 @@
-"""What other code adds to the choices of a scene: one function for all kinds."""
+"""What a scene may name: contact laws, waveforms, shapes and elements, ours and those that other code registers.
+
+An installed package adds one, a class derived from the base of its kind, without a call, in its pyproject.toml:
+
+    [project.entry-points."vanedamp.contact_laws"]
+    power = "acme.power_law:PowerLaw"
+
+The other groups are "vanedamp.waveforms", "vanedamp.shapes" and "vanedamp.elements", whose entries have the name of the
+shape and that of the element's table.
+"""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Annotated, Any, TypeVar
 
+from vanedamp.coupling.scene.contact_laws.compliant import Compliant
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
-from vanedamp.coupling.scene.contact_laws.registry import LAWS
+from vanedamp.coupling.scene.contact_laws.massless import Massless
+from vanedamp.coupling.scene.contact_laws.newton import Newton
+from vanedamp.coupling.scene.contact_laws.poisson import Poisson
+from vanedamp.coupling.scene.contact_laws.viscoelastic import Viscoelastic
 from vanedamp.coupling.scene.elements.element import SceneElement
-from vanedamp.coupling.scene.elements.registry import ELEMENTS
-from vanedamp.coupling.scene.shapes.registry import SHAPES
-from vanedamp.coupling.scene.shapes.shape import Shape
-from vanedamp.coupling.scene.waveform import WAVEFORMS, Waveform
-from vanedamp.files.extensions import ExtensionError
+from vanedamp.coupling.scene.shapes.shape import SIDES, Shape
+from vanedamp.coupling.scene.waveform import Waveform
+from vanedamp.coupling.scene.waveforms.history import History
+from vanedamp.coupling.scene.waveforms.multisine import Multisine
+from vanedamp.files.extensions import ExtensionError, Registry
+from vanedamp.files.variants import Variants
 
 Part = TypeVar("Part")
 
-#: bases of what can be added, and the registries: of classes with a name of their own, and of others
-_REGISTRIES = ((ContactLaw, LAWS), (Waveform, WAVEFORMS))
-_NAMED = ((Shape, SHAPES), (SceneElement, ELEMENTS))
+#: the values of `contact.law`
+LAWS = Variants("contact law", ContactLaw, "law", "vanedamp.contact_laws")
+#: the values of `excitation.waveform.shape`
+WAVEFORMS = Variants("waveform", Waveform, "shape", "vanedamp.waveforms")
+#: type of a scene's `contact`
+Contact = Annotated[ContactLaw, LAWS]
+#: type of an excitation's `waveform`
+AnyWaveform = Annotated[Waveform, WAVEFORMS]
+for _law in (Newton, Poisson, Compliant, Massless, Viscoelastic):
+    LAWS.register(_law)
+for _waveform in (Multisine, History):
+    WAVEFORMS.register(_waveform)
+
+_SHAPES = "vanedamp.coupling.scene.shapes"
+#: the values of `damper.shape`
+SHAPES = Registry(
+    "shape",
+    {
+        "slider": f"{_SHAPES}.slider:Slider",
+        "block": f"{_SHAPES}.block:Block",
+        "disc": f"{_SHAPES}.disc:Disc",
+        "auto": f"{_SHAPES}.slider:Open",
+    },
+    "vanedamp.shapes",
+    ("extended", "corners", "points"),
+)
+#: the tables of elements
+ELEMENTS = Registry(
+    "element", {"stop": "vanedamp.coupling.scene.elements.stop:Stop"}, "vanedamp.elements", ("units", "on_structure")
+)
+
+
+def meets_body(side: str) -> bool:
+    """Return whether events with that side name a body, not a stop or another element of the structure only."""
+    return side in (*SIDES, "body") or (side in ELEMENTS and not ELEMENTS.part(side).on_structure)
 
 
 def register(part: type[Part], name: str | None = None) -> type[Part]:
@@ -28,12 +74,16 @@ def register(part: type[Part], name: str | None = None) -> type[Part]:
     package adds one without a call, by an entry point (CONTRIBUTING.md). Raises ExtensionError for any other class, and
     for a name that is taken.
     """
-    for base, registry in _REGISTRIES:
+    kinds: dict[type, Variants[Any] | Registry] = {
+        ContactLaw: LAWS,
+        Waveform: WAVEFORMS,
+        Shape: SHAPES,
+        SceneElement: ELEMENTS,
+    }
+    for base, kind in kinds.items():
         if isinstance(part, type) and issubclass(part, base):
-            return registry.register(part)
-    for kind, named in _NAMED:
-        if isinstance(part, type) and issubclass(part, kind):
-            named.register(name or part.__name__.lower(), part)
+            if isinstance(kind, Variants):
+                return kind.register(part)
+            kind.register(name or part.__name__.lower(), part)
             return part
-    names = " or ".join(entry[0].__name__ for entry in (*_REGISTRIES, *_NAMED))
-    raise ExtensionError(f"{part!r}: derive it from {names}")
+    raise ExtensionError(f"{part!r}: derive it from {' or '.join(base.__name__ for base in kinds)}")

@@ -16,14 +16,13 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.contact_laws.newton import Newton
-from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.elements.element import SceneElement
-from vanedamp.coupling.scene.elements.registry import ELEMENTS
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
 from vanedamp.coupling.scene.ramp import Ramp
+from vanedamp.coupling.scene.registration import ELEMENTS, Contact
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
@@ -229,6 +228,14 @@ class Scene(OpenRecord, Displayed):
         tables = {"stop": self.stop} | (self.added or {})
         return ((table, number, entry) for table, entries in tables.items() for number, entry in enumerate(entries))
 
+    def cavity_of(self, damper: Damper) -> int:
+        """Return the number of a body's cavity."""
+        return [cavity.name for cavity in self.cavity].index(damper.cavity)
+
+    def bodies_in(self, cavity: Cavity) -> list[int]:
+        """Return the numbers of the bodies in a cavity, from left to right."""
+        return [number for number, damper in enumerate(self.damper) if damper.cavity == cavity.name]
+
     @property
     def yields(self) -> bool:
         """Whether contacts are springs: by the contact law, or those of elements."""
@@ -242,10 +249,9 @@ class Scene(OpenRecord, Displayed):
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
-        play = {cavity.name: cavity.play for cavity in self.cavity}
         for index, damper in enumerate(self.damper):
-            if damper.form.planar and play[damper.cavity] is None:
-                number = [cavity.name for cavity in self.cavity].index(damper.cavity)
+            number = self.cavity_of(damper)
+            if damper.form.planar and self.cavity[number].play is None:
                 raise ValueError(
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
                     "travel across the cavity"
@@ -273,7 +279,7 @@ class Scene(OpenRecord, Displayed):
         if damper.form.planar or damper.normal_load is not None or damper.friction == 0:
             return
         if self.speed:
-            number = [cavity.name for cavity in self.cavity].index(damper.cavity)
+            number = self.cavity_of(damper)
             angle = self.cavity[number].centrifugal_deg
             if math.cos(math.radians(angle)) < -1e-12:
                 raise ValueError(
@@ -301,7 +307,7 @@ class Scene(OpenRecord, Displayed):
                             "leave it out"
                         )
                 continue
-            loads = [damper.normal_load for damper in self.damper if damper.cavity == cavity.name]
+            loads = [self.damper[number].normal_load for number in self.bodies_in(cavity)]
             if self.speed and cavity.radius is None and (None in loads or (loads and cavity.centrifugal_deg)):
                 raise ValueError(
                     f"cavity[{index}].radius: missing; [rotation] turns its bodies: give the distance from the axis to "
@@ -309,7 +315,7 @@ class Scene(OpenRecord, Displayed):
                 )
 
     def _check_row(self, cavity: Cavity) -> None:
-        row = [(index, damper.position) for index, damper in enumerate(self.damper) if damper.cavity == cavity.name]
+        row = [(number, self.damper[number].position) for number in self.bodies_in(cavity)]
         for index, position in row:
             if abs(position) > cavity.gap / 2:
                 raise ValueError(

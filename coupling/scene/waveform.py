@@ -13,7 +13,6 @@ from typing import ClassVar
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.files.variants import Variants
 
 #: samples of a period from which the Fourier series of a waveform is taken, and its terms
 _SAMPLES, _TERMS = 4096, 32
@@ -79,8 +78,3 @@ class Waveform:
     @property
     def _place(self) -> str:
         return f'excitation.waveform: shape "{self.shape}"'
-
-
-WAVEFORMS = Variants("waveform", Waveform, "shape", "vanedamp.waveforms")
-#: adds a waveform; may decorate its class
-register = WAVEFORMS.register

@@ -14,9 +14,8 @@ from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.system.body_loads import BodyLoads, binding, body_loads, centres
 from vanedamp.coupling.system.cavities import check_directions, surface_labels
-from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
-from vanedamp.coupling.system.resonance import force_amplitude
+from vanedamp.coupling.system.resonance import force_amplitude, force_shapes
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
 from vanedamp.coupling.system.system import FLOOR, System, surface_code
@@ -120,7 +119,7 @@ def _excitation(
     load, weight = np.zeros((len(table), size), complex), np.zeros(size)
     amplitude = force_amplitude(scene, basis, forced)
     load[:, :n] = force_shapes(scene, basis, forced) * -1j * amplitude - base @ basis.base.T
-    floors = [surface_labels(scene, _cavity(scene, body))[2] for body in bodies]
+    floors = [surface_labels(scene, scene.cavity_of(body.damper))[2] for body in bodies]
     accelerated = base @ np.reshape([basis.directions[label] for label in floors], (-1, 3)).T
     for body, label in zip(bodies, floors, strict=True):
         k, x, mass = body.number, body.x, body.damper.mass
@@ -139,7 +138,7 @@ def _places(
     size: int,
 ) -> dict[str, Any]:  # fmt: skip
     """Return where the bodies are, and how their cavities move."""
-    n, owner = len(basis.stiffness), [_cavity(scene, body) for body in bodies]
+    n, owner = len(basis.stiffness), [scene.cavity_of(body.damper) for body in bodies]
     floor, turn, rise = np.zeros((3, len(bodies), size))
     for body, index in zip(bodies, owner, strict=True):
         ground = surfaces[index][FLOOR]
@@ -176,8 +175,7 @@ def _contacts(
     """
     contacts: list[Unit] = []
     for index, cavity in enumerate(scene.cavity):
-        inside = [body for body in bodies if body.damper.cavity == cavity.name]
-        contacts += contacts_of(law, cavity, surfaces[index], inside)
+        contacts += contacts_of(law, cavity, surfaces[index], [bodies[k] for k in scene.bodies_in(cavity)])
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
     reach = np.abs(force).sum(axis=0) / squares
@@ -218,11 +216,6 @@ def _stiffness(
             damping += drag * np.outer(own, own)
         stiffness[body.x, body.x] -= loads.gradient[body.number]
     return stiffness, damping
-
-
-def _cavity(scene: Scene, body: Body) -> int:
-    """Return the number of a body's cavity."""
-    return [cavity.name for cavity in scene.cavity].index(body.damper.cavity)
 
 
 def at_frequency(system: System, frequency: float) -> System:
@@ -267,8 +260,7 @@ def _bodies(scene: Scene, first: int) -> list[Body]:
 
 def _surfaces(scene: Scene, basis: ModalBasis, index: int, bodies: list[Body]) -> tuple[Surface, ...]:
     """Return the surfaces of a cavity: with their motion across and their rotation where a body feels these."""
-    name = scene.cavity[index].name
-    high = any(body.b > 0.0 for body in bodies if body.damper.cavity == name)
+    high = any(bodies[k].b > 0.0 for k in scene.bodies_in(scene.cavity[index]))
     return surfaces_of(scene, basis, index) if high or scene.planar else walls_and_floor(scene, basis, index)
 
 
@@ -286,14 +278,9 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:
     """Return the loads of the scene's excitation with a signal in place of its sine."""
-    level = -assemble(with_sine(scene)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
+    sine = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
+    level = -assemble(replace(scene, excitation=sine)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
     return lambda angle: np.outer(signal.sampled(angle), level)
-
-
-def with_sine(scene: Scene) -> Scene:
-    """Return the scene with a sine in place of its waveform."""
-    plain = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
-    return replace(scene, excitation=plain)
 
 
 def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:

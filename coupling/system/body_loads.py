@@ -67,7 +67,7 @@ def body_loads(scene: Scene, basis: ModalBasis) -> BodyLoads:
             along, across = pulled(field.acceleration, field.along, field.across)
         else:
             gradient = 0.0
-            label = surface_labels(scene, _cavity(scene, damper))[2]
+            label = surface_labels(scene, scene.cavity_of(damper))[2]
             normal = basis.across(label) if damper.form.planar else None
             along, across = scene.gravity.components(basis.directions[label], normal)
         curvature = 0.0 if damper.track_radius is None else across / damper.track_radius
@@ -92,12 +92,11 @@ def centres(scene: Scene) -> np.ndarray:
     """Return where the centres of the bodies (b,) stand in their cavities, m from the middle, side by side."""
     places = np.zeros(len(scene.damper))
     for cavity in scene.cavity:
-        row = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
-        half = {index: scene.damper[index].half_extent[0] for index in row}
+        half = {number: scene.damper[number].half_extent[0] for number in scene.bodies_in(cavity)}
         end = -sum(half.values())
-        for index in row:
-            places[index] = end + half[index]
-            end = places[index] + half[index]
+        for number, own in half.items():
+            places[number] = end + own
+            end = places[number] + own
     return places
 
 
@@ -139,7 +138,7 @@ class _Body(NamedTuple):
 
     @property
     def cavity(self) -> Cavity:
-        return self.scene.cavity[_cavity(self.scene, self.damper)]
+        return self.scene.cavity[self.scene.cavity_of(self.damper)]
 
     @property
     def pressed(self) -> float:
@@ -233,14 +232,10 @@ def _held(damper: Damper) -> bool:
     return damper.stiffness is not None or damper.track_radius is not None
 
 
-def _cavity(scene: Scene, damper: Damper) -> int:
-    return [cavity.name for cavity in scene.cavity].index(damper.cavity)
-
-
 def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
     """Return the field at a body in the middle of its cavity, in a scene that rotates. Raises InputError."""
     damper, square = scene.damper[index], scene.speed**2
-    cavity = scene.cavity[_cavity(scene, damper)]
+    cavity = scene.cavity[scene.cavity_of(damper)]
     if not isinstance(scene.structure, Rom):
         angle = math.radians(cavity.centrifugal_deg)
         outward = -math.sin(angle) * _ALONG - math.cos(angle) * _ACROSS
@@ -256,7 +251,7 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
     for name, known in (("direction", along.any()), ("position", label in basis.positions)):
         if not known:
             raise InputError(
-                f"cavity[{_cavity(scene, damper)}].floor: the reduced model knows no {name} of '{label}', which "
+                f"cavity[{scene.cavity_of(damper)}].floor: the reduced model knows no {name} of '{label}', which "
                 "[rotation] needs for the bodies on it; give it and reduce or import again"
             )
     place = basis.positions[label] - point

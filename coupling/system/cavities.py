@@ -7,7 +7,7 @@ the ceiling, where they have coordinates of that motion.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -44,15 +44,17 @@ def check_directions(scene: Scene, basis: ModalBasis) -> None:
     labels = [label for cavity in scene.cavity for label in (*cavity.labels(), cavity.ceiling) if label]
     if not {str(label) for label in [scene.excitation.at, *labels]} <= set(basis.rows):
         return  # an unknown label is refused where its row is wanted
-    check_displacements(scene, basis.rotations)
-    check_known(scene, basis.directions)
-    check_surfaces(scene.cavity, basis.directions, basis.normals)
-    if scene.planar:
-        for index, cavity in enumerate(scene.cavity):
-            _check_across(cavity, f"cavity[{index}]", basis.directions, basis.normals)
+    _check_displacements(scene, basis.rotations)
+    _check_known(scene, basis.directions)
+    for index, cavity in enumerate(scene.cavity):
+        key = f"cavity[{index}]"
+        _check_parallel(cavity, key, basis.directions)
+        _check_walls(cavity, key, basis.directions, basis.normals)
+        if scene.planar:
+            _check_across(cavity, key, basis.directions, basis.normals)
 
 
-def check_known(scene: Scene, directions: Vectors) -> None:
+def _check_known(scene: Scene, directions: Vectors) -> None:
     """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
     excitation, gravity = scene.excitation, scene.gravity
     reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
@@ -72,7 +74,7 @@ def check_known(scene: Scene, directions: Vectors) -> None:
             )
 
 
-def check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
+def _check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
     """Raise InputError where an angle stands for a displacement."""
     keys: dict[str, str | None] = {"excitation.at": scene.excitation.at}
     for index, cavity in enumerate(scene.cavity):
@@ -86,17 +88,8 @@ def check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
             raise InputError(f"{key}: '{label}' is a rotation (rad); name the interface coordinate of a displacement")
 
 
-def check_surfaces(cavities: Sequence[Cavity], directions: Vectors, normals: Vectors) -> None:
-    """Raise InputError for a cavity whose walls and floor have several directions, or whose walls do not face it.
-
-    directions, normals: of interface labels; zeros where unknown, which is left unchecked.
-    """
-    for index, cavity in enumerate(cavities):
-        _check_parallel(cavity, f"cavity[{index}]", directions)
-        _check_walls(cavity, f"cavity[{index}]", directions, normals)
-
-
 def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
+    """Raise InputError for surfaces with several directions (of interface labels; zeros, unknown, pass)."""
     left, right, floor = map(str, cavity.labels())
     ceiling = cavity.ceiling or floor
     pairs = ("right", right, left), ("left", left, floor), ("right", right, floor), ("ceiling", ceiling, floor)

@@ -16,7 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.engine_order import Natural, crossings
-from vanedamp.coupling.system.resonance import receptance_of
+from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -68,16 +68,14 @@ class LinearResponse:
 
     def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
-        omega = 2 * np.pi * self.order[h] * frequencies[:, None, None]
-        dynamic = np.diag(self.stiffness) + 1j * omega * self.damping - omega**2 * self.mass
-        loads = np.broadcast_to(self.load[h][:, None], (len(omega), self.load.shape[1], 1))
+        omega = 2 * np.pi * self.order[h] * frequencies
         try:
-            solved = np.linalg.solve(dynamic, loads)
+            motion = steady_motion(self.stiffness, self.damping, self.mass, self.load[h], omega)
         except np.linalg.LinAlgError:
             if len(frequencies) == 1:
                 return np.array([complex(np.inf)])
             return np.concatenate([self._wave(h, half) for half in np.array_split(frequencies, 2)])
-        wave: np.ndarray = solved[:, :, 0] @ self.response + self.table[h]
+        wave: np.ndarray = motion @ self.response + self.table[h]
         return wave
 
     def peak(self, low: float, high: float) -> LinearPeak:
@@ -198,15 +196,15 @@ def _resonances(
         yield speed, float(widths[nearest] / max(abs(1.0 - rise), 1e-3))
 
 
-def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
-    """Return the responses without bodies, and with every body glued to its cavity's floor.
+def linear_responses(scene: Scene, system: System | None = None) -> tuple[LinearResponse, LinearResponse]:
+    """Return the responses without bodies, and with every body glued to its cavity's floor. system: of the scene.
 
     Raises InputError, also for an excitation that is no sum of sines: the peak that a truncated Fourier series leaves
     out has no bound that holds for every waveform.
     """
     if scene.excitation.signal is not None:
         raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
-    system = assemble(scene)
+    system = assemble(scene) if system is None else system
     modes, bodies = system.of_structure, system.of_bodies
     glued_load = modes.load + bodies.load @ system.floor[:, : system.modes]
     order = system.order
@@ -234,4 +232,6 @@ def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np
     """
     system = assemble(scene)
     modes, mass = system.of_structure, glued_mass(system) if fixed else np.eye(system.modes)
-    return receptance_of(modes.stiffness, modes.damping, mass, modes.response, 2 * np.pi * np.asarray(frequencies))
+    omega = 2 * np.pi * np.asarray(frequencies)
+    motion = steady_motion(modes.stiffness, modes.damping, mass, modes.response, omega)
+    return np.asarray(motion @ modes.response)

@@ -15,6 +15,7 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.resonance import steady_motion
 
 #: R omega^2 over the acceleration of friction from which on a body slips without a stop (Code_Aster, SDND104)
 NEVER_STICKS = math.sqrt(1.0 + math.pi**2 / 4.0)
@@ -71,22 +72,22 @@ def onsets(scene: Scene) -> list[Onset | None]:
     system, count = assemble(scene), len(scene.damper)
     if scene.excitation.signal is not None or len(system.frequency) != 1:
         return [None] * count
-    omega, free, bodies = system.omega, linear_responses(scene)[0], system.of_bodies
-    wave = np.linalg.solve(np.diag(free.stiffness) + 1j * omega * free.damping - omega**2 * free.mass, free.load[0])
+    omega, free, bodies = system.omega, linear_responses(scene, system)[0], system.of_bodies
+    wave = steady_motion(free.stiffness, free.damping, free.mass, free.load[0], np.array([omega]))[0]
     response = abs(wave @ free.response + free.table[0])
     # a body that nothing holds stays where it is in space, which moves against the base
     reach = np.abs(system.floor[:, : system.modes] @ wave + bodies.load[0] / (bodies.mass * omega**2))
     friction, pull = system.holds / bodies.mass, bodies.weight / bodies.mass
     found: list[Onset | None] = []
     for index, damper in enumerate(scene.damper):
-        row = [other for other, one in enumerate(scene.damper) if one.cavity == damper.cavity]
+        cavity = scene.cavity[scene.cavity_of(damper)]
+        row = scene.bodies_in(cavity)
         alike = len(row) == 1 or (np.ptp(friction[row]) == 0.0 and not pull[row].any())
         lies = not damper.form.rolls and not (damper.lift or damper.tilt)
         if damper.sprung or not alike or not lies or not reach[index] or not response:
             found.append(None)
             continue
-        gap = next(cavity.gap for cavity in scene.cavity if cavity.name == damper.cavity)
-        room = gap / 2 - max(abs(scene.damper[other].position) for other in row)
+        room = cavity.gap / 2 - max(abs(scene.damper[other].position) for other in row)
         own, ratio = onset(room, friction[index], pull[index], omega), response / reach[index]
         found.append(Onset(own.slip * ratio, own.impact * ratio))
     return found

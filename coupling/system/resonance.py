@@ -1,4 +1,4 @@
-"""The resonance that `resonance_amplitude` speaks of, and the force for it."""
+"""The exciting forces on the modes of a structure, and the resonance for which `resonance_amplitude` finds them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom, Structure
 from vanedamp.coupling.system.engine_order import crossings
-from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, structure_basis
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
@@ -51,15 +50,35 @@ def chosen_resonance(scene: Scene) -> Resonance:
     return _chosen(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
 
-def receptance_of(
-    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray,
-    force: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
-    """Return the response (f,) to modal forces (n,) at angular frequencies (f,); default: a newton at the response."""
-    force = response if force is None else force
-    dynamic = np.diag(stiffness) + 1j * omega[:, None, None] * damping - omega[:, None, None] ** 2 * mass
-    loads = np.broadcast_to(force[:, None], (len(omega), len(response), 1))
-    return np.linalg.solve(dynamic, loads)[:, :, 0] @ response
+def force_shapes(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.ndarray:
+    """Return the complex amplitudes (e, n) of the modal forces by harmonic, relative to a sine, for a level of 1.
+
+    The level is a force, N, at the functional `response` (n,), or the factor of loads at several labels. Raises
+    InputError for an unknown label.
+    """
+    shares = scene.excitation.shares
+    if not scene.excitation.distributed:
+        return np.array(list(shares.values()))[:, None] * response
+    shapes = np.zeros((len(shares), len(response)), complex)
+    orders = list(shares)
+    for place, load in scene.excitation.loads.items():
+        row = interface_row(basis, load.at, f"{place}.at" if scene.excitation.load else place)
+        if load.order in orders:  # one without force has no order
+            shapes[orders.index(load.order)] += load.amplitude * row
+    return shapes
+
+
+def steady_motion(
+    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, force: np.ndarray, omega: np.ndarray
+) -> np.ndarray:
+    """Return the complex modal coordinates (f, n) under modal forces (n,) at angular frequencies (f,).
+
+    Raises LinAlgError at a resonance without damping.
+    """
+    omega = omega[:, None, None]
+    dynamic = np.diag(stiffness) + 1j * omega * damping - omega**2 * mass
+    loads = np.broadcast_to(force[:, None], (len(omega), len(force), 1))
+    return np.asarray(np.linalg.solve(dynamic, loads)[:, :, 0])
 
 
 def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> float:
@@ -105,7 +124,8 @@ def _resonant_speed(
         force = np.zeros(len(row), complex)
         for label, amplitude in sine:
             force += amplitude * interface_row(basis, label, "excitation.load")
-        return float(np.abs(receptance_of(basis.stiffness, basis.damping, np.eye(len(row)), row, omega, force)[0]))
+        motion = steady_motion(basis.stiffness, basis.damping, np.eye(len(row)), force, omega)
+        return float(abs((motion @ row)[0]))
 
     def natural(speed: float) -> np.ndarray:
         return np.sqrt(structure_basis(structure, speed).stiffness) / (2 * np.pi)
@@ -158,8 +178,8 @@ def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, force_: byt
     resonance = np.sqrt(stiffness[mode])
 
     def negative(omega: float) -> float:
-        reached = receptance_of(stiffness, damping, np.eye(len(response)), response, np.array([omega]), force)
-        return -float(abs(reached[0]))
+        motion = steady_motion(stiffness, damping, np.eye(len(response)), force, np.array([omega]))
+        return -float(abs((motion @ response)[0]))
 
     width = min(1.5 * damping[mode, mode] / resonance, 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))

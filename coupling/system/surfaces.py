@@ -46,9 +46,9 @@ def heights(scene: Scene) -> np.ndarray:
     found = np.array([damper.half_extent[1] for damper in scene.damper])
     mass = np.array([damper.mass for damper in scene.damper])
     for cavity in scene.cavity:
-        row = np.array([not item.form.planar and item.cavity == cavity.name for item in scene.damper], bool)
-        known = row & (found > 0.0)
-        if known.any():
+        row = np.array([k for k in scene.bodies_in(cavity) if not scene.damper[k].form.planar], int)
+        known = row[found[row] > 0.0]
+        if known.size:
             found[row] = (mass[known] @ found[known]) / mass[known].sum()
     return found
 

@@ -26,6 +26,8 @@ MOST = 24_000
 #: steady response, relative to what begins with it, below which a structure is at rest: an absorber without damping
 #: leaves round-off, of which no share is ever reached
 _NOTHING = 1e-6
+#: share of the transient that is left as a short run of a choice has settled, and the fewest periods which that takes
+_LEFT, _SETTLE = 0.05, 100
 
 
 def left_over(scene: Scene, periods: float) -> float:
@@ -84,12 +86,13 @@ class Transient:
         """Return the energy, J, by which weight lowers that of the springs and tracks that hold bodies."""
         return weight_energy(self.scene, self.system)
 
-    def settled_after(self, lengths: range) -> int:
-        """Return the first of rising numbers of periods that leaves at most `time.tolerance`; their end where none
-        does.
+    def settled_after(self, lengths: range, share: float | None = None) -> int:
+        """Return the first of rising numbers of periods that leaves at most a share; their end where none does.
+
+        share: of the steady response; default: `time.tolerance`.
         """
-        tolerance = self.scene.time.tolerance
-        place = bisect_left(lengths, True, key=lambda periods: self.left_over(periods) <= tolerance)
+        share = self.scene.time.tolerance if share is None else share
+        place = bisect_left(lengths, True, key=lambda periods: self.left_over(periods) <= share)
         return lengths.start + place * lengths.step
 
     def length(self) -> Length:
@@ -116,6 +119,12 @@ def most_periods(scene: Scene) -> int:
 def settled_after(scene: Scene, lengths: range) -> int:
     """Return the first of rising numbers of periods that leaves at most `time.tolerance`; their end where none does."""
     return Transient(scene).settled_after(lengths)
+
+
+def short_transient(scene: Scene) -> int:
+    """Return how many periods leave little of the structure's transient, at most those that the scene drops."""
+    most = max(_SETTLE, timed(scene).time.dropped)
+    return min(Transient(scene).settled_after(range(_SETTLE, most + 1), _LEFT), most)
 
 
 def timed(scene: Scene) -> Scene:

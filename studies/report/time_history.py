@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.response.response import PlanarSamples, Response
-from vanedamp.coupling.scene.elements.registry import meets_body
+from vanedamp.coupling.scene.registration import meets_body
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate

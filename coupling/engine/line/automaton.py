@@ -94,16 +94,12 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
                 return ACCURACY_LOST
             deciding = False
         if st.counters[SEARCHING] == 1:
-            s = _find_flow(flows, st.active_set)
-            if s < 0:
+            found = _begin_flow(system, flows, st, rec, scratch)
+            if found == NEEDS_FLOW:
                 return NEEDS_FLOW
-            _begin_subsystem(system, flows, st, scratch, s)
-            if stop_attached_bodies(system, flows, st):
-                keep_released(st, scratch)
-                deciding = True
+            deciding = found == STATES_OPEN
+            if deciding:
                 continue
-            if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
-                record_start(system, flows, st, rec, scratch)
         if st.counters[PERIOD] >= periods:
             return DONE
         if st.counters[EVENTS] >= max_events:
@@ -119,8 +115,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         _advance_motion(system, flows, st, scratch, tau)
         # the end of a period is no event: a row that has let go just before it still does
         if tau > (0.0 if event >= 0 else AT_START * system.period):
-            for r in range(len(st.released)):
-                st.released[r] = 0
+            _forget_released(st)
         if event < 0:
             _end_period(system, flows, st, watched, rec, scratch, tau)
             continue
@@ -138,6 +133,30 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             account_spell(system, flows, st, rec, scratch)
         elif not _within_walls(system, st):
             return ACCURACY_LOST
+
+
+@inlined
+def _begin_flow(system, flows, st, rec, scratch):
+    """Begin the motion of the states as decided.
+
+    Returns STATES_GO_ON, STATES_OPEN where they must be decided again, or NEEDS_FLOW.
+    """
+    s = _find_flow(flows, st.active_set)
+    if s < 0:
+        return NEEDS_FLOW
+    _begin_subsystem(system, flows, st, scratch, s)
+    if stop_attached_bodies(system, flows, st):
+        keep_released(st, scratch)
+        return STATES_OPEN
+    if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
+        record_start(system, flows, st, rec, scratch)
+    return STATES_GO_ON
+
+
+@inlined
+def _forget_released(st):
+    for r in range(len(st.released)):
+        st.released[r] = 0
 
 
 @inlined

@@ -19,8 +19,8 @@ from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
-from vanedamp.coupling.scene.contact_laws.registry import register as register_law
-from vanedamp.coupling.scene.waveform import Waveform, register
+from vanedamp.coupling.scene.registration import register
+from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import STRICT, InputError
@@ -285,7 +285,7 @@ def test_solve_ivp_on_compliant_contacts_with_friction(seed):
     assert imbalance(run) <= 1e-7
 
 
-@register_law
+@register
 @dataclass(frozen=True, config=STRICT)
 class Softer(ContactLaw):
     """Restitution k/(1 + v/c) with c = 0.05 m/s."""

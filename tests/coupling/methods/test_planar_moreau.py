@@ -10,8 +10,9 @@ from tests.tools.planar import planar_scene, run_planar, still_table, witness
 from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.registration import register
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.waveform import Waveform, register
+from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.files.toml_input import STRICT, InputError, validate
 
 BLOCK = {"shape": "block", "length": 0.02, "height": 0.01, "mass": 1.3}

@@ -20,7 +20,7 @@ from vanedamp.coupling.engine.line.automaton import advance
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.contact_laws.newton import Newton
-from vanedamp.coupling.scene.contact_laws.registry import register
+from vanedamp.coupling.scene.registration import LAWS, register
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
@@ -258,7 +258,7 @@ def test_a_restitution_outside_its_range_is_refused():
 
 def test_what_is_no_law_is_not_registered():
     with pytest.raises(ExtensionError, match="is no contact law: derive a dataclass from ContactLaw"):
-        register(dict)
+        LAWS.register(dict)
     taken = dataclasses.make_dataclass("Other", [("law", str, "newton")], bases=(ContactLaw,), frozen=True)
     with pytest.raises(ExtensionError, match="there is a contact law named newton already"):
         register(taken)

@@ -13,7 +13,7 @@ from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import Element
 from vanedamp.coupling.scene.elements.element import SceneElement, Unit
-from vanedamp.coupling.scene.elements.registry import ELEMENTS, register
+from vanedamp.coupling.scene.registration import ELEMENTS, register
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.transients.ring_down import ring_down
@@ -74,8 +74,8 @@ class Shroud(SceneElement):
 @pytest.fixture(scope="module", autouse=True)
 def registered():
     """Both elements, for the tests of this file only."""
-    register("tether", Tether)
-    register("shroud", Shroud)
+    register(Tether, "tether")
+    register(Shroud, "shroud")
     yield
     del ELEMENTS.parts["tether"], ELEMENTS.parts["shroud"]
 

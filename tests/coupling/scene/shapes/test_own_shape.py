@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import planar_scene, still_table
+from vanedamp.coupling.scene.registration import SHAPES, register
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.shapes.registry import SHAPES, register
 from vanedamp.coupling.scene.shapes.shape import Polygon, common_heights
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.simulation import simulate
@@ -46,8 +46,8 @@ class Hexagon(Polygon):
 @pytest.fixture(scope="module", autouse=True)
 def registered():
     """Both shapes, for the tests of this file only."""
-    register("chamfered", Chamfered)
-    register("hexagon", Hexagon)
+    register(Chamfered, "chamfered")
+    register(Hexagon, "hexagon")
     yield
     del SHAPES.parts["chamfered"], SHAPES.parts["hexagon"]
     unit_of.cache_clear()
@@ -213,8 +213,8 @@ def test_refused(changes, message):
 
 def test_names_are_taken_once():
     with pytest.raises(ExtensionError, match="there is a shape named block already"):
-        register("block", Hexagon)
+        register(Hexagon, "block")
     with pytest.raises(ExtensionError, match="is no shape: lacks extended, corners, points"):
-        register("nothing", dict)
-    register("hexagon", Hexagon)
+        SHAPES.register("nothing", dict)
+    register(Hexagon, "hexagon")
     assert SHAPES.part("hexagon") is Hexagon

@@ -21,8 +21,9 @@ from pydantic.dataclasses import dataclass
 from tests.commands.test_extensions import ROOT, install
 from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.registration import WAVEFORMS, register
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.waveform import Waveform, register
+from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_responses
@@ -310,7 +311,7 @@ def test_what_is_no_waveform_is_not_registered():
     with pytest.raises(
         ExtensionError, match="is no waveform: derive a dataclass from Waveform, with a default of `shape`"
     ):
-        register(dict)
+        WAVEFORMS.register(dict)
 
 
 NOTHING = Variants("part", Waveform, "shape", "vanedamp.nowhere")
