@@ -1,4 +1,4 @@
-"""The key figures of a damped curve, like beside like: its top over that of the curve without bodies in the same range.
+"""The key figures of a damped curve, each compared with that of the curve without bodies over the same range.
 
 The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
 many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
@@ -15,7 +15,7 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: a damped response within this share of the undamped one has not been touched by the bodies
+#: a damped response within this fraction of that without bodies has not been touched by them
 UNTOUCHED = 0.01
 
 
@@ -33,12 +33,12 @@ class Headline:
 
     damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
     damped_peak_at               its place on the axis
-    undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all glued over the same range
+    undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all bodies fixed over the same range
     attached_mass_fraction       at the damped peak
     onset                        first place where the bodies change the mean by more than 1 %
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a top lies at an edge of the frequencies: no resonance's
-    spacing, half_power_width    Hz, or units of a speed along an engine order: widest step beside the tops that are
-                                 resonances, and width of the undamped one
+    spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to peaks that are
+                                 resonances, and width of that without bodies
     points, points_left_out      of the curve, and how many of them are not ok
     """
 
@@ -65,7 +65,7 @@ class Headline:
 
     @property
     def peak_ratio(self) -> float:
-        """The damped peak over the undamped one."""
+        """The damped peak relative to that without bodies."""
         return self.relative(self.damped_peak)
 
     @property
@@ -168,7 +168,7 @@ def headline(
 
 
 def reference_of(undamped: np.ndarray, peaks: Mapping[str, float]) -> float:
-    """Return what charts divide amplitudes by, m: the undamped maximum, of the points where the peak has no bound."""
+    """Return what charts divide amplitudes by, m: the maximum without bodies, of the points where it has no bound."""
     known = float(peaks.get("undamped_peak", math.nan))
     return known if 0.0 < known < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
 
