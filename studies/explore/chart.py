@@ -23,7 +23,7 @@ _HEIGHT = 480
 def response_figure(
     sweep: Sweep, response: ForcedResponse, linear: LinearCurves, marks: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the picture of damped and linear amplitudes, relative to the undamped maximum, as plotly's plain data.
+    """Return the picture of damped and linear amplitudes, relative to the maximum without bodies, as plain data.
 
     response: the only one of the sweep; marks: kept as the figure's `meta`. Points of the damped curve carry their
     frequency (Hz); open markers are points that are not ok. Plain, since plotly's own objects take longer than the runs
@@ -101,7 +101,7 @@ def remarks(sweep: Sweep, response: ForcedResponse, complete: bool) -> list[str]
 
 
 def _most_reduced(response: ForcedResponse) -> str:
-    """Return the frequency at which the damped mean is the least share of the amplitude without bodies."""
+    """Return the frequency at which the damped mean is the smallest fraction of the amplitude without bodies."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(response.undamped > 0, response.damped_mean / response.undamped, np.nan)
     if not np.isfinite(share).any():

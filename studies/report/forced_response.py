@@ -122,7 +122,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
 
 
 def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
-    """Return responses by rising damped peak over the undamped one; those without any at the end."""
+    """Return responses by rising damped peak relative to that without bodies; those without any at the end."""
     return sorted(responses, key=lambda response: np.nan_to_num(response.headline.peak_ratio, nan=math.inf))
 
 

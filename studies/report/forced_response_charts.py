@@ -31,7 +31,7 @@ def responses_figure(
     linear: Sequence[LinearCurves] | None = None,
     shown: Collection[str] | None = None,
 ) -> go.Figure:
-    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
+    """Draw linear and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
 
     linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
     first; the others wait for `curves.js`, and the table beside the chart is its legend. Default: all, with a legend.
@@ -59,7 +59,7 @@ def _add_amplitude(
     figure: go.Figure, owners: Sequence[str], shown: Collection[str] | None, group: str, response: ForcedResponse,
     drawn: Mapping[str, Any],
 ) -> None:  # fmt: skip
-    """Draw a trace of amplitudes (k,), m, over the undamped maximum of a response; `group` heads it in a legend."""
+    """Draw a trace of amplitudes (k,), m, relative to the maximum without bodies; `group` heads it in a legend."""
     legend = {"legendgroup": group, "legendgrouptitle_text": group} if shown is None else {"showlegend": False}
     values, hover = drawn["y"], f"{group}, {drawn['name']}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>"
     look = {**drawn, "y": values / response.reference, "customdata": values * 1e6, "hovertemplate": hover}
@@ -120,7 +120,7 @@ def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str]
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw where the energy goes: stacked shares of the losses, one panel a response."""
+    """Draw where the energy goes: stacked fractions of the losses, one panel per response."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
     # a name is as wide as a panel at most: its settings stand below each other
@@ -160,7 +160,7 @@ def _wrapped(name: str, width: int) -> list[str]:
 
 
 def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
-    """Draw largest tilt, share of the time off the floor and what small tilts neglect, of each body in the plane.
+    """Draw largest tilt, fraction of the time off the floor and what small tilts neglect, of each body in the plane.
 
     shown: as of `responses_figure`.
     """

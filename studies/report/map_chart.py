@@ -46,7 +46,7 @@ def long_axes(sweep: Sweep) -> list[str]:
 
 
 def map_figure(sweep: Sweep) -> go.Figure:
-    """Draw the mean amplitude over the undamped maximum, of points that are ok; a panel a combination of other axes."""
+    """Draw the mean amplitude relative to the maximum without bodies; one panel per combination of other axes."""
     figure = panels_figure(
         sweep, map_panels(sweep), map_axes(sweep), coloraxis="coloraxis",
         hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra></extra>",
@@ -133,7 +133,7 @@ def count_axes(sweep: Sweep) -> tuple[str, str] | None:
 
 
 def basins_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
-    """Draw in which motion the run from each start ends, by colour; a panel a combination of other axes."""
+    """Draw in which motion the run from each start ends, by colour; one panel per combination of other axes."""
     motions = _motions(states)
     shades = [_NOT_OK, *(_COLOURS[number % len(_COLOURS)] for number in range(len(motions) - 1))]
     named = basin_panels(sweep, states)
@@ -180,7 +180,7 @@ def _motions(states: SteadyStates) -> list[str]:
 
 
 def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
-    """Draw how many steady states were found; a panel a combination of other axes."""
+    """Draw how many steady states were found; one panel per combination of other axes."""
     axes = {path: sweep.axes[path] for path in states.parameters}
     least, most = min(int(states.count.min()), 1), max(int(states.count.max()), 1)
     shades = [_NOT_OK, *sample_colorscale("Viridis", np.linspace(0.0, 1.0, max(most, 2))[:most].tolist())][least:]

@@ -74,7 +74,7 @@ def _draw_directions(axes: Axes, screen: np.ndarray) -> None:
 
 
 def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path) -> None:
-    """Write a PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
+    """Write a PNG of the mode and the forced response: without bodies, with loose bodies, with bodies fixed."""
     from matplotlib.image import imread
 
     figure, (left, right) = subplots(1, 2, size=(12, 4.6), width_ratios=[1, 1.25])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,10 @@ from vanedamp.studies.report.time_history import History, history_figure
 
 #: curves of a sweep that one figure can show, of more the best
 _MOST_CURVES = 8
+#: figures of records that one chart shows in full
+_DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
+    Branches: branches_figure, Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure
+}  # fmt: skip
 
 
 @singledispatch
@@ -64,24 +69,12 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
     return history_figure(result.late())
 
 
-@plot.register
-def _(result: Branches, scene: Scene | None = None) -> go.Figure:
-    return branches_figure(result, {})
-
-
-@plot.register
-def _(result: Ramp, scene: Scene | None = None) -> go.Figure:
-    return ramp_figure(result, {})
-
-
-@plot.register
-def _(result: RingDown, scene: Scene | None = None) -> go.Figure:
-    return ring_down_figure(result)
-
-
-@plot.register
-def _(result: Campbell, scene: Scene | None = None) -> go.Figure:
-    return campbell_figure(result)
+@plot.register(Branches)
+@plot.register(Ramp)
+@plot.register(RingDown)
+@plot.register(Campbell)
+def _(result: Any, scene: Scene | None = None) -> go.Figure:
+    return _DIAGRAMS[type(result)](result)
 
 
 @plot.register(str)

@@ -44,7 +44,7 @@ _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6
 _CURVES = {
     "amplitude_mean": "mean of the peaks", "amplitude_max": "largest peak", "amplitude_harmonic": "harmonic",
     "amplitude_mean_dynamic": "mean of the peaks from the static deflection",
-    "amplitude_undamped": "undamped", "amplitude_fixed": "bodies fixed",
+    "amplitude_undamped": "without bodies", "amplitude_fixed": "bodies fixed",
 }  # fmt: skip
 #: of the receptances of a file: frequencies, and bytes in memory
 _MOST, _MOST_BYTES = 1_000_000, 8e9

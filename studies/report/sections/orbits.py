@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -110,7 +111,9 @@ def _chosen(branches: Branches) -> Iterator[tuple[str, int, float, np.ndarray]]:
             yield f"{branch_name(number, branch)}, {kind}, {value}", branch.periods, parameter, state
 
 
-def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> go.Figure:
+def branches_figure(
+    branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, np.ndarray]] = MappingProxyType({})
+) -> go.Figure:
     """Draw amplitudes and impacts along the branches over points of sweeps, by name: parameter and mean amplitude."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.72, 0.28])
     wide, units = for_people(unit_of(branches.parameter))

@@ -1,10 +1,11 @@
-"""Run-ups and run-downs: amplitude over frequency beside the stationary response, and the peak over the rate."""
+"""Run-ups and run-downs: amplitude versus frequency over the steady-state response, peak versus rate."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def run_name(ramp: Ramp, run: RampRun) -> str:
     return f"{abs(run.rate):.4g} {ramp.table.unit} per second, {run.direction}"
 
 
-def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> go.Figure:
+def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = MappingProxyType({})) -> go.Figure:
     """Draw amplitudes over the frequency, those of the linear structure, and the points of sweeps by their names."""
     figure, x = go.Figure(), along(ramp)
     rates = list(dict.fromkeys(abs(run.rate) for run in ramp.runs))
@@ -124,7 +125,7 @@ def _ramp_table(ramp: Ramp) -> Table:
 
 
 def peaks_figure(ramp: Ramp) -> go.Figure:
-    """Draw the peak over the rate, relative to the stationary one without bodies, and Lewis' closed form."""
+    """Draw the peak over the rate, relative to the steady-state one without bodies, and Lewis' closed form."""
     figure = go.Figure()
     lewis = np.array([ramp.lewis_rate(run) for run in ramp.runs])
     rates = np.array([abs(run.rate) for run in ramp.runs])
