@@ -385,7 +385,9 @@ def test_matrices_read_by_other_programs(results):
     assert np.asarray(entries["kaa"]) == pytest.approx(model.stiffness, rel=1e-9)
     assert "SPOINT" in (results / "own.pch").read_text()
     text = (results / "own.mtx").read_text()
-    assert all(len(word) <= 20 for word in re.findall(r"[-+.\dE]+", text))  # the columns of a number in Abaqus
+    words = re.findall(r"[-+.\dE]+", text)
+    # the columns of a number in Abaqus
+    assert len(words) > model.size**2 and all(len(word) <= 20 for word in words)
     assert f"*USER ELEMENT, NODES={model.size}, LINEAR" in text
     parts = re.split(r"\*MATRIX, TYPE=(STIFFNESS|MASS)\n", text)[1:]
     for name, matrix in (("STIFFNESS", model.stiffness), ("MASS", model.mass)):

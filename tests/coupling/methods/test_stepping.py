@@ -229,6 +229,7 @@ def test_a_slip_that_turns_twice_in_a_step_does_not_stand_still():
 def test_impacts_are_logged(periodic):
     exact = simulate(periodic, events=True)
     impacts = [event for event in exact.event_list if event.kind == "impact"]
+    assert impacts
     for solver in (METHODS["moreau"], METHODS["newmark"], {"method": "solve_ivp"}):
         steps = {} if solver["method"] == "solve_ivp" else {"steps_per_period": 20000}
         ours = simulate(by(periodic, **solver, **steps), events=True).event_list

@@ -323,6 +323,7 @@ def test_hysteresis_over_the_jumps(periods, within):
     table = {"from": RATIOS[0] / (2 * np.pi), "to": RATIOS[-1] / (2 * np.pi), "periods": periods, "both": True}
     data = {name: value for name, value in BISTABLE.items() if name != "sweep"}
     runs = ramp(scene({**table, "start": "steady"}, data)).runs
+    assert [run.rate > 0.0 for run in runs] == [True, False]
     for run in runs:
         assert run.status == "ok"
         ratios = 2 * np.pi * run.frequency

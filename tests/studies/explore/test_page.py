@@ -398,7 +398,8 @@ def test_only_who_has_the_token_gets_the_page(client):
     shown = client.get("/", headers=kept)
     assert shown.status_code == 200
     # nothing from elsewhere
-    assert all(address.startswith("/") for address in re.findall(r'(?:src|href)="([^"]*)"', shown.text))
+    addresses = re.findall(r'(?:src|href)="([^"]*)"', shown.text)
+    assert addresses and all(address.startswith("/") for address in addresses)
     policy = shown.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "connect-src 'self'" in policy
     assert "http" not in policy and "unsafe-eval" not in policy

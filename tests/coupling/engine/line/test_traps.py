@@ -540,7 +540,8 @@ def test_ledger_of_a_motion_that_comes_to_nothing():
 
 def test_impacts_are_in_order():
     response = simulate(cluster(15e-6), events=True)
-    assert all(one.time <= other.time for one, other in itertools.pairwise(response.event_list))
+    times = [event.time for event in response.event_list]
+    assert len(times) > 10 and times == sorted(times)
 
 
 @pytest.mark.parametrize("speed", [1e-18, 1e-25, 1e-190])

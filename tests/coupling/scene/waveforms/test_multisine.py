@@ -188,7 +188,7 @@ def test_wrong_tables(waveform, message):
 def test_no_attached_mass_without_order_one(tmp_path):
     """It is measured by that order; and the number of modes is chosen by runs with it."""
     assert simulate(scene(periods=1, **BODY)).attached_mass_fraction is None
-    assert simulate(scene({"orders": [1, 60]}, periods=1, **BODY)).attached_mass_fraction is not None
+    assert np.isfinite(simulate(scene({"orders": [1, 60]}, periods=1, **BODY)).attached_mass_fraction)
     model = ReducedModel.from_matrices(np.eye(2), np.diag([1e4, 1e6]), {"tip": [1.0, 0.5]}, damping_ratio=0.01)
     model.save(tmp_path / "rom.h5")
     structure = {"model": "rom", "file": str(tmp_path / "rom.h5"), "modes": "auto"}
