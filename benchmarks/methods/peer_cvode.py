@@ -13,8 +13,7 @@ import numpy as np
 
 from benchmarks.methods.peers import PeerRun
 from vanedamp.coupling.methods.scipy_ivp import Options
-from vanedamp.coupling.methods.scipy_ivp.arcs import Arc
-from vanedamp.coupling.methods.scipy_ivp.run import IvpRun
+from vanedamp.coupling.methods.scipy_ivp.run import Arc, IvpRun
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene

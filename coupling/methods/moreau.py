@@ -5,7 +5,7 @@ velocities and Coulomb's on slips; a contact takes part in a step if its gap, ha
 where no row is active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a
 problem of its own, after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, by their
 mean force over the step. In the plane impulses never bring energy (Kane's paradox): all coefficients of restitution are
-smaller by one factor then, as in planar.impacts.
+smaller by one factor then, as in engine.plane.impacts.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ PLANAR_LAWS = ("yields", "two_phases", "depends_on_speed")
 
 #: problems that a step may take, the last with all contacts at once
 _TURNS = 20
-#: share of the speeds in a scene by which a sweep may still change one, and below which a contact counts as at rest
+#: times the speeds in a scene: by how much a sweep may still change one, and below which a contact counts as at rest
 _TOLERANCE, _AT_REST = 1e-13, 1e-10
-#: bisections of the factor of the coefficients; energy that impulses may bring, as a share of what they move
+#: bisections of the factor of the coefficients; energy that impulses may add, times what they move
 _HALVINGS, _GAIN = 40, 1e-10
-#: share of the play by which round-off may open a gap
+#: round-off of a gap, times the play
 _ROUND_OFF = 1e-12
 #: row of Motion.coordinates: velocities at the step's end; rows of Motion.rows, by units
 _FREE, _CLOSED, _APPROACH = 0, 0, 1
@@ -65,7 +65,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     """Return a run. Raises InputError for bodies that overlap at the start."""
     options: Any = scene.solver
     rigid = np.isinf(system.spring)
-    moving, motion = start(system, begun, records, np.where(rigid, 0.0, system.spring))
+    moving, motion = start(system, begun, np.where(rigid, 0.0, system.spring))
     times, theta = time_grid(scene, system, options.steps_per_period), options.theta
     inverse, turned, mobility = moreau_matrices(moving, times.step, theta)
     exact = not system.in_plane if options.contacts is None else options.contacts == "exact"
@@ -285,22 +285,22 @@ def _rebound(system, motion, problem, count, turn, tolerance):
 
     Returns False if they are not found.
     """
-    low, high, share = 0.0, 1.0, 1.0
+    low, high, factor = 0.0, 1.0, 1.0
     for _ in range(_HALVINGS):
-        if not solve_rows(problem, count, share, tolerance):
+        if not solve_rows(problem, count, factor, tolerance):
             return False
-        if system.in_plane and _brings_energy(system, motion, problem, count, turn, share):
-            high = share
-        elif share == 1.0:
+        if system.in_plane and _brings_energy(system, motion, problem, count, turn, factor):
+            high = factor
+        elif factor == 1.0:
             return True
         else:
-            low = share
-        share = 0.5 * (low + high)
+            low = factor
+        factor = 0.5 * (low + high)
     return solve_rows(problem, count, low, tolerance)
 
 
 @kernel
-def _brings_energy(system, motion, problem, count, turn, share):
+def _brings_energy(system, motion, problem, count, turn, factor):
     """Whether the impulses of rigid contacts bring energy, by the speeds before and after the step's loads.
 
     The loads alone may let it seem so by one of them: where they pull a contact open, or turn a slip round.
@@ -310,7 +310,7 @@ def _brings_energy(system, motion, problem, count, turn, share):
         row = problem.row[a]
         r = row - u if row >= u else row
         if is_rigid(system, r):
-            impulse, after = problem.box.force[a], problem.box.acceleration[a] - share * problem.asked[a]
+            impulse, after = problem.box.force[a], problem.box.acceleration[a] - factor * problem.asked[a]
             now = problem.now[a]
             before = motion.before[row] if turn == 0 else now
             early += 0.5 * impulse * (before + after)

@@ -47,7 +47,9 @@ class PenaltyLaws(NamedTuple):
 def penalty_laws(system: System, step: float, options: PenaltyOptions) -> PenaltyLaws:
     """Return rigid contacts as springs and dashpots, and the slip speeds of regularised friction.
 
-    A contact's spring is that of its own mobility: where both corners of a face hit at once, the contact is shorter and
+    A spring makes a contact of its own mobility last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which
+    makes the error of a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot
+    gives an isolated collision its restitution; where both corners of a face hit at once, the contact is shorter and
     its restitution another one. Raises InputError for a restitution of 0, and for one that depends on the speed.
     """
     if system.restitution_at:
@@ -57,9 +59,12 @@ def penalty_laws(system: System, step: float, options: PenaltyOptions) -> Penalt
         )
     u, mobility = len(system.rest), np.diag(system.delassus)
     spring, dashpot = np.where(np.isinf(system.spring), 0.0, system.spring), system.dashpot.copy()
+    duration = (options.contact_steps or 2 * options.steps_per_period ** (1 / 3)) * step
     for r in np.flatnonzero(np.isinf(system.spring[: system.contacts])):
+        reduced = 1 / mobility[r]
+        spring[r] = options.contact_stiffness or reduced * (np.pi / duration) ** 2
         try:
-            spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
+            dashpot[r] = 2 * damping_ratio(float(system.restitution[r])) * np.sqrt(spring[r] * reduced)
         except InputError as error:
             owner = SURFACES[system.surface[r]] if system.without_body[r] else "damper"
             raise InputError(f"{owner}[{system.body[r]}].{error}") from None
@@ -67,18 +72,6 @@ def penalty_laws(system: System, step: float, options: PenaltyOptions) -> Penalt
     with np.errstate(divide="ignore"):
         # a quarter of the dashpot at which an explicit step becomes unstable (docs/accuracy.md)
         return PenaltyLaws(spring=spring, dashpot=dashpot, slow=slow, drag=1 / (2 * mobility[u:] * step))
-
-
-def contact_spring(reduced: float, restitution: float, step: float, options: PenaltyOptions) -> tuple[float, float]:
-    """Return stiffness and dashpot of a contact with a reduced mass (kg). Raises InputError for a restitution of 0.
-
-    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
-    a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
-    collision its restitution.
-    """
-    duration = (options.contact_steps or 2 * options.steps_per_period ** (1 / 3)) * step
-    spring = options.contact_stiffness or reduced * (np.pi / duration) ** 2
-    return spring, 2 * damping_ratio(restitution) * np.sqrt(spring * reduced)
 
 
 @inlined
@@ -98,21 +91,15 @@ def set_forces(system, laws, motion, gap, drawn, rate, h):
     for r in range(u - sliders):
         bound = system.limit[r]
         if r < system.contacts:
-            push = 0.0
-            if gap[r] < 0.0:
-                push = max(-laws.spring[r] * gap[r] - laws.dashpot[r] * rate[r], 0.0)
+            push = max(-laws.spring[r] * gap[r] - laws.dashpot[r] * rate[r], 0.0) if gap[r] < 0.0 else 0.0
             _put(motion, r, push, h)
             bound = system.friction[r] * push
-        drag = 0.0
-        if bound > 0.0:
-            slip, slow = rate[u + r], laws.slow[r]
-            if slow > 0.0:
-                drag = bound * slip / slow
-            elif slow == 0.0:
-                drag = bound * np.sign(slip)
-            else:
-                drag = laws.drag[r] * slip
         if has_friction(system, r):
+            drag, slip, slow = 0.0, rate[u + r], laws.slow[r]
+            if bound > 0.0 and slow > 0.0:
+                drag = bound * slip / slow
+            elif bound > 0.0:
+                drag = bound * np.sign(slip) if slow == 0.0 else laws.drag[r] * slip
             _put(motion, u + r, -min(max(drag, -bound), bound), h)
 
 

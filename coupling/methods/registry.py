@@ -68,19 +68,17 @@ def _check_bodies(scene: Scene, system: System) -> None:
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
     if not system.in_plane:
         return
-    laws = {name: getattr(part, "PLANAR_LAWS", None) for name, part in METHODS.all().items()}
+    taken = {name: set(part.PLANAR_LAWS) for name, part in METHODS.all().items() if hasattr(part, "PLANAR_LAWS")}
     law, name = scene.contact, scene.solver.method
-    taken = laws[name]
-    if taken is None:
-        able = [other for other, known in laws.items() if known is not None]
+    if name not in taken:
         raise InputError(
             f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
-            f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(able)}'
+            f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(taken)}'
         )
     asked = {"yields": scene.yields, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
-    if not wanted <= set(taken):
-        able = [other for other, known in laws.items() if known is not None and wanted <= set(known)]
+    if not wanted <= taken[name]:
+        able = [other for other, known in taken.items() if wanted <= known]
         tables = [table for table, _, element in scene.elements if element.yields and law.rigid]
         source = f"{tables[0]}: springs" if tables else f'contact.law: "{law.law}"'
         raise InputError(

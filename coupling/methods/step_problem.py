@@ -81,14 +81,14 @@ def list_slip(system, problem, count, r, now, bound, had):
 
 
 @kernel
-def solve_rows(problem, count, share, tolerance):
-    """Solve the problem of the first rows with a share of what restitution asks for: box.force, box.acceleration.
+def solve_rows(problem, count, factor, tolerance):
+    """Solve the problem of the first rows with a factor of what restitution asks for: box.force, box.acceleration.
 
     tolerance: by how much a sweep of the iteration may still change a speed, m/s. Returns False without a solution.
     """
     box = problem.box
     for a in range(count):
-        box.b[a], box.forced[a] = problem.now[a] + share * problem.asked[a], 0
+        box.b[a], box.forced[a] = problem.now[a] + factor * problem.asked[a], 0
     if count == 1:
         box.force[0] = min(max(-box.b[0] / box.matrix[0, 0], box.low[0]), box.high[0])
         box.acceleration[0] = box.b[0] + box.matrix[0, 0] * box.force[0]

@@ -87,7 +87,7 @@ def open_step(system, times, motion, records, substeps):
     each = len(records.samples) // max(len(records.peak) - 1, 1)
     if each > 0 and k % ((len(times.phase) - 1) // each) == 0:
         row = motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)
-        put_sample(system, motion, records, row, motion.response[0], motion.q, motion.active, 0)
+        put_sample(system, records, row, motion.response[0], motion.q, motion.active, 0)
     return k
 
 
@@ -148,10 +148,10 @@ def _account(system, times, motion, records, k, deepest):
         stored = elongation(system, j, motion.q) ** 2 - elongation(system, j, q) ** 2
         motion.ledger[FRICTION] -= 0.5 * system.tangential[j] * stored
     motion.deepest[0] = max(motion.deepest[0], deep)
-    note_tilts(system, motion, motion.q, p)
+    note_tilts(system, records, motion.q, p)
     for b in range(len(system.along)):
         if system.tilt[b] >= 0 and not _stands(system, motion, b):
-            motion.lifted[p, b] += h
+            records.lifted[p, b] += h
     motion.counters[STEPS] += 1
     if not size < _BOUND:
         return DIVERGED
@@ -210,7 +210,7 @@ def _stands(system, motion, b):
 
 @kernel
 def _follow_contacts(system, times, motion, records, log, k):
-    """Count contacts that begin to carry force, and log those that have ended, as planar.impacts.log_event does."""
+    """Count contacts that begin to carry force, and log those that have ended."""
     u, p = len(system.rest), motion.counters[PERIOD]
     for r in range(system.contacts):
         pushed, before = motion.impulse[r] > 0.0, motion.before[r]

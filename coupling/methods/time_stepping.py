@@ -66,10 +66,6 @@ class Motion(NamedTuple):
     counters: np.ndarray  # (COUNTERS,) int
     ledger: np.ndarray  # (6,) J
     deepest: np.ndarray  # (1,) largest penetration relative to the free travel
-    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
-    lifted: np.ndarray  # (periods + 1, b) time without an impulse at the floor, s
-    sampled: np.ndarray  # (samples, N) coordinates
-    shut: np.ndarray  # (samples, u) int: whether contacts carry force
 
     # constant
     spring: np.ndarray  # (u,) stiffness of contacts, N/m; 0: rigid
@@ -124,19 +120,18 @@ def loads_at(scene: Scene, system: System) -> Loads:
     return loads_of(scene, signal) if signal else lambda angle: (system.phases(angle) @ system.load).real
 
 
-def start(system: System, begun: RestartState, records: Records, spring: np.ndarray) -> tuple[System, Motion]:
+def start(system: System, begun: RestartState, spring: np.ndarray) -> tuple[System, Motion]:
     """Return the system whose slips of Jenkins elements are those of what draws them, and its motion at time zero.
 
     spring: (u,) as in Motion.
     """
     initial = motion_of(system, begun)
-    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
-    contact, samples = np.arange(u) < system.contacts, len(records.samples)
+    u, size = len(system.rest), len(system.mass)
+    contact = np.arange(u) < system.contacts
     return on_structure(system), Motion(
         q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
         counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
-        tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies), sampled=np.zeros((samples, size)),
-        shut=np.zeros((samples, u), np.int8), spring=spring,
+        spring=spring,
         live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
         speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
         response=np.zeros(2), before=np.zeros(2 * u), gap=np.zeros((2, u)), impulse=np.zeros(2 * u),
@@ -151,7 +146,7 @@ class SteppedRun:
         self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
     ) -> None:
         self.system, self.march, self.motion, self.records, self.options = system, march, motion, records, options
-        self.plane = plane_of(system, motion, options.linearisation) if system.in_plane else None
+        self.plane = plane_of(system, records, options.linearisation) if system.in_plane else None
         # a contact logs at most one impact per step
         self.slice = max(_SLICE // max(system.contacts, 1), 1)
         self.log = np.zeros((_SLICE if events else 0, WIDTH))

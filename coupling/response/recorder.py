@@ -3,42 +3,21 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import entry, inlined
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import rows_of_units
-from vanedamp.coupling.response.records import STORED
+from vanedamp.coupling.response.records import STORED, Records
 from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.system.system import FLOOR, System
 
 
-class Kept(Protocol):
-    """The results in the plane that a run has kept, of every method."""
-
-    @property
-    def tilt(self) -> np.ndarray:
-        """(periods, b) largest |tilt| in the cavity, rad."""
-
-    @property
-    def lifted(self) -> np.ndarray:
-        """(periods, b) time off the floor, s."""
-
-    @property
-    def sampled(self) -> np.ndarray:
-        """(n, N) coordinates."""
-
-    @property
-    def shut(self) -> np.ndarray:
-        """(n, u) whether contacts are closed."""
-
-
-def plane_of(system: System, kept: Kept, linearisation: float) -> Plane:
+def plane_of(system: System, records: Records, linearisation: float) -> Plane:
     """Return the results in the plane of a run."""
-    samples = partial(_samples, system, kept.sampled, kept.shut)
-    return Plane(kept.tilt, kept.lifted, system.neglected, linearisation, samples)
+    samples = partial(_samples, system, records.sampled, records.shut)
+    return Plane(records.tilt, records.lifted, system.neglected, linearisation, samples)
 
 
 def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarray) -> PlanarSamples:
@@ -110,7 +89,7 @@ def put_response(system, records, period, x, rate, momentum, energy, ledger):
 
 
 @inlined
-def put_sample(system, st, rec, row, x, q, state, opened):
+def put_sample(system, rec, row, x, q, state, opened):
     """Keep a sample of the response x and the coordinates q; state: (u,) of the contacts, `opened` where they are."""
     rec.samples[row, 0] = x
     for b in range(len(system.along)):
@@ -119,22 +98,22 @@ def put_sample(system, st, rec, row, x, q, state, opened):
             slip -= system.floor[b, i] * q[i]
         rec.samples[row, 1 + b] = slip
     for i in range(len(q)):
-        st.sampled[row, i] = q[i]
+        rec.sampled[row, i] = q[i]
     for i in range(rec.coordinates.shape[1]):
         rec.coordinates[row, i] = q[i]
     for r in range(system.contacts):
-        st.shut[row, r] = 0 if state[r] == opened else 1
+        rec.shut[row, r] = 0 if state[r] == opened else 1
 
 
 @inlined
-def note_tilts(system, st, q, period):
+def note_tilts(system, rec, q, period):
     """Note the tilt of each body in its cavity, where it is the largest of the period so far."""
     for b in range(len(system.along)):
         if system.tilt[b] >= 0:
             tilt = q[system.tilt[b]]
             for i in range(len(q)):
                 tilt -= system.turn[b, i] * q[i]
-            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
+            rec.tilt[period, b] = max(rec.tilt[period, b], abs(tilt))
 
 
 @entry

@@ -31,6 +31,10 @@ class Records(NamedTuple):
     collided: np.ndarray  # energy of the relative motion that impacts turned round or took, J
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
     coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; first nan: not kept
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity, rad
+    lifted: np.ndarray  # (periods + 1, b) time off the floor, s
+    sampled: np.ndarray  # (periods * s, N) all coordinates at the samples, of runs in the plane
+    shut: np.ndarray  # (periods * s, u) int: whether contacts are closed there
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
     swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
 
@@ -56,7 +60,9 @@ def new_records(
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
         samples=np.zeros((periods * samples, 1 + b)),
-        coordinates=kept,
+        coordinates=kept, tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
+        sampled=np.zeros((periods * samples, len(system.mass))),
+        shut=np.zeros((periods * samples, len(system.rest)), np.int8),
         log=np.zeros((4096 + 4 * (system.bodies + system.dampers + system.contacts), 6)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
     )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.codes import OPEN
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import inlined
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 
@@ -53,6 +53,12 @@ def least_force(system, unit):
 def has_friction(system, unit):
     """Whether a unit has friction."""
     return unit >= system.contacts or system.friction[unit] > 0.0
+
+
+@inlined
+def is_slip(state):
+    """Whether a unit in this state slips; its state is the direction then, as a factor."""
+    return state == SLIP_RIGHT or state == SLIP_LEFT
 
 
 @inlined

@@ -62,13 +62,13 @@ def walk(system: System, z: np.ndarray) -> list[Step]:
     while counters[PERIOD] == 0:
         state = run.state.state.copy()
         run.chunks.clear()
-        run.guards.status[:] = BOUNDED
+        run.watched.status[:] = BOUNDED
         run.max_events = int(counters[EVENTS]) + 1
         if run.advance_to(1) is Status.OK:
             steps.append(Step(state, system.period))
             continue
-        roots = np.flatnonzero(run.guards.status == ROOT)
-        event = roots[np.argmin(run.guards.no_root_before[roots])]
+        roots = np.flatnonzero(run.watched.status == ROOT)
+        event = roots[np.argmin(run.watched.no_root_before[roots])]
         impulse = np.zeros(2 * u)
         for entry in np.concatenate(run.chunks) if run.chunks else []:
             if entry[1] == IMPACT:
@@ -77,8 +77,8 @@ def walk(system: System, z: np.ndarray) -> list[Step]:
             Step(
                 state,
                 float(run.state.time[0]),
-                int(run.guards.unit[event]),
-                int(run.guards.what[event]),
+                int(run.watched.unit[event]),
+                int(run.watched.what[event]),
                 impulse,
                 run.scratch.compression.copy(),
             )

@@ -22,7 +22,7 @@ from vanedamp.coupling.engine.line.event_functions import CHATTER
 from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.engine.line.impacts import COLLAPSE
 from vanedamp.coupling.engine.plane.automaton import advance, begin
-from vanedamp.coupling.engine.plane.contact_flow import add_flow
+from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow
 from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.numerics.codes import (
     DONE,
@@ -309,7 +309,7 @@ class Stepper:
     def _advance(self, periods: int, events: int, run: Run) -> np.ndarray:
         while True:
             self.code = advance(
-                run.system, run.flows, run.state, run.guards, run.records, run.log, run.scratch, periods,
+                run.system, run.flows, run.state, run.watched, run.records, run.log, run.scratch, periods,
                 events,
             )  # fmt: skip
             if self.code == PAUSED:

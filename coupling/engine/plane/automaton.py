@@ -1,12 +1,12 @@
-"""The loop from event to event of bodies with extent: flow, first event, impact, decision; energies of all of it."""
+"""The loop from event to event of planar bodies: flow, first event, impact, decision; energies of all of it."""
 
 from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.plane.contact_decisions import decide, move_sliders
+from vanedamp.coupling.engine.plane.contact_states import decide, move_sliders
 from vanedamp.coupling.engine.plane.event_functions import next_event
-from vanedamp.coupling.engine.plane.impacts import collide, log_event, note_impact, stop_wedged
+from vanedamp.coupling.engine.plane.impacts import collide, log_event, log_impact, stop_wedged
 from vanedamp.coupling.engine.plane.quadrature import add_up, motion_at, response_at
 from vanedamp.coupling.engine.plane.tolerances import (
     ALMOST_CLOSED,
@@ -58,6 +58,7 @@ from vanedamp.coupling.system.unit_kinematics import (
     is_closed,
     is_compliant,
     is_rigid,
+    is_slip,
     least_force,
     row_speed,
     speed_scale,
@@ -76,32 +77,29 @@ _TINY = 1e-150
 
 
 @entry
-def begin(system, st, rec, log, work):
+def begin(system, st, rec, log, scratch):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
     _set_phases(system, st)
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
-    if _approaches(system, st) and not collide(system, st, rec, log, work):
+    if _approaches(system, st) and not collide(system, st, rec, log, scratch):
         return False
     _begin_contacts(system, st, rec, log)
-    if not _decide_states(system, st, rec, log, work):
+    if not _decide_states(system, st, rec, log, scratch):
         return False
     st.counters[FLOW] = -1
     return True
 
 
 @entry
-def advance(system, flows, st, guards, rec, log, work, periods, max_events):
+def advance(system, flows, st, watched, rec, log, scratch, periods, max_events):
     """Advance to the end of `periods`. Returns a code."""
     segments = 0
     while st.counters[PERIOD] < periods:
-        if st.counters[FLOW] < 0:
-            found = _begin_flow(system, flows, st, log, work)
-            if found == STATES_OPEN:
-                continue
-            if found != STATES_GO_ON:
-                return found
-        else:
-            _begin_segment(system, flows, st)
+        found = _begin_flow(system, flows, st, log, scratch)
+        if found == STATES_OPEN:
+            continue
+        if found != STATES_GO_ON:
+            return found
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if segments == _SLICE or st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
@@ -109,29 +107,20 @@ def advance(system, flows, st, guards, rec, log, work, periods, max_events):
         segments += 1
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
-        tau, who = next_event(system, flows, st, guards)
+        tau, who = next_event(system, flows, st, watched)
         if who == ENDLESS:
             return ILL_CONDITIONED
         if tau > 0.0:
-            _move(system, flows, st, rec, work, tau)
-        if who == -2:
-            st.time[0] += tau
-            _set_phases(system, st)
-            segments = _SLICE
-            continue
-        if who < 0:
+            _move(system, flows, st, rec, scratch, tau)
+        if who == -1:
             _end_period(system, flows, st, rec)
             continue
-        st.counters[EVENTS] += 1
-        st.counters[AT_ONCE] += 1
-        work.attempt[0] = st.counters[AT_ONCE] // (_REPEATED * len(system.rest))
         st.time[0] += tau
         _set_phases(system, st)
-        if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
-            return UNDECIDED
-        if guards.what[who] == CLOSES and _almost_closes(system, st):
-            _project(system, flows, st, st.counters[FLOW])
-        if not _handle_event(system, st, rec, log, work, guards.unit[who], guards.what[who]):
+        if who == -2:
+            segments = _SLICE
+            continue
+        if not _handle_event(system, flows, st, rec, log, scratch, watched.unit[who], watched.what[who]):
             return UNDECIDED
         if not _within_walls(system, st):
             return ACCURACY_LOST
@@ -139,11 +128,14 @@ def advance(system, flows, st, guards, rec, log, work, periods, max_events):
 
 
 @inlined
-def _begin_flow(system, flows, st, log, work):
-    """Begin the motion of the states as decided, if forces obey their laws in it.
+def _begin_flow(system, flows, st, log, scratch):
+    """Begin the motion of the states as decided, if forces obey their laws in it; that of the last states goes on.
 
     Returns STATES_GO_ON, STATES_OPEN where other states are to be tried, NEEDS_FLOW or UNDECIDED.
     """
+    if st.counters[FLOW] >= 0:
+        _begin_segment(system, flows, st)
+        return STATES_GO_ON
     s = _find_flow(flows, st)
     if s < 0:
         return NEEDS_FLOW
@@ -151,30 +143,30 @@ def _begin_flow(system, flows, st, log, work):
     _stop_held_rows(system, flows, st)
     _begin_segment(system, flows, st)
     suffice = _forces_suffice(system, flows, st)
-    if not suffice and (work.attempt[0] == 0 or not _obeys_laws_prestressed(system, flows, st, work)):
+    if not suffice and (scratch.attempt[0] == 0 or not _obeys_laws_prestressed(system, flows, st, scratch)):
         for r in range(len(st.state)):
             st.state[r] = st.other[r]
         st.counters[FLOW] = -1
         return STATES_OPEN
-    if suffice and not _obeys_laws(system, flows, st) and not _obeys_laws_prestressed(system, flows, st, work):
-        work.attempt[0] += 1
-        if work.attempt[0] > _ATTEMPTS or not decide(system, st, work, st.scale[0]):
+    if suffice and not _obeys_laws(system, flows, st) and not _obeys_laws_prestressed(system, flows, st, scratch):
+        scratch.attempt[0] += 1
+        if scratch.attempt[0] > _ATTEMPTS or not decide(system, st, scratch, st.scale[0]):
             return UNDECIDED
         st.counters[FLOW] = -1
         return STATES_OPEN
-    work.attempt[0] = 0
+    scratch.attempt[0] = 0
     _log_changes(system, flows, st, log)
     return STATES_GO_ON
 
 
 @inlined
-def _move(system, flows, st, rec, work, tau):
+def _move(system, flows, st, rec, scratch, tau):
     """Advance the motion by tau > 0, with its integrals and samples."""
-    add_up(system, flows, st, rec, work, tau)
-    _sample(system, flows, st, rec, work, tau)
-    motion_at(system, flows, st, work, tau, work.ahead[0], work.ahead[1])
+    add_up(system, flows, st, rec, scratch, tau)
+    _sample(system, flows, st, rec, scratch, tau)
+    motion_at(system, flows, st, scratch, tau, scratch.ahead[0], scratch.ahead[1])
     for i in range(len(st.q)):
-        st.q[i], st.v[i] = work.ahead[0, i], work.ahead[1, i]
+        st.q[i], st.v[i] = scratch.ahead[0, i], scratch.ahead[1, i]
     for r in range(len(st.fresh)):
         st.fresh[r] = 0
     st.counters[AT_ONCE] = 0
@@ -208,10 +200,8 @@ def _almost_closes(system, st):
     The other corner of a face that lands flat is off by what a body has turned against the wall that holds it.
     """
     for r in range(system.contacts):
-        if st.state[r] == OPEN:
-            part = gap(system, r, st.q) / system.play[r]
-            if SIMULTANEOUS < part <= ALMOST_CLOSED:
-                return True
+        if st.state[r] == OPEN and SIMULTANEOUS < gap(system, r, st.q) / system.play[r] <= ALMOST_CLOSED:
+            return True
     return False
 
 
@@ -220,12 +210,11 @@ def _begin_contacts(system, st, rec, log):
     """Begin the compliant contacts that are closed and approach."""
     for r in range(system.contacts):
         touches = is_compliant(system, r) and (st.state[r] == OPEN or st.state[r] == TOUCHING)
-        if touches and gap(system, r, st.q) <= SIMULTANEOUS * system.play[r]:
-            speed = row_speed(system, r, st.v)
-            if speed < -AT_REST * st.scale[0]:
-                st.state[r] = SLIP_RIGHT  # decided next
-                st.pushed[r], st.pushed[len(system.rest) + r], st.lost[r] = 0.0, 0.0, 0.0
-                note_impact(system, st, rec, log, r, speed, 0.0, 0.0, 0.0, 0.0)
+        touches = touches and gap(system, r, st.q) <= SIMULTANEOUS * system.play[r]
+        if touches and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
+            st.state[r] = SLIP_RIGHT  # decided next
+            st.pushed[r], st.pushed[len(system.rest) + r], st.lost[r] = 0.0, 0.0, 0.0
+            log_impact(system, st, rec, log, r, row_speed(system, r, st.v), 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -255,34 +244,39 @@ def _is_unloaded(system, st, r):
 def _end_unloaded(system, st, log, r, what):
     """End the other compliant contacts whose forces vanish within round-off at the event of unit r: they may pull."""
     for i in range(system.contacts):
-        presses = (
-            is_compliant(system, i) and st.state[i] < OPEN and st.fresh[i] == 0 and not (what == RECLOSES and i == r)
-        )
-        if presses and _is_unloaded(system, st, i):
+        presses = is_compliant(system, i) and st.state[i] < OPEN and st.fresh[i] == 0
+        if presses and not (what == RECLOSES and i == r) and _is_unloaded(system, st, i):
             _end_contact(system, st, log, i)
 
 
 @inlined
-def _handle_event(system, st, rec, log, work, r, what):
+def _handle_event(system, flows, st, rec, log, scratch, r, what):
     """Apply the event of unit r and decide the states after it. Returns False if they cannot be decided."""
+    st.counters[EVENTS] += 1
+    st.counters[AT_ONCE] += 1
+    scratch.attempt[0] = st.counters[AT_ONCE] // (_REPEATED * len(system.rest))
+    if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
+        return False
+    if what == CLOSES and _almost_closes(system, st):
+        _project(system, flows, st, st.counters[FLOW])
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     for i in range(len(system.rest)):
-        work.before[i] = st.state[i]
+        scratch.before[i] = st.state[i]
     _change_unit(system, st, log, r, what)
     _end_unloaded(system, st, log, r, what)
     # at any event another gap may be closed as well, within the resolution of gaps
-    if _approaches(system, st) and not collide(system, st, rec, log, work):
+    if _approaches(system, st) and not collide(system, st, rec, log, scratch):
         return False
     _begin_contacts(system, st, rec, log)
-    if not _decide_states(system, st, rec, log, work):
+    if not _decide_states(system, st, rec, log, scratch):
         return False
     own = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
-    if own and (what == AT_LOW or what == AT_HIGH) and work.attempt[0] > 0 and st.state[r] == STICK:
+    if own and (what == AT_LOW or what == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
         # again and again: the decision's force is short of its known bound by round-off, that of the motion is not
         st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT
         st.other[r] = st.state[r]
     for i in range(len(system.rest)):
-        changed = work.before[i] != st.state[i] or st.other[i] != st.state[i]
+        changed = scratch.before[i] != st.state[i] or st.other[i] != st.state[i]
         if changed or st.prestress[i] != 0.0 or st.prestress[len(system.rest) + i] != 0.0:
             st.counters[FLOW] = -1
     return True
@@ -311,12 +305,12 @@ def _change_unit(system, st, log, r, what):
 
 
 @kernel
-def _decide_states(system, st, rec, log, work):
+def _decide_states(system, st, rec, log, scratch):
     """Decide the states, if no forces are possible after the impulses that stop what slips. False if that fails."""
     for _ in range(len(system.rest) + 1):
-        if decide(system, st, work, st.scale[0]):
+        if decide(system, st, scratch, st.scale[0]):
             return True
-        if not stop_wedged(system, st, rec, log, work):
+        if not stop_wedged(system, st, rec, log, scratch):
             return False
     return False
 
@@ -326,18 +320,20 @@ def _log_changes(system, flows, st, log):
     """Log which units have changed their states."""
     u = len(system.rest)
     for i in range(u):
-        was, now = st.known[i], st.state[i]
-        if (now == SLIP_RIGHT or now == SLIP_LEFT) and flows.held[st.counters[FLOW], i] and has_friction(system, i):
+        was, now, speed = st.known[i], st.state[i], 0.0
+        if is_slip(now) and flows.held[st.counters[FLOW], i] and has_friction(system, i):
             now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
-        if is_rigid(system, i) and was == OPEN and now != OPEN:
-            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
-        elif is_rigid(system, i) and was != OPEN and now == OPEN:
-            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0, 0.0)
-        elif now == STICK and (was == SLIP_RIGHT or was == SLIP_LEFT):
-            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
-        elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
-            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0, 0.0)
+        if is_rigid(system, i) and (was == OPEN) != (now == OPEN):
+            kind = DETACHES if now == OPEN else RESTS
+            speed = row_speed(system, i, st.v) if now == OPEN else 0.0
+        elif now == STICK and is_slip(was):
+            kind = STICKS
+        elif was == STICK and is_slip(now):
+            kind, speed = SLIPS, row_speed(system, u + i, st.v)
+        else:
+            continue
+        log_event(system, st, log, kind, i, 0.0, speed, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -366,13 +362,11 @@ def _find_flow(flows, st):
 @kernel
 def _stop_held_rows(system, flows, st):
     """Stop what the contacts hold, and enter what that takes from the motion."""
-    s, size, loss = st.counters[FLOW], len(st.q), 0.0
-    for r in range(len(st.prestress)):
-        st.prestress[r] = 0.0
-    size -= len(system.tangential)  # sliders have no mass
+    size, loss = len(st.q) - len(system.tangential), 0.0  # sliders have no mass
+    st.prestress[:] = 0.0
     for i in range(size):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
-    _project(system, flows, st, s)
+    _project(system, flows, st, st.counters[FLOW])
     for i in range(size):
         loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
     st.ledger[IMPACT_LOSS] += loss
@@ -397,8 +391,7 @@ def _project(system, flows, st, s):
     for i in range(size):  # the smallest doubles are slow
         st.q[i] = st.q[i] if abs(st.q[i]) > _TINY else 0.0
         st.v[i] = st.v[i] if abs(st.v[i]) > _TINY else 0.0
-    if len(system.tangential) > 0:
-        move_sliders(system, st.state, st.q, st.v)
+    move_sliders(system, st.state, st.q, st.v)
 
 
 @inlined
@@ -427,13 +420,13 @@ def _forces_suffice(system, flows, st):
             for way in (-1.0, 1.0):
                 if _violates(system, flows, st, r, system.friction[r], way):
                     return False
-        elif st.state[r] == OPEN and _rests_open(system, st, r):
-            if _reverses(system, flows, st, r, 1.0):
+        elif st.state[r] == OPEN and is_closed(system, st, r):
+            still = abs(row_speed(system, r, st.v)) <= AT_REST * st.scale[0]
+            if still and _reverses(system, flows, st, r, 1.0):
                 return False
-        elif (st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT) and not flows.held[st.counters[FLOW], r]:
-            starts = abs(row_speed(system, u + r, st.v)) <= AT_REST * st.scale[0]
-            way = 1.0 if st.state[r] == SLIP_RIGHT else -1.0
-            if starts and has_friction(system, r) and _reverses(system, flows, st, u + r, way):
+        elif is_slip(st.state[r]) and not flows.held[st.counters[FLOW], r]:
+            still = abs(row_speed(system, u + r, st.v)) <= AT_REST * st.scale[0]
+            if still and has_friction(system, r) and _reverses(system, flows, st, u + r, float(st.state[r])):
                 return False
     return True
 
@@ -467,28 +460,22 @@ def _obeys_laws(system, flows, st):
 
 
 @kernel
-def _obeys_laws_prestressed(system, flows, st, work):
+def _obeys_laws_prestressed(system, flows, st, scratch):
     """Let contacts that depend on each other have the forces of the decision. Returns whether those obey their laws.
 
     Without it they have the least ones, which may pull, or exceed the friction, where others would do.
     """
     s, many = st.counters[FLOW], len(st.force)
     for r in range(many):
-        work.speed[r] = work.impulse[r] - st.force[r]
+        scratch.speed[r] = scratch.impulse[r] - st.force[r]
         for j in range(flows.modes[s]):
-            work.speed[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+            scratch.speed[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
     for r in range(many):
         st.prestress[r] = 0.0
         for k in range(many):
-            st.prestress[r] += flows.self_stress[s, r, k] * work.speed[k]
+            st.prestress[r] += flows.self_stress[s, r, k] * scratch.speed[k]
         st.force[r] += st.prestress[r]
     return _obeys_laws(system, flows, st)
-
-
-@inlined
-def _rests_open(system, st, r):
-    """Whether the gap of an open contact is zero and stays so but for accelerations."""
-    return is_closed(system, st, r) and abs(row_speed(system, r, st.v)) <= AT_REST * st.scale[0]
 
 
 @inlined
@@ -585,18 +572,18 @@ def _within_walls(system, st):
 
 
 @inlined
-def _sample(system, flows, st, rec, work, tau):
+def _sample(system, flows, st, rec, scratch, tau):
     """Take the samples of the segment."""
     periods = len(rec.peak) - 1
     many = len(rec.samples) // periods if periods > 0 else 0
     if many == 0:
         return
-    step, q, v = system.period / many, work.ahead[0], work.ahead[1]
+    step, q, v = system.period / many, scratch.ahead[0], scratch.ahead[1]
     k = math.ceil(st.time[0] / step - SAMPLE)
     while k < many and k * step < st.time[0] + tau:
         row = st.counters[PERIOD] * many + k
         if row < len(rec.samples):
-            motion_at(system, flows, st, work, max(k * step - st.time[0], 0.0), q, v)
+            motion_at(system, flows, st, scratch, max(k * step - st.time[0], 0.0), q, v)
             x, _ = response_at(system, q, v, k * step)
-            put_sample(system, st, rec, row, x, q, st.state, OPEN)
+            put_sample(system, rec, row, x, q, st.state, OPEN)
         k += 1

@@ -1,4 +1,4 @@
-"""The event functions of bodies with extent, and the first of their roots, with the guarantee of exact.root_search."""
+"""The event functions of planar bodies, and the first of their roots, with the guarantee of engine.root_search."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from vanedamp.coupling.numerics.codes import (
     RECLOSES,
     ROOT,
     SEGMENTS,
-    SLIP_LEFT,
-    SLIP_RIGHT,
     STICK,
     STOPS,
     TOUCHING,
@@ -32,7 +30,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.numerics.tolerances import AT_START, RESOLUTION, SUM_ROUND_OFF
-from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant
+from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant, is_slip
 
 #: exponent of the growth of modes until the period's end above which the search looks less far
 _GROWN = 20.0
@@ -41,7 +39,7 @@ _LONGEST = 3e4
 
 
 @inlined
-def next_event(system, flows, st, guards):
+def next_event(system, flows, st, watched):
     """Time to the next event and its function, to the period's end and -1, or to a time without an event and -2.
 
     The last where modes grow so much until the period's end that bounds for all of it say nothing, or turn so often
@@ -56,80 +54,74 @@ def next_event(system, flows, st, guards):
     shortest = RESOLUTION * system.period
     eigenvalue, modes = flows.eigenvalue[s], flows.modes[s]
     grows = math.exp(flows.growth[s] * left)
-    count = _list_functions(system, flows, st, guards, s, grows)
+    count = _list_functions(system, flows, st, watched, s, grows)
     st.counters[SEGMENTS] += 1
     most = st.counters[EVALUATIONS] + MOST
     while True:
         k, tau = -1, left
         for i in range(count):
-            if guards.no_root_before[i] < tau:
-                k, tau = i, guards.no_root_before[i]
+            if watched.no_root_before[i] < tau:
+                k, tau = i, watched.no_root_before[i]
         if k < 0:
             return left, last
-        if guards.status[k] == ROOT:
+        if watched.status[k] == ROOT:
             return (tau if tau > shortest else 0.0), k
-        if guards.status[k] == BOUNDED:
+        if watched.status[k] == BOUNDED:
             tau = 0.0
         elif st.counters[EVALUATIONS] == most:
             return tau, ENDLESS
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(
-            guards.order[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, len(system.frequency), modes, tau,
-            guards.expansion,
+            watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], eigenvalue, len(system.frequency), modes, tau,
+            watched.expansion,
         )  # fmt: skip
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay
             second, calm = second * grows, -1.0
-            guards.expansion.taylor[0, DEGREE] *= grows
+            watched.expansion.taylor[0, DEGREE] *= grows
         step, found, _ = step_or_stop(
-            guards.expansion, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast,
+            watched.expansion, 1.0, watched.k0[k], math.inf, max(noise, watched.noise[k]), second, calm, fast,
             system.period, shortest,
         )  # fmt: skip
-        guards.status[k] = ROOT if found else EXPANDED
-        guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)
+        watched.status[k] = ROOT if found else EXPANDED
+        watched.no_root_before[k] = tau + step if found else max(watched.no_root_before[k], tau + step)
 
 
 @inlined
-def _list_functions(system, flows, st, guards, s, grows):
+def _list_functions(system, flows, st, watched, s, grows):
     """Set up the event functions of the segment. Returns how many."""
     u, count = len(system.rest), ZERO
     for r in range(u):
         state = st.state[r]
         if r < system.contacts:
             if state == OPEN:
-                count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
+                count = _add(system, flows, st, watched, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
             elif state == LEAVING:
-                count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
+                count = _add(system, flows, st, watched, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
                 on_gap, on_rate = system.spring[r], system.dashpot[r]
-                count = _add(system, flows, st, guards, s, r, POSITION, RECLOSES, on_gap, on_rate, grows, count)
+                count = _add(system, flows, st, watched, s, r, POSITION, RECLOSES, on_gap, on_rate, grows, count)
             elif state == TOUCHING:
                 if is_compliant(system, r):  # nothing presses it now
-                    count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
-                    count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
+                    count = _add(system, flows, st, watched, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
+                    count = _add(system, flows, st, watched, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
             else:
-                count = _add(system, flows, st, guards, s, r, FORCE, PARTS, 1.0, 0.0, grows, count)
+                count = _add(system, flows, st, watched, s, r, FORCE, PARTS, 1.0, 0.0, grows, count)
         if state == STICK and has_friction(system, r):
             bound = system.friction[r]
-            count = _add(system, flows, st, guards, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
-            count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, bound, 1.0, grows, count)
-        slips = (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]
-        if slips and has_friction(system, r):
-            way = 1.0 if state == SLIP_RIGHT else -1.0
-            count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
+            count = _add(system, flows, st, watched, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
+            count = _add(system, flows, st, watched, s, r, FORCE, AT_LOW, bound, 1.0, grows, count)
+        if is_slip(state) and not flows.held[s, r] and has_friction(system, r):
+            count = _add(system, flows, st, watched, s, r, VELOCITY, STOPS, 0.0, float(state), grows, count)
     return count
 
 
 @kernel
-def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows, k):
-    """Add an event function: a gap, a slip's speed, or forces, the normal row and the slip row times these factors.
+def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grows, k):
+    """Add an event function: a gap and its rate, a slip's speed, or forces of both rows, times these factors.
 
-    Where a contact is leaving, it is the gap and its rate times them. Returns the number of functions so far. One whose
-    force never comes near its bound is left out.
+    Returns the number of functions so far. One whose force never comes near its bound is left out.
     """
-    k0, k1, k2, noise = _polynomial(system, st, r, order, what, on_normal, on_slip)
-    leaves, unit = order == POSITION and what != CLOSES, 1.0
-    if leaves:
-        unit = abs(on_normal)
+    k0, k1, k2, noise = _polynomial(system, st, r, order, on_normal, on_slip)
     if st.state[r] == TOUCHING:  # as far as round-off of its gap may have it drift
         k0 += DRIFT * system.play[r]
     u = len(system.rest)
@@ -142,13 +134,12 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
             g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
         elif order == POSITION:
             g = flows.rows[s, r, j]
-            if leaves:
-                k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
-                g *= on_normal + on_slip * rate
+            k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
+            g *= on_normal + on_slip * rate
         else:
             g = on_slip * flows.rows[s, u + r, j] * rate
         g *= st.amplitude[j]
-        guards.g[k, j] = g
+        watched.g[k, j] = g
         fast = math.sqrt(rate.real * rate.real + rate.imag * rate.imag)
         bound = (abs(g.real) + abs(g.imag)) * fast
         if order == FORCE:
@@ -168,22 +159,22 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
         return k
     first += k1
     second += k2 if order == POSITION else 0.0
-    guards.unit[k], guards.order[k], guards.what[k], guards.status[k] = r, order, what, BOUNDED
-    guards.k0[k], guards.k1[k], guards.k2[k], guards.no_root_before[k] = k0, k1, k2, 0.0
-    guards.noise[k] = SUM_ROUND_OFF * (noise + swing)
-    if _begins_at_zero(system, st, r, order, unit, value, first, second_bound, noise + swing):
-        guards.no_root_before[k] = _first_step(
+    watched.unit[k], watched.order[k], watched.what[k], watched.status[k] = r, order, what, BOUNDED
+    watched.k0[k], watched.k1[k], watched.k2[k], watched.no_root_before[k] = k0, k1, k2, 0.0
+    watched.noise[k] = SUM_ROUND_OFF * (noise + swing)
+    if _begins_at_zero(system, st, r, order, abs(on_normal), value, first, second_bound, noise + swing):
+        watched.no_root_before[k] = _first_step(
             system.period, first, second, third, second_bound * grows + abs(k2), third_bound * grows,
             fourth_bound * grows,
         )  # fmt: skip
-        guards.status[k] = EXPANDED
-    elif value > guards.noise[k]:
-        guards.no_root_before[k] = first_root_of_parabola(value, first, -second_bound * grows + min(k2, 0.0))
+        watched.status[k] = EXPANDED
+    elif value > watched.noise[k]:
+        watched.no_root_before[k] = first_root_of_parabola(value, first, -second_bound * grows + min(k2, 0.0))
     return k + 1
 
 
 @inlined
-def _polynomial(system, st, r, order, what, on_normal, on_slip):
+def _polynomial(system, st, r, order, on_normal, on_slip):
     """Return the coefficients of an event function's polynomial, and the sizes of the terms of the first."""
     u, size = len(system.rest), len(st.q)
     k0, k1, k2, noise = 0.0, 0.0, 0.0, 0.0
@@ -192,14 +183,6 @@ def _polynomial(system, st, r, order, what, on_normal, on_slip):
         noise = abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r]) + system.limit[r]
         if is_compliant(system, r):  # its force is a small difference of displacements
             noise += abs(on_normal) * system.spring[r] * system.play[r]
-    elif what == CLOSES:
-        k0, noise = system.rest[r], abs(system.rest[r])
-        for i in range(size):
-            part = system.J[r, i] * st.q[i]
-            k0 += part
-            noise += abs(part)
-            k1 += system.J[r, i] * st.v[i]
-            k2 += system.J[r, i] * st.bend[i]
     elif order == POSITION:
         k0, noise = on_normal * system.rest[r], abs(on_normal * system.rest[r])
         for i in range(size):
@@ -218,15 +201,18 @@ def _polynomial(system, st, r, order, what, on_normal, on_slip):
 
 
 @inlined
-def _begins_at_zero(system, st, r, order, unit, value, first, second_bound, noise):
-    """Whether a function of a contact that has just been decided is zero at the start, and does not fall."""
+def _begins_at_zero(system, st, r, order, factor, value, first, second_bound, noise):
+    """Whether a function of a contact that has just been decided is zero at the start, and does not fall.
+
+    factor: of its gap, if it has one.
+    """
     if st.fresh[r] == 0:
         return False
     falls = first < -FLAT * second_bound * system.period
     zero = FLAT * noise
     if order == POSITION:
-        falls = falls and first < -AT_REST * st.scale[0] * unit
-        zero = DECIDED * (system.play[r] * unit)
+        falls = falls and first < -AT_REST * st.scale[0] * factor
+        zero = DECIDED * (system.play[r] * factor)
     elif order == VELOCITY:
         zero = DECIDED * st.scale[0]
     return not falls and value <= zero
@@ -238,13 +224,11 @@ def _first_step(period, first, second, third, second_bound, third_bound, fourth_
 
     The decision of the contacts at this instant says that it rises.
     """
-    shortest = AT_START * period
-    omega = 2.0 * math.pi / period
-    step = shortest
+    omega, step = 2.0 * math.pi / period, AT_START * period
     if first > FLAT * second_bound / omega:
         step = first / second_bound if second_bound > 0.0 else period
     elif second > FLAT * max(third_bound / omega, second_bound):
         step = 1.5 * second / third_bound if third_bound > 0.0 else period
     elif third > 0.0 and second > -FLAT * max(third_bound / omega, second_bound):
         step = 2.0 * third / fourth_bound if fourth_bound > 0.0 else period
-    return max(step, shortest)
+    return max(step, AT_START * period)

@@ -6,10 +6,11 @@ conj lambda_k) t): they are found once a segment and serve all products.
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.codes import FLOW, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.numerics.codes import FLOW, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.exponentials import exp_minus_one
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
+from vanedamp.coupling.system.unit_kinematics import has_friction, is_slip, row_speed
 
 #: signals: the response, the momentum of the bodies, slip and friction of a contact
 _X, _MOMENTUM, _SLIP, _FORCE = range(4)
@@ -18,28 +19,31 @@ _NEAR, _TERMS, _NEAREST, _FEW = 0.5, 18, 0.05, 10
 
 
 @kernel
-def set_up(system, flows, st, work, tau):
-    """Set the integrals of exponentials (work.moment, work.pair), and the signals of response and momentum."""
+def set_up(system, flows, st, scratch, tau):
+    """Set the integrals of exponentials (scratch.moment, scratch.pair), and the signals of response and momentum."""
     s = st.counters[FLOW]
     m = flows.modes[s]
     for j in range(m):
         z = flows.eigenvalue[s, j] * tau
         first = exp_minus_one(z)
-        work.turn[j] = first
+        scratch.turn[j] = first
         one, two, three = _moments(z, first)
-        work.moment[0, j], work.moment[1, j], work.moment[2, j] = tau * one, tau * tau * two, tau * tau * tau * three
+        scratch.moment[0, j], scratch.moment[1, j], scratch.moment[2, j] = (
+            tau * one,
+            tau * tau * two,
+            tau * tau * tau * three,
+        )
     for j in range(m):
         for k in range(j + 1):
             one, two = flows.eigenvalue[s, j], flows.eigenvalue[s, k]
-            turned = complex(two.real, -two.imag)
-            first, other = work.turn[j], work.turn[k]
-            back = complex(other.real, -other.imag)
+            first, other = scratch.turn[j], scratch.turn[k]
+            back = other.conjugate()
             same = tau * _quotient((one + two) * tau, first + other + first * other)
-            apart = tau * _quotient((one + turned) * tau, first + back + first * back)
-            work.pair[0, j, k], work.pair[0, k, j] = same, same
-            work.pair[1, j, k], work.pair[1, k, j] = apart, complex(apart.real, -apart.imag)
-    _follow_response(system, flows, st, work, m)
-    _follow_momentum(system, flows, st, work, m)
+            apart = tau * _quotient((one + two.conjugate()) * tau, first + back + first * back)
+            scratch.pair[0, j, k], scratch.pair[0, k, j] = same, same
+            scratch.pair[1, j, k], scratch.pair[1, k, j] = apart, apart.conjugate()
+    _follow_response(system, flows, st, scratch, m)
+    _follow_momentum(system, flows, st, scratch, m)
 
 
 @inlined
@@ -70,9 +74,9 @@ def _quotient(z, first):
 
 
 @inlined
-def _follow_response(system, flows, st, work, m):
+def _follow_response(system, flows, st, scratch, m):
     """Set the signal of the response, that of a prescribed base included."""
-    s, c = st.counters[FLOW], work.constant[_X]
+    s, c = st.counters[FLOW], scratch.constant[_X]
     c[0], c[1], c[2] = 0.0, 0.0, 0.0
     for i in range(len(st.q)):
         c[0] += system.response[i] * st.q[i]
@@ -85,108 +89,102 @@ def _follow_response(system, flows, st, work, m):
         g = shape * st.amplitude[j]
         c[0] -= g.real
         c[1] -= (g * flows.eigenvalue[s, j]).real
-        work.signal[_X, j] = g
+        scratch.signal[_X, j] = g
     for h in range(len(system.frequency)):
-        work.signal[_X, h] += system.table[h] * st.amplitude[h]
+        scratch.signal[_X, h] += system.table[h] * st.amplitude[h]
 
 
 @inlined
-def _follow_momentum(system, flows, st, work, m):
-    s, c = st.counters[FLOW], work.constant[_MOMENTUM]
+def _follow_momentum(system, flows, st, scratch, m):
+    s, c = st.counters[FLOW], scratch.constant[_MOMENTUM]
     c[0], c[1], c[2] = 0.0, 0.0, 0.0
-    for j in range(m):
-        work.signal[_MOMENTUM, j] = 0.0
-    for b in range(len(system.along)):
-        i = system.along[b]
+    for i in system.along:
         c[0] += system.mass[i] * st.v[i]
         c[1] += system.mass[i] * st.bend[i]
-        for j in range(m):
-            work.signal[_MOMENTUM, j] += system.mass[i] * flows.motion[s, i, j]
     for j in range(m):
-        work.signal[_MOMENTUM, j] *= flows.eigenvalue[s, j] * st.amplitude[j]
-        c[0] -= work.signal[_MOMENTUM, j].real
+        shape = complex(0.0, 0.0)
+        for i in system.along:
+            shape += system.mass[i] * flows.motion[s, i, j]
+        g = shape * (flows.eigenvalue[s, j] * st.amplitude[j])
+        scratch.signal[_MOMENTUM, j] = g
+        c[0] -= g.real
 
 
 @inlined
-def _follow_slip(system, flows, st, work, m, r):
+def _follow_slip(system, flows, st, scratch, m, r):
     """Set the signals of slip and friction force of a unit."""
-    s, u, c, force = st.counters[FLOW], len(system.rest), work.constant[_SLIP], work.constant[_FORCE]
-    c[0], c[1], c[2] = 0.0, 0.0, 0.0
+    s, u, c, force = st.counters[FLOW], len(system.rest), scratch.constant[_SLIP], scratch.constant[_FORCE]
+    c[0], c[1], c[2] = row_speed(system, u + r, st.v), row_speed(system, u + r, st.bend), 0.0
     force[0], force[1], force[2] = st.force[u + r], 0.0, 0.0
-    for i in range(len(st.q)):
-        c[0] += system.J[u + r, i] * st.v[i]
-        c[1] += system.J[u + r, i] * st.bend[i]
     for j in range(m):
         g = flows.rows[s, u + r, j] * flows.eigenvalue[s, j] * st.amplitude[j]
-        work.signal[_SLIP, j], work.signal[_FORCE, j] = g, flows.force[s, u + r, j] * st.amplitude[j]
+        scratch.signal[_SLIP, j], scratch.signal[_FORCE, j] = g, flows.force[s, u + r, j] * st.amplitude[j]
         c[0] -= g.real
 
 
 @kernel
-def _product(work, one, other, m, tau):
+def _product(scratch, one, other, m, tau):
     """Integral of the product of two signals."""
-    a, b, g, h = work.constant[one], work.constant[other], work.signal[one], work.signal[other]
+    a, b, g, h = scratch.constant[one], scratch.constant[other], scratch.signal[one], scratch.signal[other]
     total, power = 0.0, 1.0
     for k in range(5):
         power *= tau
         for i in range(max(k - 2, 0), min(k, 2) + 1):
             total += a[i] * b[k - i] * power / (k + 1)
     for j in range(m):
-        of_one = b[0] * work.moment[0, j] + b[1] * work.moment[1, j] + b[2] * work.moment[2, j]
-        of_other = a[0] * work.moment[0, j] + a[1] * work.moment[1, j] + a[2] * work.moment[2, j]
+        of_one = b[0] * scratch.moment[0, j] + b[1] * scratch.moment[1, j] + b[2] * scratch.moment[2, j]
+        of_other = a[0] * scratch.moment[0, j] + a[1] * scratch.moment[1, j] + a[2] * scratch.moment[2, j]
         total += (g[j] * of_one + h[j] * of_other).real
         same, apart = complex(0.0, 0.0), complex(0.0, 0.0)
         for k in range(m):
-            same += h[k] * work.pair[0, j, k]
-            apart += complex(h[k].real, -h[k].imag) * work.pair[1, j, k]
+            same += h[k] * scratch.pair[0, j, k]
+            apart += h[k].conjugate() * scratch.pair[1, j, k]
         total += 0.5 * (g[j] * (same + apart)).real
     return total
 
 
 @inlined
-def _integral(work, signal, m, tau):
+def _integral(scratch, signal, m, tau):
     """Integral of a signal."""
-    c, total = work.constant[signal], 0.0
+    c, total = scratch.constant[signal], 0.0
     for k in range(3):
         total += c[k] * tau ** (k + 1) / (k + 1)
     for j in range(m):
-        total += (work.signal[signal, j] * work.moment[0, j]).real
+        total += (scratch.signal[signal, j] * scratch.moment[0, j]).real
     return total
 
 
 @inlined
-def _harmonic(st, work, signal, m):
+def _harmonic(st, scratch, signal, m):
     """Integral of a signal times the conjugate phase of the first harmonic."""
-    c, g, total = work.constant[signal], work.signal[signal], complex(0.0, 0.0)
+    c, g, total = scratch.constant[signal], scratch.signal[signal], complex(0.0, 0.0)
     for k in range(3):
-        total += c[k] * complex(work.moment[k, 0].real, -work.moment[k, 0].imag)
+        total += c[k] * scratch.moment[k, 0].conjugate()
     for j in range(m):
-        same = g[j] * work.pair[0, j, 0]
-        total += 0.5 * (g[j] * work.pair[1, j, 0] + complex(same.real, -same.imag))
-    return total * complex(st.amplitude[0].real, -st.amplitude[0].imag)
+        total += 0.5 * (g[j] * scratch.pair[1, j, 0] + (g[j] * scratch.pair[0, j, 0]).conjugate())
+    return total * st.amplitude[0].conjugate()
 
 
 @kernel
-def integrate(system, flows, st, rec, work, tau):
+def integrate(system, flows, st, rec, scratch, tau):
     """Add the integrals of the segment (set_up) to ledger and records."""
     s, period = st.counters[FLOW], st.counters[PERIOD]
     m = flows.modes[s]
-    st.ledger[EXCITATION] += _work(system, flows, st, work, m)
-    st.ledger[VISCOUS] += _loss(system, flows, st, work, m, tau)
+    st.ledger[EXCITATION] += _work(system, flows, st, scratch, m)
+    st.ledger[VISCOUS] += _loss(system, flows, st, scratch, m, tau)
     for r in range(len(system.rest)):
-        slides = (st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT) and not flows.held[s, r]
-        if slides and (r >= system.contacts or system.friction[r] > 0.0):
-            _follow_slip(system, flows, st, work, m, r)
-            st.ledger[FRICTION] -= _product(work, _SLIP, _FORCE, m, tau)
-    rec.harmonic[period] += _harmonic(st, work, _X, m)
-    rec.momentum[period] += _harmonic(st, work, _MOMENTUM, m)
-    rec.square[period] += _product(work, _X, _X, m, tau)
+        if is_slip(st.state[r]) and not flows.held[s, r] and has_friction(system, r):
+            _follow_slip(system, flows, st, scratch, m, r)
+            st.ledger[FRICTION] -= _product(scratch, _SLIP, _FORCE, m, tau)
+    rec.harmonic[period] += _harmonic(st, scratch, _X, m)
+    rec.momentum[period] += _harmonic(st, scratch, _MOMENTUM, m)
+    rec.square[period] += _product(scratch, _X, _X, m, tau)
     if len(rec.swing) > 0:
-        rec.swing[period, 2] += _integral(work, _X, m, tau)
+        rec.swing[period, 2] += _integral(scratch, _X, m, tau)
 
 
 @inlined
-def _work(system, flows, st, work, m):
+def _work(system, flows, st, scratch, m):
     """Work of the loads."""
     s, total = st.counters[FLOW], 0.0
     for h in range(len(system.frequency)):
@@ -201,51 +199,50 @@ def _work(system, flows, st, work, m):
                 if system.load[h, i] != 0.0:
                     g = flows.motion[s, i, j] * speed
                     same += system.load[h, i] * g
-                    apart += system.load[h, i] * complex(g.real, -g.imag)
+                    apart += system.load[h, i] * g.conjugate()
             steady -= 0.5 * (same + apart)
-            swinging += 0.5 * (same * work.pair[0, h, j] + apart * work.pair[1, h, j])
-        total += (st.amplitude[h] * (steady * work.moment[0, h] + rising * work.moment[1, h] + swinging)).real
+            swinging += 0.5 * (same * scratch.pair[0, h, j] + apart * scratch.pair[1, h, j])
+        total += (st.amplitude[h] * (steady * scratch.moment[0, h] + rising * scratch.moment[1, h] + swinging)).real
     return total
 
 
 @inlined
-def _loss(system, flows, st, work, m, tau):
+def _loss(system, flows, st, scratch, m, tau):
     """Energy that the damping takes: of speeds v = e + t b + Re G z, with flows.drag = C G and G^T C G."""
     s, size, total = st.counters[FLOW], len(st.q), 0.0
     for i in range(size):
-        work.free[i] = st.v[i]
+        scratch.free[i] = st.v[i]
         for j in range(m):
-            work.free[i] -= (flows.motion[s, i, j] * flows.eigenvalue[s, j] * st.amplitude[j]).real
+            scratch.free[i] -= (flows.motion[s, i, j] * flows.eigenvalue[s, j] * st.amplitude[j]).real
     for i in range(size):
         for k in range(size):
             drag = system.damping[i, k]
             if drag != 0.0:
                 total += drag * tau * (
-                    work.free[i] * work.free[k]
-                    + tau * (work.free[i] * st.bend[k] + tau * st.bend[i] * st.bend[k] / 3.0)
+                    scratch.free[i] * scratch.free[k]
+                    + tau * (scratch.free[i] * st.bend[k] + tau * st.bend[i] * st.bend[k] / 3.0)
                 )  # fmt: skip
     for j in range(m):
         steady, rising, same, apart = complex(0.0, 0.0), complex(0.0, 0.0), complex(0.0, 0.0), complex(0.0, 0.0)
         for i in range(size):
-            steady += work.free[i] * flows.drag[s, i, j]
+            steady += scratch.free[i] * flows.drag[s, i, j]
             rising += st.bend[i] * flows.drag[s, i, j]
         for k in range(m):
-            amplitude = st.amplitude[k]
-            same += amplitude * flows.loss[s, j, k] * work.pair[0, j, k]
-            apart += complex(amplitude.real, -amplitude.imag) * flows.loss_apart[s, j, k] * work.pair[1, j, k]
-        alone = 2.0 * (steady * work.moment[0, j] + rising * work.moment[1, j])
+            same += st.amplitude[k] * flows.loss[s, j, k] * scratch.pair[0, j, k]
+            apart += st.amplitude[k].conjugate() * flows.loss_apart[s, j, k] * scratch.pair[1, j, k]
+        alone = 2.0 * (steady * scratch.moment[0, j] + rising * scratch.moment[1, j])
         total += (st.amplitude[j] * (alone + 0.5 * (same + apart))).real
     return total
 
 
 @inlined
-def response_after(flows, st, work, t):
+def response_after(flows, st, scratch, t):
     """Return displacement, speed and acceleration of the response at a time of the segment (set_up)."""
-    s, c = st.counters[FLOW], work.constant[_X]
+    s, c = st.counters[FLOW], scratch.constant[_X]
     x, rate, bend = c[0] + t * (c[1] + t * c[2]), c[1] + 2.0 * t * c[2], 2.0 * c[2]
     for j in range(flows.modes[s]):
         eigenvalue = flows.eigenvalue[s, j]
-        part = work.signal[_X, j] * (1.0 + exp_minus_one(eigenvalue * t))
+        part = scratch.signal[_X, j] * (1.0 + exp_minus_one(eigenvalue * t))
         x += part.real
         part *= eigenvalue
         rate += part.real

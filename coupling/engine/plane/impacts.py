@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.plane.contact_decisions import extend_basis, loaded_acceleration
+from vanedamp.coupling.engine.plane.contact_states import after_impulses, direction, extend_basis, loaded_acceleration
 from vanedamp.coupling.engine.plane.friction_problem import solve_rows
 from vanedamp.coupling.engine.plane.tolerances import (
     ADDED_ENERGY,
@@ -52,81 +52,79 @@ _FAR = 100.0
 
 
 @kernel
-def collide(system, st, rec, log, work):
+def collide(system, st, rec, log, scratch):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count = len(system.rest), _list_closed(system, st, work)
+    u, count = len(system.rest), _list_closed(system, st, scratch)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
-        work.before_impact[r] = row_speed(system, r, st.v)
+        scratch.before_impact[r] = row_speed(system, r, st.v)
     # speeds as they are, round-off included, always have a solution
-    if system.two_phases and not _compress(system, work, count, tiny) and not _compress(system, work, count, 0.0):
+    if system.two_phases and not _compress(system, scratch, count, tiny) and not _compress(system, scratch, count, 0.0):
         return False
-    if not _solve_restitution(system, st, work, count, 1.0, tiny):
+    if not _solve_restitution(system, st, scratch, count, 1.0, tiny):
         st.counters[REDUCED] += 1
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if _solve_restitution(system, st, work, count, middle, tiny):
+            if _solve_restitution(system, st, scratch, count, middle, tiny):
                 low = middle
             else:
                 high = middle
         # without rebound the speeds as they are have a solution here, too
         wedged = low <= WEDGED
-        if not _solve_restitution(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
+        if not _solve_restitution(system, st, scratch, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
-    _apply(system, st, work)
-    for p in range(count):
-        r = work.listed[p]
-        if work.impulse[r] > 0.0 or work.before_impact[r] < -tiny:
-            _log_impact(system, st, rec, log, work, r)
-    _add_loss(system, st, work)
-    return _complete_chatter(system, st, work, count, tiny)
+    _apply(system, st, rec, log, scratch, count, tiny)
+    return _complete_chatter(system, st, scratch, count, tiny)
 
 
 @inlined
-def _list_closed(system, st, work):
+def _list_closed(system, st, scratch):
     """List the contacts whose gaps are zero. Returns how many they are."""
     count = ZERO
     for r in range(system.contacts):
         if is_rigid(system, r) and is_closed(system, st, r):
-            work.listed[count], work.way[count] = r, 0
+            scratch.listed[count], scratch.way[count] = r, 0
             count += 1
     return count
 
 
 @kernel
-def _solve_restitution(system, st, work, count, factor, tiny):
+def _solve_restitution(system, st, scratch, count, factor, tiny):
     """Find impulses for this factor of the coefficients. Returns False if there are none, or they add energy."""
     if system.two_phases:
-        return _expand(system, st, work, count, factor, tiny) and not _adds_energy(system, st, work)
-    u = len(system.rest)
+        return _expand(system, st, scratch, count, factor, tiny) and not _adds_energy(system, st, scratch)
+    _set_speeds(system, scratch, scratch.before_impact, tiny)
     for p in range(count):
-        r = work.listed[p]
-        normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-        work.speed[r] = normal + factor * _restitution(system, st, work, r) * min(normal, 0.0)
-        work.speed[u + r] = work.before_impact[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0, system.limit) and not _adds_energy(system, st, work)
+        r = scratch.listed[p]
+        normal = scratch.speed[r]
+        scratch.speed[r] = normal + factor * _restitution(system, st, scratch, r) * min(normal, 0.0)
+    return solve_rows(system, scratch, count, scratch.speed, 0.0, system.limit) and not _adds_energy(
+        system, st, scratch
+    )
 
 
 @kernel
-def _compress(system, work, count, tiny):
+def _set_speeds(system, scratch, speed, tiny):
+    """Set the speeds of all rows (scratch.speed), those of gaps without their round-off."""
+    for row in range(len(speed)):
+        scratch.speed[row] = speed[row] if row >= len(system.rest) or abs(speed[row]) > tiny else 0.0
+
+
+@kernel
+def _compress(system, scratch, count, tiny):
     """Find the impulses that stop the approach, and the speeds that they leave. Returns False if there are none."""
-    u = len(system.rest)
-    for p in range(count):
-        r = work.listed[p]
-        work.speed[r] = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-        work.speed[u + r] = work.before_impact[u + r]
-    if not solve_rows(system, work, count, work.speed, 0.0, system.limit):
+    _set_speeds(system, scratch, scratch.before_impact, tiny)
+    if not solve_rows(system, scratch, count, scratch.speed, 0.0, system.limit):
         return False
-    for r in range(2 * u):
-        work.compression[r], work.compressed[r] = work.impulse[r], work.before_impact[r]
-        for o in range(2 * u):
-            work.compressed[r] += system.delassus[r, o] * work.impulse[o]
+    for row in range(len(system.J)):
+        scratch.compression[row] = scratch.impulse[row]
+        scratch.compressed[row] = after_impulses(system, row, scratch.impulse, scratch.before_impact[row])
     return True
 
 
 @kernel
-def _expand(system, st, work, count, factor, tiny):
+def _expand(system, st, scratch, count, factor, tiny):
     """Find the impulses of both phases: in expansion a contact has at least its coefficient's part of compression.
 
     With that part as given, the rest is the same problem: the more than it and the speed complement each other.
@@ -134,33 +132,33 @@ def _expand(system, st, work, count, factor, tiny):
     """
     u = len(system.rest)
     for row in range(2 * u):
-        work.speed[row] = work.compressed[row] if abs(work.compressed[row]) > tiny else 0.0
+        scratch.speed[row] = scratch.compressed[row] if abs(scratch.compressed[row]) > tiny else 0.0
     for p in range(count):
-        r = work.listed[p]
-        given = factor * _restitution(system, st, work, r) * work.compression[r]
-        work.bound[r] = system.friction[r] * given
-        work.least[r] = given
+        r = scratch.listed[p]
+        given = factor * _restitution(system, st, scratch, r) * scratch.compression[r]
+        scratch.bound[r] = system.friction[r] * given
+        scratch.least[r] = given
         for row in range(2 * u):
-            work.speed[row] += system.delassus[row, r] * given
-    if not solve_rows(system, work, count, work.speed, 0.0, work.bound):
+            scratch.speed[row] += system.delassus[row, r] * given
+    if not solve_rows(system, scratch, count, scratch.speed, 0.0, scratch.bound):
         return False
     for p in range(count):
-        r = work.listed[p]
-        work.impulse[r] += work.least[r] + work.compression[r]
-        work.impulse[u + r] += work.compression[u + r]
+        r = scratch.listed[p]
+        scratch.impulse[r] += scratch.least[r] + scratch.compression[r]
+        scratch.impulse[u + r] += scratch.compression[u + r]
     return True
 
 
 @inlined
-def _restitution(system, st, work, r):
+def _restitution(system, st, scratch, r):
     """Coefficient of a contact at its speed of approach; an impact at the end of a collapse is plastic."""
     if st.time[0] - st.last_impact[r] < COLLAPSE * system.period:
         return 0.0
-    return restitution_at(system, r, -work.before_impact[r])
+    return restitution_at(system, r, -scratch.before_impact[r])
 
 
 @inlined
-def _adds_energy(system, st, work):
+def _adds_energy(system, st, scratch):
     """Whether the impulses add more energy than round-off of what there is.
 
     By the velocities that they change: of a wedged block, large impulses nearly balance each other.
@@ -168,8 +166,8 @@ def _adds_energy(system, st, work):
     loss, there = 0.0, 0.0
     for i in range(len(st.v)):
         pushed, terms = 0.0, 0.0
-        for r in range(len(work.impulse)):
-            part = system.J[r, i] * work.impulse[r]
+        for r in range(len(scratch.impulse)):
+            part = system.J[r, i] * scratch.impulse[r]
             pushed += part
             terms += abs(part)
         loss -= pushed * (st.v[i] + 0.5 * pushed / system.mass[i])
@@ -177,36 +175,32 @@ def _adds_energy(system, st, work):
     return loss < -ADDED_ENERGY * there
 
 
-@inlined
-def _apply(system, st, work):
-    """Change the velocities by the impulses."""
+@kernel
+def _apply(system, st, rec, log, scratch, count, tiny):
+    """Change the velocities by the impulses; log the impacts of contacts that these push, or that have approached."""
+    u = len(system.rest)
     for i in range(len(st.v)):
         total = 0.0
-        for r in range(len(work.impulse)):
-            total += system.J[r, i] * work.impulse[r]
+        for row in range(2 * u):
+            total += system.J[row, i] * scratch.impulse[row]
         st.v[i] += total / system.mass[i]
+    for p in range(count):
+        r = scratch.listed[p]
+        before, push, drag = scratch.before_impact[r], scratch.impulse[r], scratch.impulse[u + r]
+        if push > 0.0 or before < -tiny:
+            after, loss = row_speed(system, r, st.v), 0.0
+            for row in (r, u + r):
+                loss -= 0.5 * scratch.impulse[row] * (scratch.before_impact[row] + row_speed(system, row, st.v))
+            log_impact(system, st, rec, log, r, before, after, push, drag, loss)
+    for row in range(2 * u):  # of the whole impact: contributions of single rows may be negative
+        if scratch.impulse[row] != 0.0:
+            st.ledger[IMPACT_LOSS] -= (
+                0.5 * scratch.impulse[row] * (scratch.before_impact[row] + row_speed(system, row, st.v))
+            )
 
 
 @inlined
-def _add_loss(system, st, work):
-    """Enter the loss of the whole impact by its impulses, J: contributions of single rows may be negative."""
-    for r in range(len(work.impulse)):
-        if work.impulse[r] != 0.0:
-            st.ledger[IMPACT_LOSS] -= 0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
-
-
-@inlined
-def _log_impact(system, st, rec, log, work, r):
-    """Count and log an impact of a rigid contact, with the energy that it takes."""
-    u = len(system.rest)
-    before, after, loss = work.before_impact[r], row_speed(system, r, st.v), 0.0
-    for row in (r, u + r):
-        loss -= 0.5 * work.impulse[row] * (work.before_impact[row] + row_speed(system, row, st.v))
-    note_impact(system, st, rec, log, r, before, after, work.impulse[r], work.impulse[u + r], loss)
-
-
-@inlined
-def note_impact(system, st, rec, log, r, before, after, normal, tangential, loss):
+def log_impact(system, st, rec, log, r, before, after, normal, tangential, loss):
     """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
@@ -221,85 +215,82 @@ def log_event(system, st, log, kind, r, before, after, normal, tangential, loss)
     entry = log[st.counters[LOGGED]]
     st.counters[LOGGED] += 1
     entry[0] = st.counters[PERIOD] * system.period + st.time[0]
-    entry[1], entry[2], entry[3], entry[4], entry[5], entry[6] = kind, r, before, after, normal, tangential
-    entry[7] = loss
+    entry[1], entry[2], entry[3], entry[4] = kind, r, before, after
+    entry[5], entry[6], entry[7] = normal, tangential, loss
 
 
 @kernel
-def _complete_chatter(system, st, work, count, tiny):
+def _complete_chatter(system, st, scratch, count, tiny):
     """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
     The step is one of Moreau's scheme, and one for all of them: over steps of several lengths the forces of contacts at
     rest would push others more, or less, than they do. A chatter takes 1/(1 - k) times its next flight. Returns False
     if that cannot be decided.
     """
-    slow, near, flight = _FAR * _accelerate(system, st, work), False, 1.0
+    slow, near, flight = _FAR * _accelerate(system, st, scratch), False, 1.0
     for p in range(count):
-        speed = row_speed(system, work.listed[p], st.v)
+        speed = row_speed(system, scratch.listed[p], st.v)
         if tiny < speed < slow:
-            near, flight = True, min(flight, max(1.0 - restitution_at(system, work.listed[p], speed), _SHORTEST_FLIGHT))
+            near, flight = (
+                True,
+                min(flight, max(1.0 - restitution_at(system, scratch.listed[p], speed), _SHORTEST_FLIGHT)),
+            )
     if not near:
         return True
-    if not _short_step(system, st, work, count, flight):
+    if not _short_step(system, st, scratch, count, flight):
         return False
     near = False
     for p in range(count):
-        r = work.listed[p]
-        work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else 0
-        near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
+        r = scratch.listed[p]
+        scratch.slips[p] = _PUSHES if scratch.impulse[r] > 0.0 else 0
+        near = near or (scratch.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
     if near:
-        _stop(system, st, work, count, tiny, slow, 1.0 - FRICTION_EDGE)
+        _stop(system, st, scratch, count, tiny, slow, 1.0 - FRICTION_EDGE)
     return True
 
 
 @kernel
-def stop_wedged(system, st, rec, log, work):
+def stop_wedged(system, st, rec, log, scratch):
     """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
 
     They are those of a step of Moreau's scheme in the limit of short ones. Slips that the loads turn within it stop.
     Returns False if there are none.
     """
-    u, count = len(system.rest), _list_closed(system, st, work)
+    u, count = len(system.rest), _list_closed(system, st, scratch)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
-    slow = _FAR * _accelerate(system, st, work)
-    if not _short_step(system, st, work, count, 1.0):
+    slow = _FAR * _accelerate(system, st, scratch)
+    if not _short_step(system, st, scratch, count, 1.0):
         return False
     for r in range(2 * u):
-        work.before_impact[r] = row_speed(system, r, st.v)
-    _apply(system, st, work)
+        scratch.before_impact[r] = row_speed(system, r, st.v)
+    _apply(system, st, rec, log, scratch, count, math.inf)
     for p in range(count):
-        if work.impulse[work.listed[p]] > 0.0:
-            _log_impact(system, st, rec, log, work, work.listed[p])
-    _add_loss(system, st, work)
-    for p in range(count):
-        r, slip = work.listed[p], work.speed[u + work.listed[p]]
-        for o in range(2 * u):
-            slip += system.delassus[u + r, o] * work.impulse[o]
+        r = scratch.listed[p]
+        slip = after_impulses(system, u + r, scratch.impulse, scratch.speed[u + r])
         turns = has_friction(system, r) and slip * row_speed(system, u + r, st.v) < 0.0
         turns = turns and abs(row_speed(system, r, st.v)) <= tiny
-        work.slips[p] = _PUSHES if work.impulse[r] > 0.0 else (_TURNS if turns else 0)
-    _stop(system, st, work, count, tiny, slow, math.inf)
+        scratch.slips[p] = _PUSHES if scratch.impulse[r] > 0.0 else (_TURNS if turns else 0)
+    _stop(system, st, scratch, count, tiny, slow, math.inf)
     return True
 
 
 @inlined
-def _accelerate(system, st, work):
-    """Set accelerations of the rows (work.speed) without contact forces. Returns the speed they give in CHATTER."""
+def _accelerate(system, st, scratch):
+    """Set accelerations of the rows (scratch.speed) without contact forces. Returns the speed they give in CHATTER."""
     u, largest = len(system.rest), 0.0
     for r in range(u - len(system.tangential)):
-        work.sliding[r] = 0
+        scratch.sliding[r] = 0
         if r >= system.contacts or (is_compliant(system, r) and has_friction(system, r) and st.state[r] < OPEN):
-            slip = row_speed(system, u + r, st.v)
-            work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
-    loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
+            scratch.sliding[r] = direction(system, st, r, AT_REST * st.scale[0])
+    loaded_acceleration(system, st, scratch, st.q, st.v, st.time[0])
     for r in range(2 * u):
-        largest = max(largest, abs(work.speed[r]))
+        largest = max(largest, abs(scratch.speed[r]))
     return largest * CHATTER * system.period
 
 
 @inlined
-def _short_step(system, st, work, count, fraction):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme, a fraction of CHATTER long. False if none exist.
+def _short_step(system, st, scratch, count, fraction):
+    """Find the impulses (scratch.impulse) of a step of Moreau's scheme, a fraction of CHATTER long. False if none.
 
     Speeds of so short a step may be so small that round-off of the motion contradicts rows that depend on each other:
     then they are measured by the motion.
@@ -308,17 +299,17 @@ def _short_step(system, st, work, count, fraction):
     for i in range(len(st.v)):
         motion += system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
-        r = work.listed[p]
-        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
-        work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0, system.limit) or solve_rows(
-        system, work, count, work.speed, STEP_SCALE * math.sqrt(motion), system.limit
+        r = scratch.listed[p]
+        scratch.speed[r] = row_speed(system, r, st.v) + ahead * scratch.speed[r]
+        scratch.speed[u + r] = row_speed(system, u + r, st.v) + ahead * scratch.speed[u + r]
+    return solve_rows(system, scratch, count, scratch.speed, 0.0, system.limit) or solve_rows(
+        system, scratch, count, scratch.speed, STEP_SCALE * math.sqrt(motion), system.limit
     )
 
 
 @inlined
-def _stop(system, st, work, count, tiny, slow, most):
-    """Stop contacts that push or turn (work.slips), those that stick with their slips, and whom that drives together.
+def _stop(system, st, scratch, count, tiny, slow, most):
+    """Stop contacts that push or turn (scratch.slips), with their slips if they stick, and whom that drives together.
 
     most: fraction of its bound below which friction counts as that of a contact that sticks.
     """
@@ -326,19 +317,19 @@ def _stop(system, st, work, count, tiny, slow, most):
     for i in range(len(st.v)):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
-        r = work.listed[p]
-        normal = work.impulse[r]
-        if work.slips[p] != 0:
-            found = _stop_row(system, st, work, r, found)
-            sticks = work.slips[p] == _TURNS or abs(work.impulse[u + r]) < most * system.friction[r] * normal
+        r = scratch.listed[p]
+        normal = scratch.impulse[r]
+        if scratch.slips[p] != 0:
+            found = _stop_row(system, st, scratch, r, found)
+            sticks = scratch.slips[p] == _TURNS or abs(scratch.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
-                found = _stop_row(system, st, work, u + r, found)
+                found = _stop_row(system, st, scratch, u + r, found)
     again = found > 0
     while again:
         again = False
         for p in range(count):
-            if row_speed(system, work.listed[p], st.v) < -tiny:
-                more = _stop_row(system, st, work, work.listed[p], found)
+            if row_speed(system, scratch.listed[p], st.v) < -tiny:
+                more = _stop_row(system, st, scratch, scratch.listed[p], found)
                 again, found = again or more > found, more
     for i in range(len(st.v)):
         loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
@@ -346,13 +337,13 @@ def _stop(system, st, work, count, tiny, slow, most):
 
 
 @inlined
-def _stop_row(system, st, work, row, found):
+def _stop_row(system, st, scratch, row, found):
     """Take a row's speed out of the velocities, and keep it stopped. Returns the number of directions stopped."""
-    more = extend_basis(system, work, row, found)
+    more = extend_basis(system, scratch, row, found)
     if more > found:
         part = 0.0
         for i in range(len(st.v)):
-            part += work.span[found, i] * math.sqrt(system.mass[i]) * st.v[i]
+            part += scratch.span[found, i] * math.sqrt(system.mass[i]) * st.v[i]
         for i in range(len(st.v)):
-            st.v[i] -= work.span[found, i] * part / math.sqrt(system.mass[i])
+            st.v[i] -= scratch.span[found, i] * part / math.sqrt(system.mass[i])
     return more

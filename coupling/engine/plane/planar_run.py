@@ -1,4 +1,4 @@
-"""A run of the exact engine for bodies with extent."""
+"""A run of the exact engine for planar bodies."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import ClassVar
 import numpy as np
 
 from vanedamp.coupling.engine.plane.automaton import advance, begin
-from vanedamp.coupling.engine.plane.contact_flow import add_flow, empty_flows
-from vanedamp.coupling.engine.plane.segments import event_of, segment_of
-from vanedamp.coupling.engine.plane.state import new_guards, new_scratch, new_state
+from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratch, new_state
+from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.engine.run import EventDrivenRun
-from vanedamp.coupling.numerics.codes import BOUNDED, DONE, REDUCED, UNDECIDED
+from vanedamp.coupling.numerics.codes import BOUNDED, DONE, FLOW, PERIOD, REDUCED, ROOT, UNDECIDED
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
 from vanedamp.coupling.response.recorder import plane_of
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, Records
 from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.segment import Begun, Event, Segment
+from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
@@ -37,7 +36,7 @@ class PlanarRun(EventDrivenRun):
         super().__init__(system, records, events, max_events)
         self.system, self.linearisation, self.flows = system, linearisation, empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.state, self.guards = new_state(system, modes, initial, records), new_guards(system, modes)
+        self.state, self.watched = new_state(system, modes, initial), new_event_functions(system, modes)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
 
     def reuse(self, earlier: PlanarRun) -> None:
@@ -53,21 +52,49 @@ class PlanarRun(EventDrivenRun):
 
     def _advance(self, periods: int, max_events: int) -> int:
         return int(advance(
-            self.system, self.flows, self.state, self.guards, self.records, self.log, self.scratch, periods, max_events
+            self.system, self.flows, self.state, self.watched, self.records, self.log, self.scratch, periods, max_events
         ))  # fmt: skip
 
     def _add_flow(self) -> None:
         self.flows = add_flow(self.flows, self.system, self.state.state)
 
     def _segment(self) -> Segment:
-        self.guards.status[:] = BOUNDED  # roots of other segments are none of this
-        return segment_of(self.system, self.flows, self.state)
+        self.watched.status[:] = BOUNDED  # roots of other segments are none of this
+        st, flows = self.state, self.flows
+        s = int(st.counters[FLOW])
+        modes = slice(int(flows.modes[s]))
+        rate, shape = flows.eigenvalue[s, modes].copy(), flows.motion[s, :, modes].copy()
+        none = np.zeros(len(rate), complex)
+        return Segment(
+            system=self.system, period=int(st.counters[PERIOD]), time=float(st.time[0]), state=st.state.copy(),
+            q=st.q.copy(), v=st.v.copy(), bend=st.bend.copy(), speed=float(st.scale[0]), rate=rate,
+            amplitude=st.amplitude[modes].copy(), shape=shape, rate_shape=shape * rate, force=st.force.copy(),
+            force_shape=flows.force[s, :, modes].copy(), drive=none, driver=none, open_force=st.prestress.copy(),
+        )  # fmt: skip
 
     def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
-        return event_of(self.system, self.state, self.guards, self.scratch, log, since)
+        system, st, watched = self.system, self.state, self.watched
+        unit, what, elapsed, u = -1, 0, 0.0, len(system.rest)
+        if since is not START:
+            roots = np.flatnonzero(watched.status == ROOT)
+            first = roots[np.argmin(watched.no_root_before[roots])]
+            unit, what = int(watched.unit[first]), int(watched.what[first])
+            elapsed = float(st.time[0]) - since.time
+        hits = np.concatenate([*log, np.zeros((0, WIDTH))])
+        hits = hits[hits[:, 1] == IMPACT]
+        struck, impulse, compression = hits[:, 2].astype(int), np.zeros(2 * u), np.zeros(2 * u)
+        np.add.at(impulse, struck, hits[:, 5])
+        np.add.at(impulse, u + struck, hits[:, 6])
+        if system.two_phases and len(struck):
+            compression = self.scratch.compression.copy()
+        return elapsed, no_event(system)._replace(
+            unit=unit, what=what, impulse=impulse, compression=compression, struck=struck, before=hits[:, 3],
+            after=hits[:, 4], loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
+            reduced=int(st.counters[REDUCED]) > since.reduced,
+        )  # fmt: skip
 
     def _left(self) -> RestartState:
         return state_at(self.system, Motion(self.state.q, self.state.v))
 
     def _plane(self) -> Plane:
-        return plane_of(self.system, self.state, self.linearisation)
+        return plane_of(self.system, self.records, self.linearisation)

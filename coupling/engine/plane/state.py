@@ -1,4 +1,4 @@
-"""The state of a run of bodies with extent, and scratch space. Sizes as in constraints.System; m modes."""
+"""The state of a run of planar bodies, and scratch space. Sizes as in System; m modes."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
-from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
 
 @record
-class PlanarState(NamedTuple):
+class State(NamedTuple):
     """The state at the start of a segment."""
 
     # changes all the time
@@ -38,10 +38,6 @@ class PlanarState(NamedTuple):
     pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
     lost: np.ndarray  # (u,) what it has taken since then, J
     ledger: np.ndarray  # (6,) J
-    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
-    lifted: np.ndarray  # (periods + 1, b) time off the floor, s
-    sampled: np.ndarray  # (samples, N) coordinates
-    shut: np.ndarray  # (samples, u) int: whether contacts are closed
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
@@ -51,11 +47,11 @@ class PlanarState(NamedTuple):
 
 
 @record
-class Guards(NamedTuple):
+class EventFunctions(NamedTuple):
     """The event functions of a segment."""
 
     unit: np.ndarray  # (k,) int
-    order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of exact.root_search
+    order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of engine.root_search
     # (k,) int: CLOSES, OPENS, a gap; STOPS, a slip; PARTS, a normal force vanishes; RECLOSES, it would push again;
     # AT_LOW, AT_HIGH, friction at its bound
     what: np.ndarray
@@ -96,7 +92,7 @@ class Scratch(NamedTuple):
     resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and what it does then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
-    split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)
+    split: Lemke  # the problem with friction split in two (friction_problem._solve_split)
     part: np.ndarray  # (4u,) int: kind of each of its unknowns
     column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
     attempt: np.ndarray  # (1,) int: how often a decision has been made anew
@@ -109,28 +105,26 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) complex
 
 
-def new_state(system: System, modes: int, initial: Motion, records: Records) -> PlanarState:
+def new_state(system: System, modes: int, initial: Motion) -> State:
     """Return the state at time zero. A spring that is compressed pushes, or lags behind the body that leaves it."""
-    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
-    samples, sprung = len(records.samples), np.isfinite(system.spring)
+    u, size, sprung = len(system.rest), len(system.mass), np.isfinite(system.spring)
     gap, speed = system.rest + system.J[:u] @ initial.q, system.J[:u] @ initial.v
     pushes = np.where(sprung, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
     state = np.where(sprung & (gap < -SIMULTANEOUS * system.play), np.where(pushes, SLIP_RIGHT, LEAVING), OPEN)
-    return PlanarState(
+    return State(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
-        lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
-        sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
+        lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
         prestress=np.zeros(2 * u),
     )  # fmt: skip
 
 
-def new_guards(system: System, modes: int) -> Guards:
+def new_event_functions(system: System, modes: int) -> EventFunctions:
     """Return room for three event functions a unit."""
     k = 3 * len(system.rest)
-    return Guards(
+    return EventFunctions(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
         status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
         no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), expansion=new_expansion(modes),

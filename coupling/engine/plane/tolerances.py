@@ -1,4 +1,4 @@
-"""Tolerances of the engine for bodies in the plane. Every comment says what the number is multiplied by.
+"""Tolerances of the engine for planar bodies. Every comment says what the number is multiplied by.
 
 Those that other layers share are in numerics.tolerances. `play` is the system's scale of each gap.
 """
@@ -28,7 +28,7 @@ AT_REST = 10 * SPEED_ROUND_OFF
 DOUBTFUL, DOUBTFUL_LATER = 1e-9, 1e-12
 #: times the sum of the absolute values of its terms: a force further beyond its bound violates it
 BEYOND = 1e-9
-#: times the largest force: a contact that pulls, or has_friction, more than this violates its law
+#: times the largest force: a contact that pulls, or rubs, more than this violates its law
 BROKEN = 1e-6
 #: distance of an elongation from its bound, times the bound, and times its terms, at which it has reached it
 NEAR_BOUND, NEAR_BOUND_TERMS = 1e-12, 1e-15
@@ -45,7 +45,7 @@ FRICTION_EDGE = 1e-9
 #: least size of the problem of a short step, times the motion: round-off is below the resolution of a pivot then
 STEP_SCALE = 1e-4
 
-# --- constraints and modes (contact_flow)
+# --- constraints and modes (subsystem_assembly)
 #: singular values, times the largest, below which rows or wrenches depend on each other
 SINGULAR = 1e-9
 #: acceleration left in constraints per unit load, beyond which forces are computed without the square of the rows'

@@ -67,11 +67,7 @@ def _around(options: Sequence[Sequence[int]], begin: Sequence[int]) -> Iterator[
     units = [unit for unit, choice in enumerate(others) if choice]
     for count in range(1, len(units) + 1):
         for changed in combinations(units, count):
-            for states in product(*(others[unit] for unit in changed)):
-                at = list(begin)
-                for unit, state in zip(changed, states, strict=True):
-                    at[unit] = state
-                yield tuple(at)
+            yield from product(*(others[unit] if unit in changed else [at] for unit, at in enumerate(begin)))
 
 
 def decide(

@@ -26,7 +26,7 @@ _DEPENDENT = 1e-9
 #: fraction of a row's motion by which forces may fail to hold it
 _LOST = 1e-7
 #: gaps below these fractions of the play, and of the terms that they are sums of, are closed; the second ones are those
-#: of rigid bodies with extent, whose corners are to meet a surface together
+#: of rigid planar bodies, whose corners are to meet a surface together
 _TOUCH, _TOUCH_EXTENDED = (0.0, 2e-14), (1e-11, 10 * ROUND_OFF)
 
 States = tuple[int, ...]
@@ -75,7 +75,7 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
-        self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a body with extent
+        self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a planar body
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:

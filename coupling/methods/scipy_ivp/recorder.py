@@ -43,10 +43,7 @@ class Recorder:
         self.impact_loss, self.spring_loss = 0.0, 0.0
         self.log: list[list[float]] = []
         self.begun: dict[int, tuple[list[float], np.ndarray]] = {}
-        of_bodies = len(records.peak), len(system.along)
-        self.tilt, self.lifted = np.zeros(of_bodies), np.zeros(of_bodies)
-        self.sampled = np.zeros((len(records.samples), free.n))
-        self.shut, self.state = np.zeros((len(records.samples), free.u), np.int8), np.full(free.u, OPEN)
+        self.state = np.full(free.u, OPEN)
         self.tilts = np.flatnonzero(system.tilt >= 0)
         self.watched, self.speeds = np.zeros((2, 1 + len(self.tilts), free.extent))
         self.watched[0, free.q] = self.speeds[0, free.v] = system.response
@@ -152,7 +149,8 @@ class Recorder:
         note_step(self.records, self.period, t - begun, before[0], value[0], rate_before[0], rate[0])
         for i, body in enumerate(self.tilts, 1):
             extremum = cubic_extremum(t - begun, before[i], value[i], rate_before[i], rate[i])
-            self.tilt[self.period, body] = max(self.tilt[self.period, body], abs(value[i]), abs(extremum))
+            tilt = self.records.tilt[self.period]
+            tilt[body] = max(tilt[body], abs(value[i]), abs(extremum))
         self.last = t, value, rate
 
     def flight(self, duration: float) -> None:
@@ -160,7 +158,7 @@ class Recorder:
         stands = np.zeros(len(self.system.along), bool)
         stands[self.system.body[self.on_floor & (self.state != OPEN)]] = True
         lifted = ~stands & (self.system.tilt >= 0)
-        self.lifted[self.period, lifted] += duration
+        self.records.lifted[self.period, lifted] += duration
 
     def _sample(self, index: int, t: float, y: np.ndarray) -> None:
         if index < len(self.records.samples):
@@ -168,7 +166,7 @@ class Recorder:
             x = self.watched[0] @ self.free.extended(t, y[: self.free.size])
             self.records.samples[index] = [x, *(q[self.system.along] - self.system.floor @ q)]
             self.records.coordinates[index] = q[: self.records.coordinates.shape[1]]
-            self.sampled[index], self.shut[index] = q, self.state != OPEN
+            self.records.sampled[index], self.records.shut[index] = q, self.state != OPEN
 
     # -- events
 

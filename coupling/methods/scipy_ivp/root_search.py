@@ -15,11 +15,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 _DEGREE = 8
-#: where the functions are sampled, as shares of the step
+#: where the functions are sampled, as fractions of the step
 NODES = (1 - np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)) / 2
-#: intervals that are halved no more, as a share of the step
+#: length of intervals that are halved no more, times the step
 _SHORTEST = 1e-14
-#: coefficients below this share of the function's size in the step are round-off
+#: round-off of coefficients, times the size of the function in the step
 _ROUND_OFF = 1e-14
 _TINY = float(np.finfo(float).tiny)
 

@@ -10,11 +10,12 @@ motion nor search nor decisions nor impacts. Closed contacts and what sticks are
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import DOP853
 
 from vanedamp.coupling.methods.scipy_ivp import Options
-from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact, impact
 from vanedamp.coupling.methods.scipy_ivp.motion import (
@@ -28,6 +29,7 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Unforced,
 )
 from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
+from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.recorder import plane_of
@@ -57,6 +59,21 @@ _CHATTER, _ELASTIC = 3e-7, 0.1
 _FAST = 100.0
 #: motions that are kept, by the states of the units
 _KEPT = 256
+
+
+class Arc(NamedTuple):
+    """Motion between two events: states (size, k) at the points t (k,) of a grid, and its end.
+
+    event: index of the event function, None at the end of the grid; duration, last: time since the start, state there.
+    """
+
+    t: np.ndarray
+    y: np.ndarray
+    event: int | None
+    duration: float
+    last: np.ndarray
+    evaluations: int
+    failed: bool = False
 
 
 class IvpRun:
@@ -102,16 +119,17 @@ class IvpRun:
     def outcome(self) -> Outcome:
         """Return the results of the run."""
         record, system = self.record, self.system
+        rows, plane = rows_of_line(system), None
+        if system.in_plane:
+            rows, plane = rows_of_units(system), plane_of(system, record.records, self.options.linearisation)
+        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
+        log, bound = [np.array(record.log)] if record.log else [], _OPEN_LEDGER * max(self.options.rtol, _LEAST)
         return Outcome(
-            system, record.records, record.period, self.events, _OPEN_LEDGER * max(self.options.rtol, _LEAST),
-            {"impacts": record.impacts, "evaluations": self.evaluations},
-            [np.array(record.log)] if record.log else [], (rows_of_units if record.plane else rows_of_line)(system),
-            max(record.deep, 0.0), plane_of(system, record, self.options.linearisation) if record.plane else None,
-        )  # fmt: skip
+            system, record.records, record.period, self.events, bound, numbers, log, rows, max(record.deep, 0.0), plane
+        )
 
     def final(self) -> None:
         """Return None: the states of contacts are no part of a motion that another run could begin with."""
-        return None
 
     # -- motion between events
 
@@ -147,21 +165,44 @@ class IvpRun:
         return Status.OK
 
     def _integrate(self, grid: np.ndarray) -> Arc:
-        """Return the motion from now to the first event, or to the end of the grid."""
-        free, guard = self.free, self.guard
-        return integrate(
-            self.rate, self.y, self.time, grid, lambda t, y: guard @ free.extended(t, y[: free.size]), self.order,
-            self.options.rtol, self.absolute, self._first_step(), self.step,
+        """Return the motion from now to the first event, or to the end of the grid, by scipy's DOP853."""
+        free, time, order, far = self.free, self.time, self.order, grid - self.time
+        solver = DOP853(
+            lambda tau, y: self.rate(time + tau, y), 0.0, self.y, far[-1], max_step=self.step,
+            rtol=self.options.rtol, atol=self.absolute, first_step=min(self._first_step(), far[-1]),
         )  # fmt: skip
+        states, reached, root = [], 0, None
+        while solver.status == "running" and root is None:
+            solver.step()
+            if solver.status == "failed":
+                return Arc(grid[:0], self.y[:, None][:, :0], None, 0.0, self.y, solver.nfev, True)
+            piece, now, last = solver.dense_output(), solver.t, solver.y
+            if len(order):
+                at = solver.t_old + NODES * (solver.t - solver.t_old)
+                root = first_root(self.guard @ free.extended(time + at, piece(at)[: free.size]), order)
+            if root is not None:
+                now = solver.t_old + root[0] * (solver.t - solver.t_old)
+                last = piece(now)
+            # an event may fall on a point of the grid, which round-off must not leave out
+            passed = np.count_nonzero((far <= now) | (grid <= time + now))
+            states += [piece(tau) for tau in far[reached:passed]]
+            order, reached = np.zeros_like(order), passed
+        points = np.array(states).reshape(reached, len(self.y)).T
+        return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
+        """Return twice the time to the first event by the functions' parabolas: round-off is that of the flight, s."""
         now = self.free.extended(self.time, self.y[: self.free.size])
         # accelerations of what leaves by its third derivative are round-off
         early = self.order < 3
         guard, order, rate = self.guard[early], self.order[early], self.motion.rate @ now
         value = np.where(order > 0, 0.0, guard @ now)
         slope, curvature = guard @ rate, guard @ (self.motion.rate @ rate)
-        return first_step(value, slope, curvature, _SHORTEST * self.system.period, self.step)
+        with np.errstate(all="ignore"):
+            root = np.sqrt(slope**2 - 2 * curvature * value)
+            times = np.where(slope > 0, -(slope + root) / curvature, 2 * value / (root - slope))
+        times = times[np.isfinite(times) & (times > 0)]
+        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.system.period, self.step))
 
     def _linear(self, states: States) -> np.ndarray:
         motion = self.motions(states)

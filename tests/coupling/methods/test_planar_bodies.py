@@ -202,15 +202,15 @@ def test_solve_ivp_and_the_exact_engine_agree(friction):
     np.testing.assert_allclose(ours[:, 0], theirs[:, 0], rtol=1e-8)
     np.testing.assert_allclose(ours[:, 3:], theirs[:, 3:], rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(run.record.records.samples, exact.records.samples, rtol=1e-8, atol=1e-12)
-    np.testing.assert_array_equal(run.record.shut, exact.state.shut)
-    np.testing.assert_allclose(run.record.sampled, exact.state.sampled, rtol=1e-8, atol=1e-12)
+    np.testing.assert_array_equal(run.record.records.shut, exact.records.shut)
+    np.testing.assert_allclose(run.record.records.sampled, exact.records.sampled, rtol=1e-8, atol=1e-12)
     for name in ("peak", "harmonic", "square", "momentum", "section", "collided", "ledger", "parts"):
         theirs = getattr(exact.records, name)
         np.testing.assert_allclose(
             getattr(run.record.records, name), theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max(), err_msg=name
         )
-    assert run.record.tilt[0, 0] == pytest.approx(exact.state.tilt[0, 0], rel=1e-7)
-    assert run.record.lifted[0, 0] == pytest.approx(exact.state.lifted[0, 0], rel=1e-7)
+    assert run.record.records.tilt[0, 0] == pytest.approx(exact.records.tilt[0, 0], rel=1e-7)
+    assert run.record.records.lifted[0, 0] == pytest.approx(exact.records.lifted[0, 0], rel=1e-7)
 
 
 def random_errors(seeds, samples=32, **solver):

@@ -12,7 +12,7 @@ All is computed in coordinates sqrt(M) q, where the mass matrix is one.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eig, null_space, orth
@@ -34,9 +34,12 @@ from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
 from vanedamp.coupling.system.system import System
 
+#: bytes that the flows of one run may take
+_ROOM = 2**28
+
 
 @record
-class ContactFlows(NamedTuple):
+class Flows(NamedTuple):
     """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
 
     key: np.ndarray  # (s, u) int: the states
@@ -44,7 +47,7 @@ class ContactFlows(NamedTuple):
     eigenvalue: np.ndarray  # (s, m)
     project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
     offset: np.ndarray  # (s, m)
-    in_phase: np.ndarray  # (s, m, e): share of the real part of the phase of each harmonic in c
+    in_phase: np.ndarray  # (s, m, e): contribution of the real part of the phase of each harmonic to c
     in_quadrature: np.ndarray  # (s, m, e): of the imaginary part
     motion: np.ndarray  # (s, N, m): q of each mode
     rows: np.ndarray  # (s, 2u, m): J motion
@@ -64,14 +67,14 @@ class ContactFlows(NamedTuple):
     fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
 
 
-def empty_flows(system: System, capacity: int = 8) -> ContactFlows:
+def empty_flows(system: System, capacity: int = 8) -> Flows:
     """Room for `capacity` flows."""
     size, u, e = len(system.mass), len(system.rest), len(system.frequency)
     springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
     m = e + 2 * len(_stretched(system, springs))
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
-    return ContactFlows(
+    return Flows(
         key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
         project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
@@ -81,25 +84,20 @@ def empty_flows(system: System, capacity: int = 8) -> ContactFlows:
     )  # fmt: skip
 
 
-def add_flow(flows: ContactFlows, system: System, state: np.ndarray) -> ContactFlows:
+def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
     """The stack with the flow of the states (u,) in its first free place.
 
     Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
     """
-    free = np.flatnonzero(flows.modes == 0)
-    if len(free) == 0:
-        if sum(part.nbytes for part in flows) > _ROOM:
-            flows = empty_flows(system, len(flows.modes))
-        else:
-            more = empty_flows(system, len(flows.modes))
-            flows = ContactFlows(*(np.concatenate(pair) for pair in zip(flows, more, strict=True)))
-        free = np.flatnonzero(flows.modes == 0)
-    _fill(flows, system, int(free[0]), state)
+    flow = _flow(system, state)
+    if flows.modes.all():
+        more = empty_flows(system, len(flows.modes))
+        full = sum(part.nbytes for part in flows) > _ROOM
+        flows = more if full else Flows(*(np.concatenate(pair) for pair in zip(flows, more, strict=True)))
+    s = int(np.argmin(flows.modes != 0))
+    for name, value in flow.items():
+        getattr(flows, name)[(s, *map(slice, np.shape(value)))] = value
     return flows
-
-
-#: bytes that the flows of one run may take
-_ROOM = 2**28
 
 
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
@@ -119,30 +117,68 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     return basis
 
 
-def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> None:
-    u, e, size = len(system.rest), len(system.frequency), len(system.mass)
-    root = np.sqrt(system.mass)
-    rows = system.J / root
-    units = np.arange(u)
-    compliant = np.isfinite(system.spring)
-    closed = np.flatnonzero((state < OPEN) & (units < system.contacts) & ~compliant)
-    pressed = np.flatnonzero((state < OPEN) & compliant)
-    stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
-    way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
-    kept = np.r_[closed, u + stick]
-    constraints = rows[kept]
-    drag = way * system.friction
-    wrench = np.vstack([rows[closed] - drag[closed, None] * rows[u + closed], rows[u + stick]]).T
-    sliders = len(system.tangential)
-    holds, follows = (np.flatnonzero((state[u - sliders :] == STICK) == rests) for rests in (True, False))
-    # a slider that moves hands its force on to what draws it
-    drawn = rows[u:].copy()
-    drawn[u - sliders :] += system.elongation / root
-    slides = np.flatnonzero((units >= system.contacts) & (way != 0))
-    applied = -(way * system.limit)[slides] @ drawn[slides]
-    carried, oblique = _forces(constraints, wrench)
+class _Contacts:
+    """What units do in their states (u,), in coordinates sqrt(M) q.
+
+    closed, pressed: rigid and compliant contacts with forces; stick: units whose slips are kept at rest; slides:
+    friction elements that slip. kept (k,): the rows at rest; wrench (N, k): directions of their forces; push (N, p): of
+    those of springs; drag (u,): friction per normal force; drawn (u, N): slips, a slider's with what draws it.
+    """
+
+    def __init__(self, system: System, state: np.ndarray) -> None:
+        u, units, compliant = len(state), np.arange(len(state)), np.isfinite(system.spring)
+        self.root, self.u = np.sqrt(system.mass), u
+        rows = self.rows = system.J / self.root
+        rigid, way = (units < system.contacts) & ~compliant, (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
+        self.closed, self.pressed = np.flatnonzero((state < OPEN) & rigid), np.flatnonzero((state < OPEN) & compliant)
+        self.touching = np.flatnonzero((state != OPEN) & rigid)
+        self.stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
+        self.slides = np.flatnonzero((units >= system.contacts) & (way != 0))
+        self.kept = np.r_[self.closed, u + self.stick]
+        self.drag, self.known = way * system.friction, -(way * system.limit)[self.slides]
+        sliding, push = (
+            rows[which] - self.drag[which, None] * rows[u + which] for which in (self.closed, self.pressed)
+        )
+        self.wrench, self.push = np.vstack([sliding, rows[u + self.stick]]).T, push.T
+        # a slider that moves hands its force on to what draws it
+        self.drawn = rows[u:].copy()
+        self.drawn[u - len(system.tangential) :] += system.elongation / self.root
+
+    def spread(self, kept: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the forces (2u, ...) of all rows from those of the kept rows (k, ...) and of springs (p, ...)."""
+        acting, count = np.r_[self.closed, self.pressed], len(self.closed)
+        forces = np.zeros((2 * self.u, *kept.shape[1:]), kept.dtype)
+        forces[self.closed], forces[self.pressed] = kept[:count], pushes
+        forces[self.u + acting] = -(self.drag[acting] * forces[acting].T).T
+        forces[self.u + self.stick] = kept[count:]
+        return forces
+
+    def projectors(self) -> dict[str, np.ndarray]:
+        """Return the entries of Flows that bring gaps, slips and forces to what they must be."""
+        u, rows, root, kept, drawn = self.u, self.rows, self.root, self.kept, self.drawn
+        self_stress = np.zeros((2 * u, 2 * u))
+        close_gaps, stop_rows = np.zeros((len(root), u)), np.zeros((len(root), 2 * u))
+        if len(kept):
+            lever = np.linalg.norm(self.wrench, axis=0)
+            balanced = null_space(self.wrench / lever, rcond=SINGULAR)
+            self_stress[:, kept] = self.spread(balanced @ balanced.T / lever[:, None] * lever)
+        for target, which in ((close_gaps, self.touching), (stop_rows, np.r_[self.touching, u + self.stick])):
+            target[:, which] = np.linalg.pinv(rows[which], rcond=SINGULAR) / root[:, None]
+        free = drawn - drawn @ np.linalg.pinv(rows[kept], rcond=SINGULAR) @ rows[kept]
+        held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
+        return {"self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held}
+
+
+def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
+    """Return the entries of Flows for the states (u,), of as many modes as there are."""
+    e, size, sliders = len(system.frequency), len(system.mass), len(system.tangential)
+    contacts = _Contacts(system, state)
+    root, rows, pressed, push = contacts.root, contacts.rows, contacts.pressed, contacts.push
+    constraints = rows[contacts.kept]
+    holds, follows = (np.flatnonzero((state[len(state) - sliders :] == STICK) == rests) for rests in (True, False))
+    applied = contacts.known @ contacts.drawn[contacts.slides]
+    carried, oblique = _forces(constraints, contacts.wrench)
     stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
-    push = (rows[pressed] - drag[pressed, None] * rows[u + pressed]).T
     spring, dashpot = (part[pressed, None] * rows[pressed] for part in (system.spring, system.dashpot))
     stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
     if len(holds):
@@ -168,7 +204,6 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
-    count = e + len(eigenvalue)
     rate = np.r_[1j * system.frequency, eigenvalue]
     # constant part, of loads and of what constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
@@ -194,62 +229,32 @@ def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> Non
             part[a] = root[a] * (row[:-sliders] @ part[:-sliders])
     # a coordinate that constraints hold is at rest, not at round-off
     motion[np.abs(motion) <= HELD_ROUND_OFF * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
-    flows.key[s], flows.modes[s] = state, count
-    flows.eigenvalue[s, :count] = rate
+    motion = motion / root[:, None]
     both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
-    flows.project[s, e:count] = project @ np.vstack(both)
-    flows.project[s, e:count, :size] -= project[:, :k] @ rest_held * root
-    flows.offset[s, e:count] = project[:, :k] @ rest
-    full = np.vstack([wave, 1j * system.frequency * wave])
-    flows.in_phase[s, e:count], flows.in_quadrature[s, e:count] = project @ full.real, -(project @ full.imag)
-    flows.motion[s, :, :count] = motion / root[:, None]
-    turned = system.J @ flows.motion[s, :, :count]
-    terms = np.abs(system.J) @ np.abs(flows.motion[s, :, :count])
-    flows.rows[s, :, :count] = np.where(np.abs(turned) <= CANCELLED * terms, 0, turned)
-    flows.bend[s], flows.bend_held[s] = bend / root, bend_held / root[:, None] * root
-    flows.force[s], flows.force_constant[s], flows.force_held[s] = 0.0, 0.0, 0.0
-    for part, target in ((net, flows.force[s, :, :count]), (net_constant, flows.force_constant[s])):
-        _spread(target, carried @ part, closed, stick, drag, u)
-    _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
+    free, full = project @ np.vstack(both), np.vstack([wave, 1j * system.frequency * wave])
+    free[:, :size] -= project[:, :k] @ rest_held * root
+    turned, terms = system.J @ motion, np.abs(system.J) @ np.abs(motion)
     strained = inner.T @ eta
-    for part, target in (
-        (-spring @ strained - dashpot @ (strained * rate), flows.force[s, :, :count]),
-        (-preload - spring @ inner.T @ rest, flows.force_constant[s]),
-        (-spring @ (held + inner.T @ rest_held) * root, flows.force_held[s]),
-    ):
-        target[pressed] = part
-        target[u + pressed] -= (drag[pressed] * part.T).T
-    flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
-    flows.self_stress[s] = 0.0
-    if len(kept):
-        lever = np.linalg.norm(wrench, axis=0)
-        balanced = null_space(wrench / lever, rcond=SINGULAR)
-        spread = np.zeros((2 * u, len(kept)))
-        _spread(spread, balanced @ balanced.T / lever[:, None] * lever, closed, stick, drag, u)
-        flows.self_stress[s][:, kept] = spread
-    touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~compliant)
-    flows.close_gaps[s], flows.stop_rows[s] = 0.0, 0.0
-    flows.close_gaps[s][:, touching] = np.linalg.pinv(rows[touching], rcond=SINGULAR) / root[:, None]
-    still_rows = np.r_[touching, u + stick]
-    flows.stop_rows[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=SINGULAR) / root[:, None]
-    free = drawn - drawn @ np.linalg.pinv(constraints, rcond=SINGULAR) @ constraints
-    flows.held[s] = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
-    speeds = flows.motion[s, :, :count] * rate
-    drag = system.damping @ speeds
-    flows.drag[s, :, :count] = drag
-    flows.loss[s, :count, :count], flows.loss_apart[s, :count, :count] = speeds.T @ drag, speeds.T @ drag.conj()
-    flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
-    flows.fastest[s] = (np.abs(rate.real) + np.abs(rate.imag)).max()
 
+    def after_harmonics(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.zeros((e, *values.shape[1:])), values])
 
-def _spread(
-    target: np.ndarray, forces: np.ndarray, closed: np.ndarray, stick: np.ndarray, drag: np.ndarray, u: int
-) -> None:
-    """Put the forces of the kept rows, and the friction of those that slip, into their places."""
-    normal = forces[: len(closed)]
-    target[closed] = normal
-    target[u + closed] = -(drag[closed] * normal.T).T
-    target[u + stick] = forces[len(closed) :]
+    force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
+    force_constant[len(state) + contacts.slides] = contacts.known
+    speeds = motion * rate
+    damped = system.damping @ speeds
+    return {
+        "key": state, "modes": len(rate), "eigenvalue": rate, "project": after_harmonics(free),
+        "offset": after_harmonics(project[:, :k] @ rest), "in_phase": after_harmonics(project @ full.real),
+        "in_quadrature": after_harmonics(-(project @ full.imag)),
+        "motion": motion, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
+        "bend": bend / root, "bend_held": bend_held / root[:, None] * root,
+        "force": contacts.spread(carried @ net, -spring @ strained - dashpot @ (strained * rate)),
+        "force_constant": force_constant,
+        "force_held": contacts.spread(carried @ net_held * root, -spring @ (held + inner.T @ rest_held) * root),
+        "drag": damped, "loss": speeds.T @ damped, "loss_apart": speeds.T @ damped.conj(),
+        "growth": max(eigenvalue.real.max(initial=0.0), 0.0), "fastest": (np.abs(rate.real) + np.abs(rate.imag)).max(),
+    } | contacts.projectors()  # fmt: skip
 
 
 def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ from vanedamp.coupling.system.unit_kinematics import (
     is_closed,
     is_compliant,
     is_rigid,
+    is_slip,
     least_force,
     row_speed,
     spring_force,
@@ -35,10 +36,10 @@ _AT_BOUND = 4
 
 
 @kernel
-def free_acceleration(system, work, q, v, time):
-    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period.
+def free_acceleration(system, scratch, q, v, time):
+    """Accelerations (scratch.free) without contact forces, friction elements included, at a time within the period.
 
-    work.terms: sizes of the terms that they are sums of.
+    scratch.terms: sizes of the terms that they are sums of.
     """
     size = len(q)
     for i in range(size):
@@ -51,13 +52,13 @@ def free_acceleration(system, work, q, v, time):
             spring, dashpot = system.stiffness[i, k] * q[k], system.damping[i, k] * v[k]
             total -= spring + dashpot
             terms += abs(spring) + abs(dashpot)
-        work.free[i], work.terms[i] = total / system.mass[i], terms / system.mass[i]
+        scratch.free[i], scratch.terms[i] = total / system.mass[i], terms / system.mass[i]
     for j in range(len(system.tangential)):
         force = system.tangential[j] * elongation(system, j, q)
         for i in range(size - len(system.tangential)):
             part = system.elongation[j, i] * force / system.mass[i]
-            work.free[i] -= part
-            work.terms[i] += abs(part)
+            scratch.free[i] -= part
+            scratch.terms[i] += abs(part)
 
 
 @kernel
@@ -68,13 +69,12 @@ def move_sliders(system, state, q, v):
         r, a = len(system.rest) - sliders + j, size - sliders + j
         v[a] = 0.0
         if state[r] != STICK:
-            way = 1.0 if state[r] == SLIP_RIGHT else -1.0
-            q[a] += elongation(system, j, q) - way * system.limit[r] / system.tangential[j]
+            q[a] += elongation(system, j, q) - state[r] * system.limit[r] / system.tangential[j]
             v[a] = elongation(system, j, v)
 
 
 @kernel
-def _hold_sliders(system, st, work, slow):
+def _hold_sliders(system, st, scratch, slow):
     """Decide which sliders rest, and which what draws them moves: those whose springs are at their bounds.
 
     One whose spring is at its bound while what draws it is at rest is marked: its acceleration decides. Sliders that
@@ -89,155 +89,155 @@ def _hold_sliders(system, st, work, slow):
             terms += abs(part)
         for i in range(size - sliders):
             speed += system.elongation[j, i] * st.v[i]
-        most, way = system.limit[r] / system.tangential[j], 1.0 if stretched > 0.0 else -1.0
+        most, way = system.limit[r] / system.tangential[j], SLIP_RIGHT if stretched > 0.0 else SLIP_LEFT
         at_bound = abs(stretched) >= most - NEAR_BOUND * most - NEAR_BOUND_TERMS * terms
-        if st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT:
-            at_bound, way = True, 1.0 if st.state[r] == SLIP_RIGHT else -1.0
-        st.state[r], work.sliding[r], work.resting[r] = STICK, 0, 0
+        if is_slip(st.state[r]):
+            at_bound, way = True, st.state[r]
+        st.state[r], scratch.sliding[r], scratch.resting[r] = STICK, 0, 0
         if at_bound and way * speed >= -slow:
-            st.state[r] = SLIP_RIGHT if way > 0.0 else SLIP_LEFT
-            work.resting[r] = _AT_BOUND if way * speed <= slow else 0
+            st.state[r] = way
+            scratch.resting[r] = _AT_BOUND if way * speed <= slow else 0
     move_sliders(system, st.state, st.q, st.v)
 
 
 @kernel
-def _draw_sliders(system, st, work, nothing):
+def _draw_sliders(system, st, scratch, nothing):
     """Decide by accelerations whether what is at rest draws its slider on. Returns how many stay in doubt, drawn."""
     u, sliders, doubts = len(system.rest), len(system.tangential), 0
     for j in range(sliders):
         r, acceleration, mobility = u - sliders + j, 0.0, 0.0
-        if work.resting[r] != _AT_BOUND:
+        if scratch.resting[r] != _AT_BOUND:
             continue
         for i in range(len(st.q) - sliders):
-            total = work.free[i]
+            total = scratch.free[i]
             for row in range(2 * u):
-                total += system.J[row, i] * work.impulse[row] / system.mass[i]
+                total += system.J[row, i] * scratch.impulse[row] / system.mass[i]
             acceleration += system.elongation[j, i] * total
             mobility += system.elongation[j, i] * system.elongation[j, i] / system.mass[i]
-        acceleration *= 1.0 if st.state[r] == SLIP_RIGHT else -1.0
+        acceleration *= st.state[r]
         if abs(acceleration) <= nothing * math.sqrt(mobility):
             doubts += 1
         else:
-            work.resting[r] = 0
+            scratch.resting[r] = 0
             st.state[r] = STICK if acceleration < 0.0 else st.state[r]
     return doubts
 
 
 @kernel
-def _solve_states(system, st, work, count, terms, nothing):
-    """Decide the states of the listed units (work.verdict) by accelerations (work.speed). False if none are possible.
+def _solve_states(system, st, scratch, count, terms, nothing):
+    """Decide the states of the listed units (scratch.verdict) by accelerations (scratch.speed). False if none exist.
 
     Lemke's method need not find forces of contacts that slip. Over a short step in which they might stop it does: the
     slips become parts of the accelerations that remain to be stopped. Its forces are those of the instant if no
     contact that presses stops; if one does, none are found, and the slip ends by impulses (impacts.stop_wedged).
     """
     u = len(system.rest)
-    if solve_rows(system, work, count, work.speed, terms, work.bound):
-        _classify(system, work, count, nothing)
+    if solve_rows(system, scratch, count, scratch.speed, terms, scratch.bound):
+        _classify(system, scratch, count, nothing)
         return True
     moment, possible = CHATTER * system.period, True
     for p in range(count):
-        work.slips[p] = work.way[p]
-        if work.way[p] != 0:
-            work.speed[u + work.listed[p]] += row_speed(system, u + work.listed[p], st.v) / moment
-            work.way[p] = 0
-    if not solve_rows(system, work, count, work.speed, terms, work.bound):
+        scratch.slips[p] = scratch.way[p]
+        if scratch.way[p] != 0:
+            scratch.speed[u + scratch.listed[p]] += row_speed(system, u + scratch.listed[p], st.v) / moment
+            scratch.way[p] = 0
+    if not solve_rows(system, scratch, count, scratch.speed, terms, scratch.bound):
         return False
-    _classify(system, work, count, nothing)
+    _classify(system, scratch, count, nothing)
     for p in range(count):
-        if work.slips[p] != 0:
-            same = work.verdict[p] == (SLIP_RIGHT if work.slips[p] > 0 else SLIP_LEFT)
-            possible = possible and (same or work.verdict[p] >= OPEN)
-            work.way[p] = work.slips[p]
+        if scratch.slips[p] != 0:
+            possible = possible and (scratch.verdict[p] == scratch.slips[p] or scratch.verdict[p] >= OPEN)
+            scratch.way[p] = scratch.slips[p]
     return possible
 
 
 @kernel
-def _classify(system, work, count, nothing):
-    """States (work.verdict) of the listed units from the solution, and what it leaves open (work.doubtful)."""
-    problem = work.lemke
+def _classify(system, scratch, count, nothing):
+    """States (scratch.verdict) of the listed units from the solution, and what it leaves open (scratch.doubtful)."""
+    problem = scratch.lemke
     for p in range(count):
-        r, i = work.listed[p], work.place[p]
-        work.doubtful[p] = 0
+        r, i = scratch.listed[p], scratch.place[p]
+        scratch.doubtful[p] = 0
         contact = is_rigid(system, r)
         if contact and problem.z[i] <= nothing:
-            work.verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
-            work.doubtful[p] = _NORMAL if problem.w[i] <= nothing else 0
-        elif work.way[p] != 0:
-            work.verdict[p] = SLIP_RIGHT if work.way[p] > 0 else SLIP_LEFT
+            scratch.verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
+            scratch.doubtful[p] = _NORMAL if problem.w[i] <= nothing else 0
+        elif scratch.way[p] != 0:
+            scratch.verdict[p] = scratch.way[p]
         elif contact and system.friction[r] == 0.0:
-            work.verdict[p] = SLIP_RIGHT
+            scratch.verdict[p] = SLIP_RIGHT
         else:
             first = i + 1 if contact else i
             # a spring without force has no friction: both bounds are one, and the acceleration tells
             left = problem.w[first + 1] <= nothing and problem.z[first + 1] > nothing
             if problem.z[first] <= nothing and not left:
-                work.verdict[p] = SLIP_RIGHT
-                work.doubtful[p] = _SLIP if problem.w[first] <= nothing else 0
+                scratch.verdict[p] = SLIP_RIGHT
+                scratch.doubtful[p] = _SLIP if problem.w[first] <= nothing else 0
             elif problem.w[first + 1] <= nothing:
-                work.verdict[p] = SLIP_LEFT
-                work.doubtful[p] = _SLIP if problem.z[first + 1] <= nothing else 0
+                scratch.verdict[p] = SLIP_LEFT
+                scratch.doubtful[p] = _SLIP if problem.z[first + 1] <= nothing else 0
             else:
-                work.verdict[p] = STICK
+                scratch.verdict[p] = STICK
 
 
 @entry
-def decide(system, st, work, scale):
+def decide(system, st, scratch, scale):
     """Decide the state of every unit at st.q, st.v. Returns False if the problem cannot be solved.
 
     scale: the speeds in the scene, m/s, whose round-off counts as rest.
     """
     sliders, slow = len(system.tangential), AT_REST * scale
-    if sliders > 0:
-        _hold_sliders(system, st, work, slow)
+    _hold_sliders(system, st, scratch, slow)
     count = ZERO
     for r in range(len(system.rest) - sliders):
-        if _is_undecided(system, st, work, r, slow):
-            work.listed[count], work.way[count] = r, _way(system, st, r, slow) if has_friction(system, r) else 0
+        if _is_undecided(system, st, scratch, r, slow):
+            scratch.listed[count], scratch.way[count] = (
+                r,
+                direction(system, st, r, slow) if has_friction(system, r) else 0,
+            )
             count += 1
-    terms = loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
-    if not _solve_states(system, st, work, count, terms, DOUBTFUL):
+    terms = loaded_acceleration(system, st, scratch, st.q, st.v, st.time[0])
+    if not _solve_states(system, st, scratch, count, terms, DOUBTFUL):
         return False
-    doubts = _close_or_open(system, work, count, DOUBTFUL * terms)
-    if sliders > 0:
-        doubts += _draw_sliders(system, st, work, DOUBTFUL * terms)
+    doubts = _close_or_open(system, scratch, count, DOUBTFUL * terms)
+    doubts += _draw_sliders(system, st, scratch, DOUBTFUL * terms)
     for p in range(count):
-        doubts += work.doubtful[p]
+        doubts += scratch.doubtful[p]
     if doubts > 0:
-        if not _decide_later(system, st, work, count):
+        if not _decide_later(system, st, scratch, count):
             return False
-        _stick_in_doubt(system, work, count)
-    if sliders > 0:
-        move_sliders(system, st.state, st.q, st.v)
-    _take_decisions(system, st, work, count, doubts > 0)
+        _stick_in_doubt(system, scratch, count)
+    move_sliders(system, st.state, st.q, st.v)
+    _take_decisions(system, st, scratch, count, doubts > 0)
     return True
 
 
 @inlined
-def _way(system, st, r, slow):
+def direction(system, st, r, slow):
     """Return the direction in which a unit slips, 0 for none."""
     slip = row_speed(system, len(system.rest) + r, st.v)
     return 0 if abs(slip) <= slow else (1 if slip > 0.0 else -1)
 
 
 @inlined
-def _is_undecided(system, st, work, r, slow):
+def _is_undecided(system, st, scratch, r, slow):
     """Whether forces decide the state of a unit. Otherwise gap and speeds do, and it is set."""
-    work.sliding[r], work.resting[r] = 0, 0
+    scratch.sliding[r], scratch.resting[r] = 0, 0
     if is_compliant(system, r):
-        if not _is_pressed(system, st, work, r, slow):
+        if not _is_pressed(system, st, scratch, r, slow):
             return False
-        way = _way(system, st, r, slow)
-        if way != 0 or not has_friction(system, r):
-            st.state[r] = SLIP_LEFT if way < 0 and has_friction(system, r) else SLIP_RIGHT
-            work.sliding[r] = way if has_friction(system, r) else 0
+        way = direction(system, st, r, slow)
+        if not has_friction(system, r):
+            st.state[r] = SLIP_RIGHT
+            return False
+        if way != 0:
+            st.state[r], scratch.sliding[r] = way, way
             return False
         st.state[r] = STICK
     elif r >= system.contacts:
-        way = _way(system, st, r, slow)
+        way = direction(system, st, r, slow)
         if way != 0:
-            st.state[r] = SLIP_RIGHT if way > 0 else SLIP_LEFT
-            work.sliding[r] = way
+            st.state[r], scratch.sliding[r] = way, way
             return False
     elif not is_closed(system, st, r) or row_speed(system, r, st.v) > slow:
         st.state[r] = OPEN
@@ -246,21 +246,21 @@ def _is_undecided(system, st, work, r, slow):
 
 
 @inlined
-def _take_decisions(system, st, work, count, doubtful):
+def _take_decisions(system, st, scratch, count, doubtful):
     """Set the states of all units from the decisions; doubtful: whether any was made a moment later."""
     u = len(system.rest)
     for r in range(u):
         st.other[r] = st.state[r]
     for p in range(count):
-        r = work.listed[p]
-        st.state[r], st.other[r] = work.verdict[p], work.verdict[p]
-        if doubtful and work.doubtful[p] == _SLIP and _may_stick(system, work, p):
+        r = scratch.listed[p]
+        st.state[r], st.other[r] = scratch.verdict[p], scratch.verdict[p]
+        if doubtful and scratch.doubtful[p] == _SLIP and _may_stick(system, scratch, p):
             st.state[r] = STICK
     for r in range(u):
-        if work.resting[r] == _OPENS or work.resting[r] == _TOUCHES:
-            st.state[r] = OPEN if work.resting[r] == _OPENS else TOUCHING
+        if scratch.resting[r] == _OPENS or scratch.resting[r] == _TOUCHES:
+            st.state[r] = OPEN if scratch.resting[r] == _OPENS else TOUCHING
             st.other[r] = st.state[r]
-        if work.resting[r] == _PRESSES or work.resting[r] == _TOUCHES:
+        if scratch.resting[r] == _PRESSES or scratch.resting[r] == _TOUCHES:
             _stop_approach(system, st, r)
         st.fresh[r] = 1
 
@@ -275,7 +275,7 @@ def _stop_approach(system, st, r):
 
 
 @inlined
-def _is_pressed(system, st, work, r, slow):
+def _is_pressed(system, st, scratch, r, slow):
     """Whether a compliant contact is closed, for all that its gap and speed tell.
 
     One that touches without speed has no force yet, and is marked: its acceleration decides.
@@ -289,108 +289,112 @@ def _is_pressed(system, st, work, r, slow):
         st.state[r] = OPEN
         return False
     if rate >= -slow:
-        work.resting[r] = _TOUCHES
+        scratch.resting[r] = _TOUCHES
     return True
 
 
 @kernel
-def _close_or_open(system, work, count, nothing):
+def _close_or_open(system, scratch, count, nothing):
     """Decide by accelerations whether contacts that touch without speed are pressed. Returns how many stay in doubt."""
-    u, doubts = len(system.rest), 0
+    doubts = 0
     for r in range(system.contacts):
-        if work.resting[r] == _TOUCHES:
-            acceleration = work.speed[r]
-            for row in range(2 * u):
-                acceleration += system.delassus[r, row] * work.impulse[row]
+        if scratch.resting[r] == _TOUCHES:
+            acceleration = after_impulses(system, r, scratch.impulse, scratch.speed[r])
             least = least_force(system, r) * system.delassus[r, r]
             if abs(acceleration) <= max(nothing * math.sqrt(system.delassus[r, r]), least):
                 doubts += 1
             else:
-                work.resting[r] = _PRESSES if acceleration < 0.0 else _OPENS
+                scratch.resting[r] = _PRESSES if acceleration < 0.0 else _OPENS
     for p in range(count):
-        if work.resting[work.listed[p]] == _OPENS:
-            work.verdict[p], work.doubtful[p] = OPEN, 0
+        if scratch.resting[scratch.listed[p]] == _OPENS:
+            scratch.verdict[p], scratch.doubtful[p] = OPEN, 0
     return doubts
 
 
 @inlined
-def loaded_acceleration(system, st, work, q, v, time):
-    """Accelerations of the rows (work.speed) without unknown forces: with those of springs, and of units that slide.
+def after_impulses(system, row, impulse, speed):
+    """Return the speed of a row after impulses (2u,) of all rows, or its acceleration with their forces."""
+    for other in range(len(impulse)):
+        speed += system.delassus[row, other] * impulse[other]
+    return speed
 
-    Sets the bounds of friction that are known (work.bound). Returns the size of the terms that accelerations are sums
-    of, per root of the diagonal of G: what is far below is round-off.
+
+@inlined
+def loaded_acceleration(system, st, scratch, q, v, time):
+    """Set accelerations of the rows (scratch.speed) by all known forces, of springs and of units that slide as well.
+
+    Sets the bounds of friction that are known (scratch.bound). Returns the size of the terms that accelerations are
+    sums of, per root of the diagonal of G: what is far below is round-off.
     """
     u = len(system.rest)
-    free_acceleration(system, work, q, v, time)
+    free_acceleration(system, scratch, q, v, time)
     for r in range(u):
-        work.bound[r] = system.limit[r]
+        scratch.bound[r] = system.limit[r]
         if is_compliant(system, r) and st.state[r] < OPEN:
             force = spring_force(system, r, q, v)
-            if work.resting[r] == _TOUCHES and force <= least_force(system, r):
+            if scratch.resting[r] == _TOUCHES and force <= least_force(system, r):
                 force = 0.0  # it would press others
-            work.bound[r] = system.friction[r] * force
+            scratch.bound[r] = system.friction[r] * force
             for i in range(len(q)):
                 part = system.J[r, i] * force / system.mass[i]
-                work.free[i] += part
-                work.terms[i] += abs(part)
-        if work.sliding[r] != 0:
+                scratch.free[i] += part
+                scratch.terms[i] += abs(part)
+        if scratch.sliding[r] != 0:
             for i in range(len(q)):
-                work.free[i] -= work.sliding[r] * work.bound[r] * system.J[u + r, i] / system.mass[i]
+                scratch.free[i] -= scratch.sliding[r] * scratch.bound[r] * system.J[u + r, i] / system.mass[i]
     largest = 0.0
     for r in range(2 * u):
-        work.speed[r] = row_speed(system, r, work.free)
+        scratch.speed[r] = row_speed(system, r, scratch.free)
         terms = 0.0
         for i in range(len(q)):
-            terms += abs(system.J[r, i]) * work.terms[i]
+            terms += abs(system.J[r, i]) * scratch.terms[i]
         if system.delassus[r, r] > 0.0:
             largest = max(largest, terms / math.sqrt(system.delassus[r, r]))
     return largest
 
 
 @kernel
-def _decide_later(system, st, work, count):
+def _decide_later(system, st, scratch, count):
     """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved.
 
     Where forces have only begun, they may all be others after that moment: a decision made anew looks less far ahead.
     """
     u, size = len(system.rest), len(st.q)
     for i in range(size):
-        work.ahead[1, i] = work.free[i]
+        scratch.ahead[1, i] = scratch.free[i]
         for r in range(2 * u):
-            work.ahead[1, i] += system.J[r, i] * work.impulse[r] / system.mass[i]
-    moment = _before_end(system, st, work, count, work.ahead[1], system.moment * _SOONER ** work.attempt[0])
+            scratch.ahead[1, i] += system.J[r, i] * scratch.impulse[r] / system.mass[i]
+    moment = _before_end(system, st, scratch, count, scratch.ahead[1], system.moment * _SOONER ** scratch.attempt[0])
     for i in range(size):
-        total = work.ahead[1, i]
-        work.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
-        work.ahead[1, i] = st.v[i] + moment * total
-    if len(system.tangential) > 0:
-        move_sliders(system, st.state, work.ahead[0], work.ahead[1])
+        total = scratch.ahead[1, i]
+        scratch.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
+        scratch.ahead[1, i] = st.v[i] + moment * total
+    move_sliders(system, st.state, scratch.ahead[0], scratch.ahead[1])
     for p in range(count):
-        work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
-    terms = loaded_acceleration(system, st, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not _solve_states(system, st, work, count, terms, DOUBTFUL_LATER):
+        scratch.first[p], scratch.doubt[p] = scratch.verdict[p], scratch.doubtful[p]
+    terms = loaded_acceleration(system, st, scratch, scratch.ahead[0], scratch.ahead[1], st.time[0] + moment)
+    if not _solve_states(system, st, scratch, count, terms, DOUBTFUL_LATER):
         return False
     # which of contacts that depend on each other carry the force is decided for all of them together
     carriers = False
     for p in range(count):
-        carriers = carriers or work.doubt[p] == _NORMAL
+        carriers = carriers or scratch.doubt[p] == _NORMAL
     for p in range(count):
-        sure = work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN)
-        if sure and not (carriers and (work.verdict[p] == TOUCHING or work.attempt[0] > 0)):
-            work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
-    _close_or_open(system, work, count, DOUBTFUL_LATER * terms)
-    if len(system.tangential) > 0:
-        _draw_sliders(system, st, work, DOUBTFUL_LATER * terms)
+        sure = scratch.doubt[p] == 0 or (scratch.doubt[p] == _SLIP and scratch.verdict[p] >= OPEN)
+        if sure and not (carriers and (scratch.verdict[p] == TOUCHING or scratch.attempt[0] > 0)):
+            scratch.verdict[p], scratch.doubtful[p] = scratch.first[p], scratch.doubt[p]
+    _close_or_open(system, scratch, count, DOUBTFUL_LATER * terms)
+    _draw_sliders(system, st, scratch, DOUBTFUL_LATER * terms)
     return True
 
 
 @inlined
-def _before_end(system, st, work, count, acceleration, moment):
+def _before_end(system, st, scratch, count, acceleration, moment):
     """Return the moment, or a shorter one in which no compliant contact ends whose slip is in doubt: without force
     there is nothing to decide."""
     for p in range(count):
-        r = work.listed[p]
-        if is_compliant(system, r) and work.doubtful[p] == _SLIP and work.resting[r] == 0:
+        r = scratch.listed[p]
+        if is_compliant(system, r) and scratch.doubtful[p] == _SLIP and scratch.resting[r] == 0:
             force, speed = spring_force(system, r, st.q, st.v), row_speed(system, r, st.v)
             falls = system.spring[r] * speed + system.dashpot[r] * row_speed(system, r, acceleration)
             if force > least_force(system, r) and falls * moment > 0.5 * force:
@@ -399,7 +403,7 @@ def _before_end(system, st, work, count, acceleration, moment):
 
 
 @kernel
-def _stick_in_doubt(system, work, count):
+def _stick_in_doubt(system, scratch, count):
     """Let contacts stick whose friction is at its bound though nothing moves them, unless others hold their slip.
 
     Both corners of a block that lies still may push against each other. Where others hold its slip, a force at the
@@ -408,35 +412,34 @@ def _stick_in_doubt(system, work, count):
     """
     u, found = len(system.rest), 0
     for p in range(count):
-        r = work.listed[p]
-        if work.verdict[p] < OPEN and is_rigid(system, r):
-            found = extend_basis(system, work, r, found)
+        r = scratch.listed[p]
+        if scratch.verdict[p] < OPEN and is_rigid(system, r):
+            found = extend_basis(system, scratch, r, found)
     for p in range(count):
-        if work.verdict[p] == STICK:
-            found = extend_basis(system, work, u + work.listed[p], found)
+        if scratch.verdict[p] == STICK:
+            found = extend_basis(system, scratch, u + scratch.listed[p], found)
     for p in range(count):
-        r = work.listed[p]
-        if work.doubtful[p] == _SLIP and _may_stick(system, work, p):
-            more = extend_basis(system, work, u + r, found)
+        r = scratch.listed[p]
+        if scratch.doubtful[p] == _SLIP and _may_stick(system, scratch, p):
+            more = extend_basis(system, scratch, u + r, found)
             if more > found:
-                work.verdict[p], found = STICK, more
+                scratch.verdict[p], found = STICK, more
 
 
 @inlined
-def _may_stick(system, work, p):
+def _may_stick(system, scratch, p):
     """Whether a listed unit that counts as slipping has friction and no slip."""
-    r = work.listed[p]
-    slips = work.verdict[p] == SLIP_RIGHT or work.verdict[p] == SLIP_LEFT
-    return slips and work.way[p] == 0 and has_friction(system, r)
+    r = scratch.listed[p]
+    return is_slip(scratch.verdict[p]) and scratch.way[p] == 0 and has_friction(system, r)
 
 
 @kernel
-def extend_basis(system, work, row, found):
+def extend_basis(system, scratch, row, found):
     """Add a row to the orthonormal basis of those that are kept. Returns its size, the same if they hold the row."""
     size, whole, left = len(system.mass), 0.0, 0.0
     if found >= size:
         return found
-    new = work.span[found]
+    new = scratch.span[found]
     for i in range(size):
         new[i] = system.J[row, i] / math.sqrt(system.mass[i])
         whole += new[i] * new[i]
@@ -444,9 +447,9 @@ def extend_basis(system, work, row, found):
         for k in range(found):
             part = 0.0
             for i in range(size):
-                part += work.span[k, i] * new[i]
+                part += scratch.span[k, i] * new[i]
             for i in range(size):
-                new[i] -= part * work.span[k, i]
+                new[i] -= part * scratch.span[k, i]
     for i in range(size):
         left += new[i] * new[i]
     if left <= DEPENDENCE * whole:
