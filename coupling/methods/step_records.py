@@ -26,7 +26,7 @@ _BOUND = 1e30
 
 @inlined
 def product(matrix, i, vector):
-    """Return entry i of the product of a matrix (equations_of_motion.Sparse) and a vector."""
+    """Return entry i of the product of a matrix (time_stepping.Sparse) and a vector."""
     total = 0.0
     for a in range(matrix.value.shape[1]):
         total += matrix.value[i, a] * vector[matrix.column[i, a]]
