@@ -225,11 +225,15 @@ class Interface(Displayed):
         return np.array([item.direction if item.motion == "translation" else (0.0,) * 3 for item in self.coordinates])
 
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
-        """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
+        """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure.
+
+        Those are what the supports left when the interface was made, also where `matrices` has others.
+        """
+        free = self.motions.nonzero()[0]
 
         def restricted(matrix: sparse.csr_array) -> sparse.csr_array:
-            if self.motions.nnz == self.motions.shape[1]:  # no rigid patch: free DOFs only
-                return matrices.of_free(matrix)
+            if len(free) == self.motions.shape[1]:  # no rigid patch: free DOFs only
+                return matrix[free][:, free]
             return sparse.csr_array(self.motions.T @ matrix @ self.motions)
 
         return restricted(matrices.stiffness), restricted(matrices.mass), self.motions.T @ self.vectors
