@@ -242,8 +242,7 @@ def _image(
     with h5py.File(image, "w", track_order=_TRACK_ORDER) as file:
         file.attrs["kind"] = kind
         file.attrs["schema_version"] = SCHEMA_VERSION
-        for name, value in attributes.items():
-            file.attrs[name] = json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
+        file.attrs.update(_texts(attributes))
         for name, variable in variables.items():
             _create(file, name, variable, compressed)
         lengths = _dimension_lengths(variables)
@@ -268,7 +267,15 @@ def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) ->
     made = {
         name: (tuple(item.dims), np.asarray(item.values), {"units": item.units}) for name, item in variables.items()
     }
-    return xarray.Dataset(made, attrs=dict(attributes))
+    return xarray.Dataset(made, attrs=_texts(attributes))
+
+
+def _texts(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as a file holds them: dictionaries as JSON text."""
+    return {
+        name: json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
+        for name, value in attributes.items()
+    }
 
 
 def clear_leftovers(path: str | os.PathLike[str]) -> None:

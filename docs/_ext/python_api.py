@@ -22,6 +22,7 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import stringify_signature
 
 import vanedamp
+from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.files.key_tables import KeyedDocstring
 
 FOLDER = Path(__file__).parent.parent / "reference" / "api"
@@ -76,11 +77,7 @@ def members(module: ModuleType) -> list[str]:
 
 def pages() -> Iterator[tuple[str, str]]:
     """Yield name and text of the pages."""
-    names = "".join(
-        f".. auto{'class' if inspect.isclass(getattr(vanedamp, name)) else 'function'}:: vanedamp.{name}\n"
-        + ("   :members:\n\n" if inspect.isclass(getattr(vanedamp, name)) else "\n")
-        for name in vanedamp.__all__
-    )
+    names = "".join(_entry(name, getattr(vanedamp, name)) for name in vanedamp.__all__)
     yield "vanedamp", _titled("vanedamp") + ".. automodule:: vanedamp\n   :no-members:\n\n" + names
     for part in PARTS:
         entries = "".join(f"   {name}\n" for name in modules(part))
@@ -93,6 +90,14 @@ def pages() -> Iterator[tuple[str, str]]:
                 name,
                 _titled(name) + text + (f"   :members: {', '.join(listed)}\n" if listed else "   :no-members:\n"),
             )
+
+
+def _entry(name: str, value: Any) -> str:
+    """Return the directive of a public name; records of scenes share how they are saved, loaded and converted."""
+    if not inspect.isclass(value):
+        return f".. autofunction:: vanedamp.{name}\n\n"
+    inherited = "   :inherited-members:\n" if issubclass(value, SceneRecord) else ""
+    return f".. autoclass:: vanedamp.{name}\n   :members:\n{inherited}\n"
 
 
 def _titled(name: str) -> str:

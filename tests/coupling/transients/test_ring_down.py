@@ -429,6 +429,8 @@ def test_files_of_ring_downs(rung, tmp_path):
     with xarray.open_dataset(tmp_path / "rung.h5", engine="h5netcdf") as data:
         memory = rung.to_xarray()
         assert set(data.variables) >= set(memory.variables)
+        assert {name: data.attrs[name] for name in memory.attrs} == memory.attrs
+        memory.to_netcdf(tmp_path / "copy.nc", engine="h5netcdf")
         assert data.frequency.attrs["units"] == "Hz" and data.frequency.dims == ("half_cycle",)
         assert data.damping_ratio.dims == ("cycle",) and data.damping_ratio_mean.dims == ("bin",)
         assert np.array_equal(data.displacement, rung.displacement)
