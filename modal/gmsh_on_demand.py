@@ -1,4 +1,4 @@
-"""gmsh, loaded when it is first used: its library needs those of a display, which servers lack.
+"""gmsh, loaded when it is first used: its library needs display libraries, which servers lack.
 
 `from vanedamp.modal import gmsh_on_demand as gmsh`, and then as gmsh itself.
 """

@@ -114,7 +114,7 @@ class Tracks:
         return sorted(kept, key=lambda approach: approach.speed)
 
     def _reach(self, speed: float) -> None:
-        """Go on from the last state to a speed, over speeds between them as far as the shapes need."""
+        """Continue from the last state to a speed, over speeds between them as far as the shapes need."""
         ahead = [speed]
         while ahead:
             left = self.states[-1]
