@@ -284,7 +284,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
 
 
 def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
-    """Yield the lines that say something, those of included files in their place. Raises MeshError."""
+    """Yield the lines with content, included files' lines in their place. Raises MeshError."""
     including = (*including, path.resolve())
     for line in deck_lines(path):
         text = line.text.split("$")[0].expandtabs(8).rstrip()
