@@ -215,7 +215,7 @@ def inverted() -> dict[int, str]:
 
 
 def check_connected() -> None:
-    """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
+    """Raise MeshError when the volume elements of the current model fall into parts without common nodes."""
     links, groups_of, lengths = [], [], []
     for _, entity in gmsh.model.getEntities(3):
         for labels, rows, _ in _elements(3, entity):

@@ -86,7 +86,7 @@ class Ramp(SceneRecord):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
-    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the largest of both
+    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the peaks of both
     from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
     `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
     which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
