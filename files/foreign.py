@@ -46,7 +46,7 @@ def existing(path: str | os.PathLike[str], error: type[VanedampError], kind: str
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: str) -> Iterator[None]:
-    """Turn a reader's exceptions into `error` with the file; expected: what the file should be.
+    """Turn a reader's exceptions into `error` with the file; expected: the kind of file expected.
 
     Errors about input pass, and so do system errors, a lack of memory and missing packages: no fault of the file.
     """

@@ -12,7 +12,7 @@ from vanedamp.files.errors import VanedampError
 
 
 class GmshError(VanedampError):
-    """A gmsh that cannot be loaded; the message says what it lacks."""
+    """A gmsh that cannot be loaded; the message names the missing library."""
 
 
 def __getattr__(name: str) -> Any:

@@ -169,7 +169,7 @@ def _contacts(
     scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], placed: dict[str, Any],
     force: np.ndarray,
 ) -> tuple[list[Unit], list[Unit]]:  # fmt: skip
-    """Return the contacts, cavity by cavity, then those of elements; and friction elements of these.
+    """Return the contacts, cavity by cavity, then of elements; and the elements' friction elements.
 
     placed: where the bodies are; force: (e, n) on the modes. Raises InputError.
     """

@@ -22,7 +22,7 @@ import numpy as np
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.scene.shapes.shape import SIDES
 
-#: names of a unit's counterparts, also those of the elements that have been assembled
+#: names of a unit's counterparts, also of elements assembled so far
 SURFACES = [*SIDES, "body", "stop", "casing"]
 LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 

@@ -1,6 +1,6 @@
 """The linear transient: its length is known before a run.
 
-From rest, each mode of the structure with what is attached to it starts with its steady amplitude missing, and the
+From rest, each mode of the structure with attached bodies starts with its steady amplitude missing, and the
 difference decays at the mode's own rate (system.linear_modes). At its resonance a mode of damping ratio zeta has
 exp(-2 pi zeta n) left after n periods.
 """

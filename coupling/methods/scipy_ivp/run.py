@@ -191,7 +191,7 @@ class IvpRun:
         return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
-        """Return twice the time to the first event by the functions' parabolas: round-off is that of the flight, s."""
+        """Return twice the time to the first event by the functions' parabolas: round-off is the flight's, s."""
         now = self.free.extended(self.time, self.y[: self.free.size])
         # accelerations of what leaves by its third derivative are round-off
         early = self.order < 3
