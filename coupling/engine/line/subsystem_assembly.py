@@ -313,7 +313,7 @@ def _fill_forces(
 def _excite(
     system: LineSystem, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in phase with the
+    """Return the modes, driven ones first, in order of the harmonics that drive them; steady eta (k, e) under the
     harmonics of a load (k, e), without the part of driven modes; harmonic and growth (d,) of each driven mode.
     """
     eigenvalue, shape, project = modes
@@ -330,7 +330,7 @@ def _excite(
         push = project[:, k:] @ load[:, h]
         harmonic[:, h] = shape[:k] @ np.where(driven, 0, push / np.where(driven, 1, apart))
         driver[driven] = h
-        # a real load turns half with the harmonic, half against it, in phase with the conjugate
+        # a real load turns half with the harmonic, half against it, with the conjugate
         growth[driven] = push[driven] / 2
     if np.all(driver == e):
         return modes, harmonic, driver[:0], growth[:0]
