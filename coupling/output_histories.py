@@ -17,7 +17,7 @@ from vanedamp.files.toml_input import InputError
 
 
 class History(NamedTuple):
-    """Samples of outputs: time (t,) s, values (p, t) in the outputs' units; status: that of the run."""
+    """Samples of outputs: time (t,) s, values (p, t) in the outputs' units; status: the run's."""
 
     time: np.ndarray
     values: np.ndarray

@@ -27,7 +27,7 @@ def simulate(
     events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
     state that another run has left (`Response.final`), in place of the scene's initial one, where the method can;
     progress: called with the number of periods done and of those to do.
-    Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
+    Raises InputError for a scene that the model does not allow; numerical failure is a status of the response.
     """
     started = time.perf_counter()
     scene = loaded(scene)

@@ -1,4 +1,4 @@
-"""A file that a long command keeps while it works, and from which the same command goes on after a kill.
+"""A file that a long command keeps while it works, and from which the same command resumes after a kill.
 
 Each write makes a new file, which takes the place of the old one when it is complete, so that a kill at any moment
 leaves one that can be read. Writing takes at most a hundredth of the time.
@@ -22,7 +22,7 @@ SHARE = 100
 class CheckpointFile:
     """The checkpoint of one command (path None: nothing is kept).
 
-    kind: of its record; belongs: by attribute what it is the checkpoint of, and the word for that in messages; content:
+    kind: of its record; belongs: by attribute the input that it belongs to, and its name in messages; content:
     returns variables and further attributes of the record, and how much is finished, in words.
     """
 

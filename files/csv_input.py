@@ -20,7 +20,7 @@ class CsvRow(NamedTuple):
     words: dict[str, str]
 
     def number(self, column: str) -> float:
-        """Return the finite number in a column, no larger than those of other input files. Raises InputError."""
+        """Return the finite number in a column, no larger than numbers of other input files. Raises InputError."""
         word = self.words[column]
         try:
             value = float(word)

@@ -35,7 +35,7 @@ class ExtensionPoint(NamedTuple):
 
     kind        in words, for messages
     package     each module of which is a part; folders: each package of which is one; or a module with PARTS by name
-    group       of entry points, whose names are those of the parts
+    group       of entry points, named like the parts
     attributes  that a part must have; it may have a NAME other than its file's, and an ORDER among the others
     """
 
@@ -58,7 +58,7 @@ class ExtensionPoint(NamedTuple):
         return _in_order(parts)
 
     def all(self) -> dict[str, Any]:
-        """Return our own parts and those of other packages. Raises ExtensionError for one that cannot be used."""
+        """Return our own parts and other packages'. Raises ExtensionError for one that cannot be used."""
         own = self.own()
         added = _added(self.kind, self.group, own)
         return _in_order(own | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
@@ -74,7 +74,7 @@ class Registry(NamedTuple):
 
     kind        in words, for messages
     parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and others
-    group       of entry points, whose names are those of the parts
+    group       of entry points, named like the parts
     attributes  that a part must have
     """
 

@@ -1,4 +1,4 @@
-"""Files that a user hands over: no devices, and whatever a reader or its library meets in them is one line."""
+"""Files from a user: no devices, and any error of a reader or its library becomes one line."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PATIENCE, _SPEED = 60, 1e6
 def existing(path: str | os.PathLike[str], error: type[VanedampError], kind: str = "file") -> Path:
     """Return the path of a regular file. Raises `error` for one that is missing, a folder, a device or a pipe.
 
-    kind: what the message calls it.
+    kind: its name in the message.
     """
     file = Path(path)
     try:
@@ -46,9 +46,9 @@ def existing(path: str | os.PathLike[str], error: type[VanedampError], kind: str
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: str) -> Iterator[None]:
-    """Turn what a reader stumbles over into `error` with the file; expected: what the file should be.
+    """Turn a reader's exceptions into `error` with the file; expected: the kind of file expected.
 
-    Errors about input pass, and so do those of the system, a lack of memory and missing packages: no fault of the file.
+    Errors about input pass, and so do system errors, a lack of memory and missing packages: no fault of the file.
     """
     try:
         yield

@@ -24,7 +24,7 @@ WORDS = {"number": "number", "integer": "whole number", "string": "text", "boole
 
 
 class Key(NamedTuple):
-    """A key of a table: its name, what it may be, its unit, default and meaning; required ones have no default."""
+    """A key of a table: its name, permitted values, unit, default and meaning; required ones have no default."""
 
     name: str
     value: str
@@ -72,7 +72,7 @@ def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator
 
 
 def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[Table]:
-    """Yield the tables that a key stands for: one, the variants of one, or those of a list."""
+    """Yield the tables that a key stands for: one, the variants of one, or a list's."""
     found = _own_tables(schema, node)
     brackets = "[[{}]]" if any("items" in option for option in options(schema, node)) else "[{}]"
     for one in found:
@@ -126,7 +126,7 @@ def _key(schema: Schema, name: str, node: Schema, required: bool) -> Key:
 
 
 def _value(schema: Schema, node: Schema) -> str:
-    """Return what a key may be in words: its type and its range, or the values it has."""
+    """Return the permitted values of a key in words: type and range, or a list."""
     if "const" in node:
         return _toml(node["const"])
     if "enum" in node:

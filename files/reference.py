@@ -1,4 +1,4 @@
-"""What the keys of an input file mean: JSON Schema of a record, with the docstrings after its fields.
+"""Meaning of the keys of an input file: JSON Schema of a record, with the docstrings after its fields.
 
 A field of a record read from a file is followed by a string literal, a phrase with its unit in brackets at the end:
 
@@ -70,7 +70,7 @@ def schema(record: Any) -> dict[str, Any]:
 
 
 def field_docstrings(record: type) -> dict[str, str]:
-    """Return the docstrings after the fields of a class, those of its bases included, by the names of the fields."""
+    """Return the docstrings after the fields of a class, its bases' included, by the names of the fields."""
     found: dict[str, str] = {}
     for base in reversed(record.__mro__):
         found |= _literals(base.__module__).get(base.__qualname__, {})
@@ -104,7 +104,7 @@ def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, A
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:
-    """Return the schema of a key of a table, its own or that of all others; nothing for a key it does not have."""
+    """Return the schema of a key of a table, its own or the one for all others; nothing for a key it does not have."""
     others = table.get("additionalProperties")
     node: dict[str, Any] = table.get("properties", {}).get(key, others if isinstance(others, dict) else {})
     return node

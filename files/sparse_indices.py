@@ -1,4 +1,4 @@
-"""Sparse matrices whose indices nobody has checked: operations on them read and write where the indices lead."""
+"""Sparse matrices with unchecked indices: operations on them read and write where the indices lead."""
 
 from __future__ import annotations
 

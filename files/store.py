@@ -36,13 +36,13 @@ from vanedamp.files.interrupts import uninterrupted
 
 SCHEMA_VERSION = 1
 
-#: said each time: the default is that of the process, which other packages change
+#: given each time: the default is the process's, which other packages change
 _TRACK_ORDER = False
 #: name of a dimension without a coordinate in netCDF-4
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
-#: the last bytes of a record's file, after those of HDF5, which passes over them and drops them at a change
+#: the last bytes of a record's file, after HDF5's, which passes over them and drops them at a change
 _SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
 #: bytes that are read at once
 _PART = 1 << 20
@@ -67,7 +67,7 @@ class Variable(NamedTuple):
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
+    """Yield a temporary path in the folder of `path`; rename it to `path` on success, remove it on any failure.
 
     A killed or failing writer thus leaves the old file or none, never half a file; an interrupt waits for its end. The
     temporary file keeps the suffix.
@@ -164,7 +164,7 @@ def file_stamp(path: str | os.PathLike[str]) -> int:
     if not file.is_file():
         return 0
     found = file.stat()
-    # copies and archives keep the time of the content; that of the change they cannot set
+    # copies and archives keep the time of the content; the time of the change cannot be set
     return hash((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
 
 
@@ -279,7 +279,7 @@ def _texts(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def clear_leftovers(path: str | os.PathLike[str]) -> None:
-    """Remove the temporary files that killed writers of `path` have left beside it."""
+    """Remove the temporary files that killed writers of `path` have left in its folder."""
     target = destination(path)
     if target is None:
         return
@@ -393,7 +393,7 @@ def _attributes(path: str | os.PathLike[str], found: dict[str, Any]) -> dict[str
 
 
 def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:
-    """Return the names of a variable's dimensions; that of a coordinate is its own."""
+    """Return the names of a variable's dimensions; a coordinate's is its own."""
     return tuple(scales[0].name.lstrip("/") if len(scales) else name for scales in dataset.dims)
 
 

@@ -21,7 +21,7 @@ from vanedamp.files.reference import constants, options
 T = TypeVar("T")
 
 #: Every record read from a file knows all its keys and holds finite numbers. Its schema is built when it is read, as a
-#: part of that of its file: on import it would be built once more
+#: part of the schema of its file: on import it would be built once more
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
@@ -31,7 +31,7 @@ _NO_LIST = ("tuple_type", "list_type")
 #: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and
 #: squares are numbers, too
 LARGEST = 1e40
-#: and no whole number is longer than those of TOML
+#: and no whole number is longer than TOML's
 _LONGEST = 2**63 - 1
 #: of a file of ours: bytes, and tables and lists one in another
 _MOST_BYTES, _DEEPEST = 50_000_000, 30
@@ -74,7 +74,7 @@ Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
 class InputError(VanedampError):
-    """Bad input. The message is one line: file, key, what is wrong and what would be right."""
+    """Bad input. The message is one line: file, key, error and remedy."""
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

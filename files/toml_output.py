@@ -1,6 +1,6 @@
-"""Input files written for people: TOML with what its keys mean, and their units, as comments.
+"""Input files written for people: TOML with meanings and units of the keys as comments.
 
-tomlkit writes them. What is here are comments, lines and digits: tomlkit 0.15.2 alone writes a list of 200 frequencies
+tomlkit writes them. Here are comments, lines and digits: tomlkit 0.15.2 itself writes a list of 200 frequencies
 as one line of 3,884 characters; here the longest has 99.
 """
 
@@ -30,7 +30,7 @@ _LINE = 96
 def write_commented(
     path: str | Path, data: Mapping[str, Any], kind: FileKind, notes: Mapping[str, str] | None = None
 ) -> None:
-    """Write tables as a commented TOML file, and the JSON Schema of its kind beside it. Raises StoreError.
+    """Write tables as a commented TOML file, and the JSON Schema of its kind in the same folder. Raises StoreError.
 
     notes: as in `commented`.
     """
@@ -52,7 +52,7 @@ def schema_text(schema: Mapping[str, Any]) -> str:
 
 
 def schema_name(kind: str) -> str:
-    """Return the name of the file with the JSON Schema of a kind, which stands beside the files of that kind."""
+    """Return the name of the file with the JSON Schema of a kind, which lies in the folder of these files."""
     return f"{kind}.schema.json"
 
 
@@ -88,7 +88,7 @@ class _Writer(NamedTuple):
     ) -> None:
         """Add the keys of a table to a place in the document, values first, then tables.
 
-        told: keys that need no comment any more, since a table of the same list explains them; those of this one join
+        told: keys that need no further comment, since a table of the same list explains them; this table's keys join
         them. name: the dotted one of the table.
         """
         _comment(place, self.notes.get(name, ""))

@@ -66,7 +66,7 @@ class Variants(Generic[Base]):
         return self._compiled
 
     def _nothing(self) -> CoreSchema:
-        """Return the schema while there is no record: it refuses every table."""
+        """Return the schema while there is no record: it rejects every table."""
         reason = f"there is no {self._kind}; other packages add them (entry points {self._group})"
         return core_schema.custom_error_schema(
             core_schema.none_schema(), custom_error_type="no_variant", custom_error_message=reason

@@ -1,4 +1,4 @@
-"""Linear algebra that modes and reduced models share, in plain numpy: Ritz values, signs of shapes, symmetric parts."""
+"""Linear algebra common to modes and reduced models, in plain numpy: Ritz values, signs of shapes, symmetric parts."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class BaseResponse:
 
     frequencies_hz    (n,)
     relative          (k, n) complex, m per m/s^2: displacement relative to the base
-    transmissibility  (k, n) complex: absolute displacement (or acceleration) over that of the base
+    transmissibility  (k, n) complex: absolute displacement (or acceleration) over the base's
     """
 
     frequencies_hz: np.ndarray

@@ -117,7 +117,7 @@ def pair_modes(mac: np.ndarray, least: float = LEAST_MAC) -> Pairing:
     values = np.asarray(mac, dtype=float)
     if values.ndim != 2 or not np.all(np.isfinite(values)):
         raise CorrelationError(f"mac: expected a finite matrix (m1, m2), not shape {values.shape}")
-    # what is below the threshold is worth nothing, so that it displaces no pair above it
+    # values below the threshold count as zero, so that they displace no pair above it
     first, second = linear_sum_assignment(-np.where(values >= least, values, 0.0))
     kept = values[first, second] >= least
     return Pairing(frozen(values), frozen(first[kept], np.int64), frozen(second[kept], np.int64))

@@ -145,7 +145,7 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
 
     if not unstable(1.0):
         return 1.0
-    # the energy is linear in the share: past the first unstable one, such as that of a single DOF, none is stable
+    # the energy is linear in the fraction: beyond the first unstable one, as of a single DOF, none is stable
     softer = added.diagonal() < 0.0
     low, high = 0.0, float(np.min(-given.diagonal()[softer] / added.diagonal()[softer], initial=1.0))
     while high - low > _SHARE_DIGITS * high:
@@ -229,7 +229,7 @@ def _orthonormal(vectors: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, 
     """Return mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
 
     Vectors with residuals r (in the norm of M^-1) are orthogonal to |phi_i^T M phi_j| <= (r_i + r_j) / |lambda_i -
-    lambda_j| only, where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
+    lambda_j| only, where no Krylov space holds both, as with two slices. The lower one keeps its direction
     (Cholesky): that adds at most their product to the relative residual of the higher one, while the other way round
     the lower one's would grow by the ratio of their eigenvalues.
     """
@@ -258,7 +258,7 @@ def shape_signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
 
     factors: (m, 3) participation factors of the shapes along x, y and z.
     """
-    # a mode that barely couples to a translation has a factor of noise
+    # a mode that barely couples to a translation has a factor that is noise
     noise = 1e-6 * np.abs(factors).max()
     guides = (f if np.abs(f).max() > noise else vector for vector, f in zip(vectors, factors, strict=True))
     return np.array([leading_sign(guide) for guide in guides])

@@ -190,7 +190,7 @@ class Solid:
     def rotating(self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float]) -> RotatingMatrices:
         """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
 
-        The stress is that of the static solution under the centrifugal load, linear in the squared speed; supports turn
+        The stress comes from the static solution under the centrifugal load, linear in the squared speed; supports turn
         with the structure. Raises ElasticityError for a structure that is free to move, MatricesError for an axis of
         length zero.
         """
@@ -211,7 +211,7 @@ class Solid:
         """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
 
         Each is proportional to its Young's modulus or to its support's stiffnesses: the derivatives of model updating.
-        That of thermal stress is none of them.
+        Thermal stress is not among them.
         """
         parts = {
             f"material.{name}": self._material_stiffness(fenicsx.over(self.domain, 3, cells))

@@ -48,7 +48,7 @@ _UNNAMED = "unnamed"
 
 
 class CompilerError(VanedampError):
-    """A machine on which no form can be compiled; the message says what it lacks."""
+    """A machine on which no form can be compiled; the message says what is missing."""
 
 
 @dataclass(frozen=True, eq=False)

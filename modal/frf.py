@@ -18,7 +18,7 @@ UNITS = {"receptance": "m/N", "mobility": "m/(N s)", "accelerance": "m/(N s^2)"}
 _UNCERTAIN = 0.5
 # fraction of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
 _NARROW = 0.5
-# root mean square of the error over that of the response: where more is missed the fit is not of this response. Noise
+# root mean square of the error over the response's: with a larger error, the fit does not describe it. Noise
 # of a tenth of the peak over forty bandwidths leaves 0.41
 _MISFIT = 0.5
 # fraction of its misfit that a response read as decibels has at most where it is one in decibels; of linear responses,

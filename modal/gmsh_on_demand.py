@@ -1,4 +1,4 @@
-"""gmsh, loaded when it is first used: its library needs those of a display, which servers lack.
+"""gmsh, loaded when it is first used: its library needs display libraries, which servers lack.
 
 `from vanedamp.modal import gmsh_on_demand as gmsh`, and then as gmsh itself.
 """
@@ -12,7 +12,7 @@ from vanedamp.files.errors import VanedampError
 
 
 class GmshError(VanedampError):
-    """A gmsh that cannot be loaded; the message says what it lacks."""
+    """A gmsh that cannot be loaded; the message names the missing library."""
 
 
 def __getattr__(name: str) -> Any:

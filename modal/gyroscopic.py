@@ -37,7 +37,7 @@ class GyroscopicModes:
     speed           rad/s
     frequencies_hz  (m,)
     shapes          (m, N) complex, kg^-1/2: x^H M x = 1, zero at the fixed DOFs; the phase at which most of the
-                    structure passes its largest displacement is that of the real part
+                    structure passes its largest displacement is its real part's
     residuals       (m,) of Q x = r, in the norm of the energy: sqrt(r^H K^-1 r / x^H K x); the frequency's error is of
                     its square
     whirl           (m,) mean turn of the motion: 1 where all points circle in the sense of the rotation, -1 against it,

@@ -6,7 +6,7 @@ directions are kept and orthogonalised against, and a full space restarts with i
 J. Matrix Anal. Appl. 22(2)).
 
 Why not SLEPc's Krylov-Schur (3.18), which has no blocks: with the same factors of 73,122 freedoms it takes as long
-for 6 modes (1.1 s and 1.2 s), 2.2 s for 20 (here 1.8 s) and 7.0 s for 60 (here 4.6 s). Ranks of MPI share it (`petsc`).
+for 6 modes (1.1 s and 1.2 s), 2.2 s for 20 (here 1.8 s) and 7.0 s for 60 (here 4.6 s). MPI ranks divide it (`petsc`).
 Why not scipy's eigsh (ARPACK, 1.10), which has none either: with the same factors 1.4 to 1.7 times as long.
 """
 
@@ -62,7 +62,7 @@ def eigenpairs(
     space, random = _Space(mass, directions(wanted)), np.random.default_rng(0)
     for _ in range(_RESTARTS):
         while space.count <= space.most - width:
-            if space.block == 0:  # at the start, or what is there holds all that its start can reach
+            if space.block == 0:  # at the start, or the space holds all that its start can reach
                 space.begin(solve(_product(mass, random.standard_normal((width, space.size)))))
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
@@ -94,7 +94,7 @@ class _Space:
         self._before = self.count - self.block
 
     def append(self, rows: np.ndarray) -> np.ndarray:
-        """Make rows (b, n) orthonormal, append those that are independent, and return their shares (b, j) in `rows`."""
+        """Make rows (b, n) orthonormal, append the independent ones, return their components (b, j) in `rows`."""
         shares = np.eye(len(rows))
         for _ in range(3):
             inertia = _product(self._mass, rows)
@@ -114,7 +114,7 @@ class _Space:
         return shares
 
     def extend(self, solve: Solve) -> np.ndarray:
-        """Apply the operator to the last block and append what is new; return its shares (j, b) in the new rows."""
+        """Apply the operator to the last block and append new directions; return its components (j, b) in them."""
         count, last = self.count, slice(self.count - self.block, self.count)
         rows, shares = self._orthogonal(solve(self.inertia[last]), self._before)
         self.projected[:count, last] = shares

@@ -206,7 +206,7 @@ class SystemMatrices(Displayed):
 
 
 def _merged(patches: Sequence[Patch]) -> Patch:
-    """Return several patches as one; a node that they share has the sum of its weights."""
+    """Return several patches as one; a common node has the sum of its weights."""
     if not patches:
         raise MatricesError("patch: no label; name at least one")
     nodes, places = np.unique(np.concatenate([patch.nodes for patch in patches]), return_inverse=True)

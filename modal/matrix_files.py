@@ -87,7 +87,7 @@ def read_folder(
 
 
 def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:
-    """Write the matrices for other codes; see the top of this file. Nodes are numbered from 1."""
+    """Write the matrices for other codes; see the module's docstring. Nodes are numbered from 1."""
     home = Path(folder)
     home.mkdir(parents=True, exist_ok=True)
     for name, matrix in (("stiffness", matrices.stiffness), ("mass", matrices.mass)):

@@ -222,7 +222,7 @@ def _number(word: str) -> float:
 
 @contextlib.contextmanager
 def _of(file: Path) -> Iterator[None]:
-    """Raise MeasurementError with the file for what a record rejects."""
+    """Raise MeasurementError with the file for values that a record rejects."""
     try:
         yield
     except ValueError as error:

@@ -24,7 +24,7 @@ from vanedamp.modal.msh import same_rows
 
 
 class _Shape(NamedTuple):
-    """A kind of volume cell: its nodes, and those of its facets and edges, corners first (VTK's order).
+    """A kind of volume cell: its nodes and the nodes of its facets and edges, corners first (VTK's order).
 
     elements: gmsh's types by dimension from 0; order: gmsh's order of the nodes of a cell.
     """

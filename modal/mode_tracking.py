@@ -114,7 +114,7 @@ class Tracks:
         return sorted(kept, key=lambda approach: approach.speed)
 
     def _reach(self, speed: float) -> None:
-        """Go on from the last state to a speed, over speeds between them as far as the shapes need."""
+        """Continue from the last state to a speed, over speeds between them as far as the shapes need."""
         ahead = [speed]
         while ahead:
             left = self.states[-1]
@@ -209,7 +209,7 @@ class Tracks:
         return float(modal_assurance(*shapes).max(initial=0.0))
 
     def _aligned(self, modes: SpeedModes, reference: SpeedModes) -> SpeedModes:
-        """Return modes whose multiple ones are turned, within their span, to shapes like those of a reference."""
+        """Return modes whose multiple ones are turned, within their span, to shapes like a reference's."""
         shapes = modes.shapes.copy()
         apart = np.flatnonzero(np.diff(modes.frequencies) > self.same * modes.frequencies[1:]) + 1
         for group in np.split(np.arange(modes.frequencies.size), apart):

@@ -50,13 +50,13 @@ class Tuning:
     deviations     (p,) relative standard deviations of the factors if the measured frequencies err by 0.1 % each;
                    large values mean that these frequencies do not determine each factor
     target_hz      (n,) measured frequencies
-    before_hz, after_hz   (n,) those of their partners among the computed modes
+    before_hz, after_hz   (n,) of the computed modes paired with them
     modes_before, modes_after  (n,) indices of these partners
     mac_before, mac_after      (n,) MAC with the measured shapes, or with the untuned modes where none were given
     sensitivities  (n, p) d log f / d log factor, after tuning: half the fraction of the strain energy in a part
     evaluations    eigenvalue problems solved
     matrices       the tuned system
-    warnings       what to look at: frequencies that are missed, another pairing with less change
+    warnings       points to check: frequencies that are missed, another pairing with less change
     """
 
     names: tuple[str, ...]
@@ -242,7 +242,7 @@ class _State:
 class _Problem:
     """Residuals and Jacobian at logarithms of factors; keeps the last state, and follows the modes.
 
-    The arguments are those of `tune`; meant: (n,) the modes that the targets belong to, unless shapes say so.
+    Arguments: see `tune`; meant: (n,) the modes that the targets belong to, unless shapes say so.
     """
 
     matrices: SystemMatrices

@@ -124,7 +124,7 @@ def taken(dimension: int) -> dict[str, np.ndarray]:
 
 
 def drop_strays() -> None:
-    """Take entities beside the volume elements out of the current model, such as the centres of arcs.
+    """Remove entities other than volume elements from the current model, such as the centres of arcs.
 
     dolfinx 0.5.2 writes past its memory when a node belongs to no volume element. Raises MeshError for groups of points
     or lines there, and for nodes that cannot be taken out.
@@ -215,7 +215,7 @@ def inverted() -> dict[int, str]:
 
 
 def check_connected() -> None:
-    """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
+    """Raise MeshError when the volume elements of the current model fall into parts without common nodes."""
     links, groups_of, lengths = [], [], []
     for _, entity in gmsh.model.getEntities(3):
         for labels, rows, _ in _elements(3, entity):

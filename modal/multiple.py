@@ -14,7 +14,7 @@ _NOISE = 1e-6
 
 
 def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray], tolerance: float) -> Modes:
-    """Return the modes, those of (nearly) one frequency turned into the directions of functionals.
+    """Return the modes, turned into the directions of functionals where frequencies (nearly) coincide.
 
     guides     functionals (N,) in order of precedence. Of the modes of a group, the first takes all that the group has
                of the first guide, and the others none of it; the second takes the rest of the second guide, and so on

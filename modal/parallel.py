@@ -1,6 +1,6 @@
 """MPI ranks that help the first one: rank 0 runs the program, the others wait for tasks and take part in them.
 
-Under `mpirun -n K` all ranks share the factorisations, which take most of the time and memory; everything else, files
+Under `mpirun -n K` all ranks divide the factorisations, which take most of the time and memory; everything else, files
 included, is up to rank 0 only.
 """
 
@@ -55,7 +55,7 @@ def invite(*arguments: Any) -> None:
 
 
 def rows(matrix: sparse.csr_array | None) -> tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return the size of rank 0's square matrix (None elsewhere), and this rank's share of its rows: CSR arrays."""
+    """Return the size of rank 0's square matrix (None elsewhere), and this rank's part of its rows: CSR arrays."""
     size = COMM.bcast(None if matrix is None else matrix.shape[0], root=0)
     edges = np.linspace(0, size, COMM.size + 1).astype(int)
     if matrix is not None:
@@ -75,7 +75,7 @@ def rows(matrix: sparse.csr_array | None) -> tuple[int, tuple[np.ndarray, np.nda
 
 
 def gathered(vectors: np.ndarray) -> np.ndarray:
-    """Return (count, n) on rank 0 from every rank's (count, share of n); on the others their own share."""
+    """Return (count, n) on rank 0 from every rank's (count, part of n); on the others their own part."""
     shares = COMM.gather(vectors, root=0)
     return vectors if shares is None else np.hstack(shares)
 

@@ -1,7 +1,7 @@
 """Sparse symmetric algebra on PETSc and SLEPc: a factorisation and an eigenvalue solver for scipy matrices.
 
 Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose solves are quicker, and on block
-Lanczos. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI all ranks share
+Lanczos. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI all ranks divide
 eigenvalue problems (SLEPc) and inertia counts (see `parallel`), on MUMPS; a Factorization stays on its own rank.
 """
 
@@ -43,7 +43,7 @@ class Factorization:
 
     def __init__(self, matrix: sparse.csr_array, direct: str = "mumps") -> None:
         self.size = int(matrix.shape[0])
-        # only the factor is kept: what it is made of has its size in the largest structures
+        # only the factor is kept: its inputs take as much memory in the largest structures
         with contextlib.ExitStack() as stack:
             given = stack.enter_context(_petsc(_upper_triangle(matrix)))
             ksp = stack.enter_context(_petsc(PETSc.KSP().create(PETSc.COMM_SELF)))

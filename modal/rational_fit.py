@@ -49,7 +49,7 @@ class Rational:
         """Return the fit next to the poles (m,) of a start.
 
         Bounds keep the poles where the lines can resolve them: without them noise pulls a pole onto one line, where its
-        decay underflows or overflows and the answer hangs on the last bit.
+        decay underflows or overflows and the result depends on the last bit.
         """
         if start.size == 0:
             return Fit(start, self._misfit(start), np.zeros((self._target.size, 0)))

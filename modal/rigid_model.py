@@ -72,7 +72,7 @@ def rigid_model(
 
 @dataclass(frozen=True)
 class CavityMotion:
-    """How one mode moves a cavity: what a rigid model of that mode knows of it.
+    """How one mode moves a cavity, as a rigid model of that mode includes it.
 
     along          displacement along the cavity, for unit displacement at the rigid model's interface coordinate
     normal_motion  displacement across, for unit displacement along
@@ -98,7 +98,7 @@ def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray)
 
 
 def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bool:
-    """Say whether a displacement is one: that of a patch that moves is of the order of the shape's own."""
+    """Say whether a patch moves: its displacement is then of the order of the shape's own."""
     return abs(displacement) >= 1e-9 * np.abs(functional).sum() * np.abs(shape).max() and displacement != 0.0
 
 

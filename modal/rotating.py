@@ -5,7 +5,7 @@ About its centrifugal equilibrium at a constant speed W (rad/s) the structure mo
     M q'' + W G q' + (K0 + W^2 K1) q = loads,
 
 K1 = geometric stiffness of the centrifugal stress at unit speed, less the spin softening (the mass across the axis),
-and G the gyroscopic coupling, skew. The stress is that of the linear static solution, so that K1 is one matrix.
+and G the gyroscopic coupling, skew. The stress comes from the linear static solution, so that K1 is one matrix.
 Lawrence et al. (1987), NASA TM 100187; Geradin and Rixen (2015), Mechanical Vibrations, section 1.
 """
 
@@ -22,7 +22,7 @@ from vanedamp.modal.matrices import SystemMatrices
 
 
 class UnstableError(VanedampError):
-    """A structure that leaves its equilibrium, heated or at a speed; the message names what it bears."""
+    """A structure that leaves its equilibrium, heated or at a speed; the message names the limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ class RotatingMatrices:
 
 
 def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:
-    """Return the matrix of the integral of rho (A u) . v, A (3, 3), from a solid's mass, that of A = 1.
+    """Return the matrix of the integral of rho (A u) . v, A (3, 3), from a solid's mass, the case A = 1.
 
-    Each component of a solid has the same inertia, so that its mass is one of the nodes times the unit matrix.
+    Each component of a solid has the same inertia, so that its mass is a nodal matrix times the unit matrix.
     """
     return sparse.csr_array(sparse.kron(mass[::3, ::3], matrix, format="csr"))
 

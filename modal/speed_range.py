@@ -19,7 +19,7 @@ from vanedamp.modal.rotating import RotatingMatrices
 
 #: 1/min per rad/s
 RPM = 30.0 / np.pi
-# of the unit length of a shape: what the basis lacks of it for a field more
+# of the unit length of a shape: missing part of it for which the basis gains a field
 _LACKING = 1e-10
 # of the highest square that was solved for: the least distance of a mode from it
 _NEAREST = 1e-3
@@ -47,7 +47,7 @@ class SpeedRange:
 
     solved      rad/s, speeds with full solutions so far
 
-    Raises modal.rotating.UnstableError for a structure that is unstable at the greatest speed, and SolverError.
+    Raises modal.rotating.UnstableError for a structure that is unstable at the maximum speed, and SolverError.
     """
 
     def __init__(self, rotating: RotatingMatrices, low: float, high: float, count: int, gyroscopic: bool) -> None:
@@ -108,10 +108,10 @@ class SpeedRange:
         return np.asarray(change / self._inertia(modes, speed))
 
     def meetings(self, order: float) -> np.ndarray:
-        """Return the speeds, rad/s, at which a frequency is that of an engine order, omega = order * W, ascending.
+        """Return the speeds, rad/s, at which a frequency equals an engine order's, omega = order * W, ascending.
 
         (K0 + W^2 (K1 + i order G - order^2 M)) x = 0 is linear in the squared speed. Its eigenvalues turn negative one
-        after the other, each once: the i-th speed is that of the i-th lowest mode.
+        after the other, each once: the i-th speed belongs to the i-th lowest mode.
         """
         inertia = order**2 * self._small[2] - self._small[1]
         if self.gyroscopic:
@@ -122,9 +122,9 @@ class SpeedRange:
     def errors(self, speed: float) -> np.ndarray:
         """Return the estimated relative errors (m,) of the frequencies at a speed.
 
-        The error of an eigenvalue is r^T (K - lambda M)^-1 r over what the basis lacks. That is bounded by the residual
-        r in the norm of the inverse of the stiffness in the middle of the range, times the largest ratios of that
-        stiffness to K, in the basis, and of K to K - lambda M: what the basis lacks lies above the highest modes solved
+        The error of an eigenvalue is r^T (K - lambda M)^-1 r over the part that the basis lacks. It is bounded by
+        the residual r in the norm of the inverse of the stiffness in mid-range, times the largest ratios of that
+        stiffness to K, in the basis, and of K to K - lambda M: the missing part lies above the highest modes solved
         for at the neighbours and, its Rayleigh quotients being linear in the squared speed, above the line between
         these. So no mode below that line is missed, either.
         """

@@ -42,7 +42,7 @@ def doubts(
     materials  group -> Young's modulus (Pa) and density (kg/m^3)
     size       m, largest extent along an axis
     mass       kg
-    first_hz   first straining natural frequency; None where there is none
+    first_hz   first straining natural frequency; None if there is none
     """
     found = []
     for group, (young, density) in materials.items():

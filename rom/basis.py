@@ -1,6 +1,6 @@
-"""The bases of reduction by name: ours, and those that other packages add; other code asks them, never for a name.
+"""The bases of reduction by name: ours and other packages'. Other code calls their methods, never compares names.
 
-An installed package adds one, a ReductionBasis or an object that answers like one, in its pyproject.toml:
+An installed package adds one, a ReductionBasis or an object with its methods, in its pyproject.toml:
 
     [project.entry-points."vanedamp.bases"]
     guyan = "acme.guyan:GUYAN"
@@ -26,12 +26,12 @@ from vanedamp.rom.truncation import massless, truncated
 
 @dataclass(frozen=True)
 class ReductionBasis:
-    """What a basis keeps: modes, and how the rest of the structure follows statically.
+    """What a basis retains: modes, and the static response of the rest of the structure.
 
     held: whether the modes are those with the interface held; attached: blocks of attachment modes of natural modes;
     without_mass: whether the rest is a boundary without mass; more: whether further blocks follow on the attached ones;
     least: fewest modes of a structure that its supports hold; speeds: what joins the bases at several speeds of
-    rotation, None where the basis is that of one speed.
+    rotation, None if the basis holds at one speed.
     """
 
     held: bool = False
@@ -45,7 +45,7 @@ class ReductionBasis:
         self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize,
         keep_recovery: bool = False, quasi_static: int = 0, characteristic: int = 6,
     ) -> ReducedModel:  # fmt: skip
-        """Return the model with that many modes. Arguments and errors: those of rom.reduction.reduce."""
+        """Return the model with that many modes. Arguments and errors: see rom.reduction.reduce."""
         given = matrices, interface
         if self.held:
             most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
@@ -60,7 +60,7 @@ class ReductionBasis:
         self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize, blocks: int,
         keep_recovery: bool = False,
     ) -> ReducedModel:  # fmt: skip
-        """Return the model that `cut` takes those up to `modes` of, with that many blocks of quasi-static modes.
+        """Return the model from which `cut` takes those up to `modes`, with that many blocks of quasi-static modes.
 
         With 1 + BLOCKS, it has their error estimates as well (rom.error_estimate); Craig-Bampton models then have one.
         """

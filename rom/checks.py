@@ -15,12 +15,12 @@ from vanedamp.modal.algebra import symmetric_part
 _ASYMMETRY = 1e-9
 # negative eigenvalues of a semidefinite K, relative to the largest: round-off of the rigid motions of a free structure
 _INDEFINITE = 1e-9
-# of a matrix's largest entry: what is below on its diagonal counts as zero
+# of a matrix's largest entry: smaller diagonal entries count as zero
 _LEAST = 1e-60
 
 
 class ReducedModelError(VanedampError):
-    """A reduced model that does not fit together, or a question it cannot answer; the message names the field."""
+    """A reduced model that does not fit together, or a request that it cannot meet; the message names the field."""
 
 
 def check_definite(squares: np.ndarray) -> None:

@@ -86,8 +86,8 @@ def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: Col
     """Return the fraction of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
 
     A half sine of force at the contact frequency leaves mode j the energy (row_j p S(omega_j))^2 / 2, p the impulse at
-    the mass of the first mode and S the pulse's spectrum; relative to that of the approach and of all modes but the
-    first.
+    the mass of the first mode and S the pulse's spectrum; relative to the energy of the approach and of all modes
+    but the first.
     """
     reduced = 1.0 / (float(row[0]) ** 2 + 1.0 / collision.mass)
     spectrum = pulse_spectrum(np.sqrt(np.maximum(squares, 0.0) * reduced / collision.stiffness))

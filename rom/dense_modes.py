@@ -10,7 +10,7 @@ from vanedamp.rom.checks import ReducedModelError
 
 # ratio of the lowest to the highest squared frequency below which round-off of the highest is felt in the lowest
 _WIDE = 1e-6
-# round-offs of the stiffness, for each coordinate, below which a squared frequency is none
+# round-offs of the stiffness, for each coordinate, below which a squared frequency counts as zero
 _MARGIN = 20.0
 
 

@@ -1,4 +1,4 @@
-"""The ladder of models of one structure: the error of each, and the smallest that a tolerance needs.
+"""The model hierarchy of one structure: the error of each model, and the smallest within a tolerance.
 
 Forced responses. A Galerkin model leaves the residual R = W - Z T q_r, Z = K + i omega C - omega^2 M, and its
 receptance the error R^T Z^-1 R: the residual, weighed once more with the response it would cause. The basis has the low
@@ -8,7 +8,7 @@ basis with two more such blocks, which is the difference of the two models' rece
 factors at hand, for as many solutions as the interface has coordinates each.
 
 Contact. Bodies act on the structure by pulses, so an error of the pulse at the excitation frequency
-(rom.contact_pulse) is one of the force that changes the response.
+(rom.contact_pulse) is an error of the force that changes the response.
 
 Needs numpy and reduced models only.
 """
@@ -39,7 +39,7 @@ class LadderError(VanedampError):
 
 @dataclass(frozen=True)
 class Rung:
-    """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
+    """A model of the hierarchy with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
     above: fraction of a collision's energy that modes beyond the model's would take, which need not be an error;
     attached: whether the modes come with residual attachment modes (ReducedModel.attached).
@@ -63,7 +63,7 @@ class Choice:
     """The smallest model within a tolerance, and why.
 
     rigid    error of the rigid model (the first mode with every interface coordinate moving as the response)
-    ladder   the models compared
+    ladder   the models of the hierarchy
     sentence for people
     """
 
@@ -99,7 +99,7 @@ def frf_errors(
 
 
 def worst_rungs(ladders: Sequence[Sequence[Rung]]) -> list[Rung]:
-    """Return the largest errors of several ladders by their numbers of modes, of those that all of them have."""
+    """Return the largest errors of several hierarchies by number of modes, for the numbers that all of them have."""
     by_modes = [{rung.modes: rung for rung in ladder} for ladder in ladders]
     common = [modes for modes in by_modes[0] if all(modes in ladder for ladder in by_modes)]
     fields = [zip(*(astuple(ladder[modes]) for ladder in by_modes), strict=True) for modes in common]
@@ -115,7 +115,7 @@ def rigid_errors(
 ) -> np.ndarray:
     """Return the same (f,) of the rigid model: the first natural mode, in which every coordinate moves as `at`.
 
-    Only rotations, and motions across beside those along, stand still.
+    Only rotations, and transverse motions next to motions along a cavity, stand still.
     """
     first = richer.projected(
         linalg.eigh(richer.stiffness, richer.mass, subset_by_index=[0, 0])[1],
@@ -131,7 +131,7 @@ def _errors(
     receptance: np.ndarray, richer: ReducedModel, frequencies_hz: Sequence[float] | np.ndarray,
     labels: Sequence[str] | None, forces: Sequence[str] | None,
 ) -> np.ndarray:  # fmt: skip
-    """Return the relative errors (f,) of receptances (f, k, k) against those of a richer model."""
+    """Return the relative errors (f,) of receptances (f, k, k) against a richer model's."""
     rows = [richer.interface.index(label) for label in labels or richer.interface]
     columns = [richer.interface.index(label) for label in forces or labels or richer.interface]
     lengths = np.outer(richer.lengths[rows], richer.lengths[columns])
@@ -187,11 +187,11 @@ def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: 
 
 
 def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
-    """Return the smallest rung from which on the error stays within the tolerance, or the best one if none does."""
+    """Return the smallest model from which on the error stays within the tolerance, or else the best one."""
     if not 0.0 < tolerance < 1.0:
         raise LadderError(f"tolerance: expected a relative error between 0 and 1, not {tolerance}")
     errors = np.array([rung.error for rung in ladder])
-    late = np.maximum.accumulate(errors[::-1])[::-1]  # a small error by accident, with larger ones after it, is none
+    late = np.maximum.accumulate(errors[::-1])[::-1]  # a small error by accident, with larger ones after it: ignored
     within = np.flatnonzero(late <= tolerance)
     chosen = ladder[int(within[0])] if within.size else ladder[int(np.argmin(errors))]
     what = "mode" if chosen.modes == 1 else "modes"

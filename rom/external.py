@@ -77,8 +77,8 @@ def external_model(
     """Return a checked model of given matrices (n, n), with the findings of the checks.
 
     interface: label -> the coordinate's index, from 0, or a row (n,) over the coordinates. The other arguments are
-    those of ReducedModel.from_matrices. Raises ExternalError for matrices that are not symmetric or not (semi)definite
-    beyond the digits of a text file, and ReducedModelError for what does not fit together.
+    as in ReducedModel.from_matrices. Raises ExternalError for matrices that are not symmetric or not (semi)definite
+    beyond the digits of a text file, and ReducedModelError for parts that do not fit together.
     """
     matrices = {"mass": mass, "stiffness": stiffness} | ({} if damping is None else {"damping": damping})
     given = matrices | ({} if base_load is None else {"base_load": base_load})

@@ -21,7 +21,7 @@ MOTIONS = ("translation", "rotation")
 _DEPENDENT = 1e-10
 # the same of the constraints between rigid patches: an edge, straight within that fraction of its length, is a hinge
 _STRAIGHT = 1e-5
-# a mean normal shorter than this is that of a surface which faces everywhere, or that of several which face apart
+# a shorter mean normal belongs to a closed surface, or to several surfaces that face apart
 _FLAT, _ONE_WAY = 0.5, 0.9
 # sine of the least angle between the directions along and across that span a plane
 _APART = 0.5**0.5
@@ -47,7 +47,7 @@ class InterfaceCoordinate:
     motion     "translation", or "rotation": the small rotation about the direction through the centroid, rad
     point      where the rigid motion of an average patch is taken, m; None: at its centroid, where it is the mean
 
-    The motion of a patch that deforms is that of the rigid motion which fits it best over the area (least squares); its
+    A patch that deforms has the rigid motion that fits it best over the area (least squares); its
     translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
     """
 
@@ -102,9 +102,9 @@ def plane_motion(
     """Return the motion of a surface of a cavity in the plane of two directions: along, across and rotation.
 
     "<label>" is the displacement along, "<label>.normal" the one in the plane across it, "<label>.rotation" the small
-    rotation that turns the first into the second. Those of a kind "patch" are the means over it and the rotation of
+    rotation that turns the first into the second. Of kind "patch" they are the means over it and the rotation of
     its best rigid motion (area-weighted least squares, an RBE3); a "cavity" is the same for all surfaces of a cavity,
-    with the displacements at the middle of its floor, its lowest place across; a "node" has no rotation. Raises
+    with the displacements at the middle of its floor, its lowest transverse position; a "node" has no rotation. Raises
     InterfaceError for directions that span no plane, and a "patch" that faces several ways.
     """
     first, second = unit_direction(along), unit_direction(across)
@@ -242,7 +242,7 @@ class Interface(Displayed):
 def _resolved(matrices: SystemMatrices, item: InterfaceCoordinate) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Return functional (N,), normal of the patch (3,), place of the motion (3,), m, and radius of gyration, m.
 
-    The radius is that of the patch about the axis of a rotation; 0 for a displacement.
+    The radius refers to the axis of a rotation; it is 0 for a displacement.
     """
     patch, centroid, offsets = _around(matrices, item.facets)
     normal = _normal(patch)
@@ -266,7 +266,7 @@ def _resolved(matrices: SystemMatrices, item: InterfaceCoordinate) -> tuple[np.n
 def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: np.ndarray) -> np.ndarray:
     """Return the functional (N,) of axis . theta, theta the rotation in a patch's best rigid motion.
 
-    axis: (3,) of any length. Raises InterfaceError for nodes whose motion does not tell it.
+    axis: (3,) of any length. Raises InterfaceError for nodes whose motion does not determine it.
     """
     patch, _, offsets = _around(matrices, coordinate.facets)
     length = np.abs(offsets).max() or 1.0
@@ -293,9 +293,9 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
 
 
 def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -> sparse.csr_array:
-    """Return columns for the free DOFs outside rigid patches, then those of the motions that the patches can make.
+    """Return columns for the free DOFs outside rigid patches, then for the motions that the patches can make.
 
-    A patch alone makes up to six. Patches with common nodes make those in which these move with both, such as the
+    A single patch makes up to six. Patches with common nodes make those in which these move with both, such as the
     rotation about a common edge; a patch with nodes at the supports those in which the supports stay at rest.
     """
     free = np.zeros(matrices.size, dtype=bool)

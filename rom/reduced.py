@@ -1,6 +1,6 @@
-"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling knows no more of a structure.
+"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling sees nothing else of a structure.
 
-Needs numpy, scipy and the record store only: a user of another code enters here with `ReducedModel.from_matrices`.
+Needs numpy, scipy and the record store only: users of another code start with `ReducedModel.from_matrices`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectru
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 
-#: what follows the label of a displacement along a cavity in those of its motion across and of its rotation
+#: suffixes to the label of a displacement along a cavity: transverse motion, rotation
 NORMAL, ROTATION = ".normal", ".rotation"
 
 _KIND = "reduced-model"
@@ -202,7 +202,7 @@ class ReducedModel(Displayed):
     def contact_mass(self, label: str) -> float:
         """Return 1 / (w^T M^-1 w), kg: the mass that an impact on that interface coordinate has to move at once.
 
-        It falls with the number of modes kept, so Newton's impact law means another collision in every truncation. A
+        It falls with the number of modes kept, so Newton's impact law gives another collision in every truncation. A
         coordinate with residual flexibility has none.
         """
         if self.residual_flexibility is not None and self.residual_flexibility[(self._index(label),) * 2] > 0.0:
@@ -250,7 +250,7 @@ class ReducedModel(Displayed):
         """Return the model as it vibrates while it rotates at a constant speed, rad/s: K + speed^2 K1.
 
         A damping ratio holds for the modes at that speed. Raises ReducedModelError for a model that does not rotate, a
-        speed beyond those of its basis, and one at which the structure is unstable.
+        speed beyond its basis, and a speed at which the structure is unstable.
         """
         if speed == 0.0:
             return self
@@ -272,9 +272,9 @@ class ReducedModel(Displayed):
         return replace(self, **changes)
 
     def with_masses(self, masses: Iterable[tuple[str, float]]) -> ReducedModel:
-        """Return the model with masses (kg) fixed to interface coordinates, such as bodies glued to their cavities.
+        """Return the model with masses (kg) fixed to interface coordinates, such as bodies fixed in their cavities.
 
-        The damping matrix stays; it is then no longer that of one ratio.
+        The damping matrix stays; it no longer corresponds to one ratio.
         """
         mass = np.array(self.mass)
         for label, value in masses:

@@ -1,12 +1,12 @@
-"""Reduction of a rotating structure: K0 + speed^2 K1 on one basis that holds from standstill to a greatest speed.
+"""Reduction of a rotating structure: K0 + speed^2 K1 on one basis that holds from standstill to a maximum speed.
 
-The basis joins those of Craig and Bampton at several speeds, each from one factorisation. The constraint modes at
-standstill move the interface; what they become at other speeds, and the fixed-interface and quasi-static modes there,
+The basis joins Craig-Bampton bases at several speeds, each from one factorisation. The constraint modes at
+standstill move the interface; at other speeds these modes, and the fixed-interface and quasi-static modes there,
 differ from those at standstill by motions that leave the interface at rest. Of these differences a basis, orthogonal to
 the modes at standstill in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps
 it. As the squared speed enters the stiffness linearly, a few speeds are enough, spaced evenly in its square.
 
-The error between the speeds of the basis is estimated at those halfway (in the square): by what the model gains from
+The error between the speeds of the basis is estimated halfway (in the square), by the gain of the model from
 the basis of that speed, which is exact there but for the modes cut off at every speed.
 """
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _OWN_SHARE = 1e-10
 # relative error of natural frequencies between the speeds of the basis
 _FREQUENCY = 1e-5
-# speeds of the basis, standstill and the greatest among them
+# speeds of the basis, standstill and the maximum among them
 _MOST_SPEEDS = 6
 
 
@@ -129,7 +129,7 @@ def reduce_rotating(
     frequencies: Callable[[ReducedModel], np.ndarray] | None = None,
     keep_recovery: bool = False,
 ) -> ReducedModel:
-    """Reduce a rotating structure with one basis from standstill to a greatest speed, rad/s.
+    """Reduce a rotating structure with one basis from standstill to a maximum speed, rad/s.
 
     modes        fixed-interface modes kept (default: all of the bases)
     tolerance    relative error of the interface's receptance between the speeds of the basis; natural frequencies in
@@ -138,7 +138,7 @@ def reduce_rotating(
     keep_recovery  keep the basis, to reconstruct full displacements
 
     Speeds are added to the basis until the estimated error is within the tolerance, or there are six; the estimate
-    is `rotation` of the provenance. The structure is stable at the greatest speed. Raises ReductionError.
+    is `rotation` of the provenance. The structure is stable at the maximum speed. Raises ReductionError.
     """
     if not greatest_speed > 0.0:
         raise ReductionError(f"greatest_speed: expected a speed above 0 rad/s, not {greatest_speed:g}")

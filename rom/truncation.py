@@ -13,7 +13,7 @@ from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectrum
 from vanedamp.rom.reduced import ReducedModel
 
-# natural modes, and what the structure does beyond them, are those of one stiffness
+# natural modes and the residual response belong to one stiffness
 _AT_ONE_SPEED: dict[str, Any] = {"centrifugal_stiffness": None, "greatest_speed": 0.0}
 
 

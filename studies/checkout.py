@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from vanedamp.files.errors import VanedampError
 
-#: folder that holds the package vanedamp: the top of the repository, or a folder of installed packages
+#: folder that holds the package vanedamp: the root of the repository, or a folder of installed packages
 _ROOT = Path(__file__).parents[2]
 
 
@@ -20,7 +20,7 @@ class CheckoutError(VanedampError):
 
 
 class CheckoutCommand(NamedTuple):
-    """A command whose arguments and work are in the module `command` of a package at the top of the repository.
+    """A command whose arguments and work are in the module `command` of a package at the root of the repository.
 
     NAME, SUMMARY, ORDER: as studies.commands says. The methods raise CheckoutError where there is no checkout.
     """

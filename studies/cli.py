@@ -1,4 +1,4 @@
-"""The command `vanedamp`: it finds its commands (studies.commands), runs one, and says in a line what went wrong."""
+"""The command `vanedamp`: it finds its commands (studies.commands), runs one, and reports errors in one line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FINITE_ELEMENTS = (
     "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx, or "
     "conda's environment.yml (CONTRIBUTING.md)"
 )
-#: names of packages that are not those of their modules
+#: names of packages that differ from their modules'
 _ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
 
 
@@ -38,7 +38,7 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that refuses a wrong command line in one line."""
+    """A parser that rejects a wrong command line in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
     to be had, with one line on standard error; 130 when interrupted.
 
-    argv: the words after the command's name; None: those of this process, whose end is not interrupted any more.
+    argv: the words after the command's name; None: this process's, whose end is not interrupted any more.
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
     if sys.stderr is None:
@@ -88,13 +88,13 @@ def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
         with warnings.catch_warnings():
-            if not sys.warnoptions:  # of numbers that overflow on their way to the line that refuses them
+            if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
             arguments = _parser(words[0] if words else None).parse_args(words)
             input_file = getattr(arguments, "input", None)
             arguments.run(arguments)
             sys.stdout.flush()
-    except BrokenPipeError:  # nobody reads on
+    except BrokenPipeError:  # the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (ValueError, OSError, ImportError, MemoryError) as error:
@@ -106,7 +106,7 @@ def _run(words: Sequence[str]) -> int:
 
 
 def _message(error: Exception, file: str | None) -> str | None:
-    """Say what is wrong with the input (in a file) or what the machine lacks; None for a fault of the program."""
+    """Describe the error of the input (in a file) or the machine's deficiency; None for a fault of the program."""
     if isinstance(error, OSError):
         where = error.filename or "standard output, or another file"
         return f"{where}: {error.strerror}" if error.strerror else str(error)

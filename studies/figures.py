@@ -1,6 +1,6 @@
 """Figures by matplotlib: colours, axes, and how they are saved.
 
-They are made without pyplot, which chooses a window system and keeps every figure that nobody closes.
+They are made without pyplot, which chooses a window system and keeps every figure until it is closed.
 """
 
 from __future__ import annotations

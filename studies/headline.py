@@ -1,7 +1,7 @@
 """The key results of a damped curve: its peak over that of the curve without bodies, in the same range.
 
 The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
-many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
+many of these are left out, whether the peak lies at an edge of the range, and whether the points are too coarse.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ class _Top(NamedTuple):
 
 @dataclass(frozen=True)
 class Headline:
-    """The figures of a damped curve; nan or None where there is none.
+    """The results of a damped curve; nan or None where there is none.
 
     damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
     onset                        first place where the bodies change the mean by more than 1 %
-    peak_at_edge, undamped_at_edge, fixed_at_edge   whether a top lies at an edge of the frequencies: no resonance's
+    peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
                                  resonances, and width of the undamped one
     points, points_left_out      of the curve, and how many of them are not ok
@@ -60,7 +60,7 @@ class Headline:
     points_left_out: int
 
     def relative(self, height: float) -> float:
-        """Return an amplitude, m, over the maximum without bodies; nan where that has no bound or is none."""
+        """Return an amplitude, m, over the maximum without bodies; nan where that is unbounded or zero."""
         return height / self.undamped_peak if 0.0 < self.undamped_peak < math.inf else math.nan
 
     @property
@@ -75,7 +75,7 @@ class Headline:
 
     @property
     def remarks(self) -> list[str]:
-        """Reasons that keep the ratio from being that of two resonance peaks, along the frequency."""
+        """Reasons why the ratio does not compare two resonance peaks, along the frequency."""
         return self.remarks_in("Hz")
 
     def remarks_in(self, units: str) -> list[str]:
@@ -168,7 +168,7 @@ def headline(
 
 
 def reference_of(undamped: np.ndarray, peaks: Mapping[str, float]) -> float:
-    """Return what charts divide amplitudes by, m: the undamped maximum, of the points where the peak has no bound."""
+    """Return the divisor of amplitudes in charts, m: the undamped maximum, at the points if the peak is unbounded."""
     known = float(peaks.get("undamped_peak", math.nan))
     return known if 0.0 < known < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
 

@@ -1,7 +1,7 @@
 """Loaded once by the server from which the workers of a pool are forked (studies.workers): the engine, compiled.
 
-Workers share its memory as long as none of them writes there. It loads what is compiled and compiles nothing: that
-would take a minute in which nobody could interrupt it, and the first worker does it just as well.
+Workers share its memory until one writes there. It loads compiled code and compiles nothing: that
+would take a minute in which it could not be interrupted, and the first worker does it just as well.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a scene must have before it runs, beyond what its record checks; quick to load, for quick answers."""
+"""Requirements of a scene before it runs, beyond its record's checks; quick to load, for quick answers."""
 
 from __future__ import annotations
 

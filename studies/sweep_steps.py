@@ -23,12 +23,12 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.terminal import progress
 
-#: samples a period of the run at the peak
+#: samples per period of the run at the peak
 PEAK_SAMPLES = 200
 
 
 class Prepared(NamedTuple):
-    """A sweep before its first run: its points, what its result says of its making, and those points that are done.
+    """A sweep before its first run: its points, its provenance, and the points that are done.
 
     checkpoint: the file that keeps finished points, None: nowhere; resumed: points that it had.
     """

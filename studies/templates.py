@@ -13,7 +13,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
 
-#: mass of the body over that of the structure, and its gap over the amplitude without bodies
+#: mass of the body over the structure's, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
 #: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
@@ -46,7 +46,7 @@ Template = tuple[dict[str, Any], dict[str, str]]
 
 
 def template(kind: str, file: Path, rom: Path | None = None) -> Template:
-    """Return what a file of a kind (scene, study or case) begins with, with its comments.
+    """Return the first version of a file of a kind (scene, study or case), with its comments.
 
     A scene is of the shipped rigid model, or of a reduced model (rom), a study is on the same scene. Raises InputError
     for the reduced model's file, and for one with a case.
@@ -92,7 +92,7 @@ def _case(file: Path) -> Template:
 
 
 def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
-    """Return a scene whose gap and mass are those of a good damper, by the resonance of its structure."""
+    """Return a scene with gap and mass of a good damper, by the resonance of its structure."""
     shipped = Structure.shipped()
     amplitude = _rounded(shipped.amplitude, 2)
     if rom is None:

@@ -21,7 +21,7 @@ from typing import Any
 from vanedamp.files.interrupts import uninterrupted
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-#: what the server of workers loads before it forks the first one
+#: modules that the server of workers loads before it forks the first one
 _PRELOADED = "vanedamp.studies.preloaded"
 
 
@@ -34,7 +34,7 @@ class WorkerPool(Executor):
         self._pool = self._new()
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
-        """Run a call in a worker. What a broken pool has lost is not run again."""
+        """Run a call in a worker. Calls lost by a broken pool are not run again."""
         with uninterrupted():  # submit starts them
             try:
                 return self._pool.submit(function, *arguments, **options)
@@ -65,7 +65,7 @@ class WorkerPool(Executor):
 def _context() -> BaseContext:
     """Return how workers begin: not as a fork of this process, which may hold MPI or threads.
 
-    On Linux they are forks of a server that holds neither, and that has the engine in its memory, which they share.
+    On Linux they are forks of a server that holds neither, and that has the engine in common memory.
     Elsewhere the system's libraries may have threads of their own, and each worker starts afresh.
     """
     if sys.platform != "linux":
@@ -76,7 +76,7 @@ def _context() -> BaseContext:
     context.set_forkserver_preload([_PRELOADED])
     before = {name: os.environ.pop(name) for name in _THREADS if name in os.environ}
     try:
-        # every worker has a core of its own, and a library that is told this starts no thread in the server
+        # every worker has a core of its own, and with this setting a library starts no thread in the server
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         forkserver.ensure_running()
     finally:

@@ -1,4 +1,4 @@
-"""The engines, of sliders and for bodies in the plane, behind one door: what a system contains decides which runs."""
+"""Common entry of both engines, for sliders and for planar bodies: the contents of a system decide which runs."""
 
 from __future__ import annotations
 

@@ -42,9 +42,9 @@ class Method(Protocol):
 
     It may also have RESTARTS = True: its runs leave a state that others can begin with. And WAVEFORMS = True: it takes
     an excitation that is no sum of the system's harmonics, whose loads (k, N), N, at angles omega t (k,) in [0, 2 pi),
-    system.assembly.loads_of returns, in place of those of the system. Other methods reject such an excitation.
+    system.assembly.loads_of returns, in place of the system's. Other methods reject such an excitation.
 
-    A method that takes bodies in the plane has PLANAR_LAWS: what it takes there apart from rigid contacts of one
+    A method that takes bodies in the plane has PLANAR_LAWS: what it accepts there apart from rigid contacts of one
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
     sentence that every run of such bodies with friction carries.
     """
@@ -55,7 +55,7 @@ class Method(Protocol):
     def begin(self, scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
         """Return a run of a scene at time zero; `scene.solver` is an instance of Options.
 
-        system: of the scene; a method for bodies that only slide may take its rows (system.line_system). records: room
+        system: of the scene; a method for bodies that only slide may take its rows (line_system). records: storage
         for all periods, to be filled (response.recorder); events: whether to keep a log of them. start: where the run
         begins, of the scene or of another run; response.restart.motion_of has its coordinates. Raises InputError for an
         impossible scene.

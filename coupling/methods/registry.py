@@ -38,7 +38,7 @@ def respond(
 
 
 def final_state(scene: Scene, run: Run) -> RestartState | None:
-    """Return the state that a run of a scene has come to; None within a period, or if the method keeps none."""
+    """Return the present state of a run of a scene; None within a period, or if the method keeps none."""
     state = run.final()
     return None if state is None else marked_with_speed(scene, state)
 

@@ -7,9 +7,9 @@ this where the body is going to be. In the steady motion of the slider it tilts 
 allows and far more than round-off, lifts them, so that they do not lie flat at once, and watches for some tens of
 periods whether tilts persist. Some starts have a large tilt, since aligned and tilted motion can both be steady.
 
-Where no tilt persists, slider and block have one steady motion. Where some do, these runs go on, and their mean
-amplitude beside the slider's is the slider's error. A tilt may live for hundreds of periods and then die, and leave the
-structure in another steady motion than the slider's: before a slider is taken beside tilts that persist, all runs go on
+Where no tilt persists, slider and block have one steady motion. Where some do, these runs continue, and their mean
+amplitude compared with the slider's gives its error. A tilt may live for hundreds of periods and then die, leaving the
+structure in another steady motion than the slider's: before it is accepted despite lasting tilts, all runs continue
 for three times as long, and the error is the larger one of both windows. A block that tilts further than its run
 allows has no amplitude to compare with.
 """
@@ -41,7 +41,7 @@ from vanedamp.files.toml_input import InputError
 
 #: relative error of the mean amplitude that is allowed unless a body says otherwise
 TOLERANCE = 0.05
-#: tilts that blocks begin with, as shares of the largest that their cavity allows; share from which on one has grown
+#: tilts that blocks begin with, as fractions of the largest that their cavity allows; fraction above which it has grown
 _SMALL, _LARGE, _GROWN = 1e-4, 0.3, 0.05
 _TILTS = (_SMALL, -_SMALL, _LARGE, _SMALL, -_SMALL, -_LARGE)
 #: heights above the floor over the play: of large tilts, and the least of small ones
@@ -50,13 +50,13 @@ _LIFT, _BARELY = 0.4, 1e-3
 _FALL = 2.0
 #: periods between two starts
 _APART = 7
-#: events in a period, of each body, beyond which a run of the check is not worth its time
+#: events per period and body, beyond which a run of the check is not worth its time
 _EVENTS = 1000
 #: periods after which a tilt can have died, can be said to persist, and persists unless it has died
 _EARLY, _WATCH, _LONGEST = 20, 60, 240
 #: tilts that persist after which no more are tried, periods over which means are taken, and batches of each block's
 _ENOUGH, _WINDOW, _SLIDER_WINDOW, _BATCHES = 3, 240, 480, 3
-#: periods for which runs go on before a slider is taken beside tilts that persist
+#: periods for which runs continue before a slider is accepted despite persisting tilts
 _LATER = 480
 
 
@@ -106,9 +106,9 @@ def with_sliders(scene: Scene) -> Scene:
 def with_blocks(scene: Scene, share: float = _LARGE) -> tuple[Scene, RestartState | None]:
     """Return the scene with its bodies of shape "auto" as blocks, and the state that it begins with.
 
-    That is the sliders' settled motion with a tilt, `share` of the largest: started from rest, a block can lie flat
+    That is the sliders' settled motion with a tilt, `share` times the largest: started from rest, a block can lie flat
     before it meets a wall, and is a slider for good. None, the scene's own start, where that is across a cavity, and
-    where sliders do not settle for a numerical trouble.
+    where sliders do not settle because of a numerical failure.
     """
     blocks, sliders = _changed(scene, {"shape": "block"}), with_sliders(scene)
     bodies = [damper for damper in scene.damper if damper.shape == "auto"]
@@ -230,7 +230,7 @@ def _error(slider: Run, settled: int, blocks: Sequence[Run], tolerance: float) -
     """Return the error of the slider's mean amplitude relative to the blocks', and its 95 % confidence.
 
     The runs end before they have settled as well, if they show by then that it exceeds the tolerance. Where it stays
-    within, they go on, and the worse one of both windows counts. Raises _Ended.
+    within, they continue, and the worse one of both windows counts. Raises _Ended.
     """
     own = 2 * settled + _SLIDER_WINDOW
     early, last = max(settled, 2 * _WATCH), settled + _WINDOW

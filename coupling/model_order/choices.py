@@ -1,6 +1,6 @@
-"""All that scenes leave open, chosen: the number of modes (selection), then the shape of the bodies (body_choice).
+"""Open choices of scenes: the number of modes (selection), then the shape of the bodies (body_choice).
 
-The points of a sweep share their choices, so that a curve is one model's.
+All points of a sweep have the same choices, so that a curve belongs to one model.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def leaves_open(scene: Scene) -> bool:
 
 
 def choose(scene: Scene) -> Chosen:
-    """Return a scene with what it leaves open. Raises InputError when there is no good choice."""
+    """Return a scene with its open choices made. Raises InputError when there is no good choice."""
     return with_choices(scene, choices_of([scene]))
 
 

@@ -35,7 +35,7 @@ def sensitivity(
     """Return the change of the mean amplitude over the undamped one (m), for a relative change of all pulses.
 
     The largest over the frequencies (Hz), with `modes` natural modes, as few as the motion there takes. wall: the first
-    mode's entry of the wall's functional; pulse: that of the collision on the whole model.
+    mode's entry of the wall's functional; pulse: of the collision on the whole model.
     """
     reduced = 1.0 / (wall**2 + 1.0 / collision.mass)
     growth = min(max(abs(pulse.transform) / reduced, 1.0 + _PLASTIC), 2.0)  # 1 + restitution

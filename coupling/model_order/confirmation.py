@@ -1,6 +1,6 @@
-"""Runs that confirm a choice of modes: the model chosen beside the whole one, with the bodies as they are.
+"""Runs that confirm a choice of modes: the model chosen compared with the whole one, with the bodies as they are.
 
-The estimate weighs errors of forces; which of several steady states a motion comes to it does not know. So both models
+The estimate weighs errors of forces; it does not predict which of several steady states is reached. So both models
 run from the scene's own start, and each once more from the other's motion. Where their mean amplitudes differ by more
 than the tolerance a larger model is tried. A difference is one of steady states that both models have if each keeps the
 other's motion: then no number of modes decides between them.
@@ -35,7 +35,7 @@ _SAFETY = 1.5
 
 @dataclass(frozen=True)
 class Confirmed(Choice):
-    """A choice that runs have confirmed, or that rests on the estimate alone.
+    """A choice that runs have confirmed, or that rests on the estimate only.
 
     difference: largest difference of the mean amplitude from the whole model's, relative to the peak without bodies;
     None where nothing was run. several: whether both models have several steady states between which they differ.
@@ -89,7 +89,7 @@ def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confi
 
 
 class _Pair:
-    """A scene with the whole model, beside which others are run. Differences are relative to a peak, m."""
+    """A scene with the whole model, with which other models are compared. Differences are relative to a peak, m."""
 
     def __init__(self, scene: Scene, whole: Rung, peak: float, tolerance: float) -> None:
         self.peak, self.tolerance = peak, tolerance

@@ -2,7 +2,7 @@
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.error_estimate):
 of the receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus
-that of the pulse of a collision, in the measure in which the bodies can change the response at all. The whole model of
+the error of a collision's pulse, in proportion to the bodies' possible effect on the response. The whole model of
 the file is the measure; of scenes at several speeds of rotation at the lowest, the middle and the highest of these.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
@@ -36,14 +36,14 @@ from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, na
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
-#: bodies that hit twice a period act like up to 1.7 times their mass, and damp the response as well
+#: bodies that hit twice per period act like up to 1.7 times their mass, and damp the response as well
 _IMPACTS = 2.0
-#: share of a flexibility in common from which on a warning is given
+#: common fraction of a flexibility from which on a warning is given
 _SHARED = 0.1
 #: empirical upper bound of sensitivity(richer model) / sensitivity(one mode)
 _CAUTION = 5.0
-#: resonances in the range that are tried, share of the highest from which on they count, and places on the way from
-#: loose (0) to glued bodies (1)
+#: resonances in the range that are tried, fraction of the highest from which on they count, and steps from
+#: loose (0) to fixed bodies (1)
 _RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
 #: scenes of a sweep that are tried, of those that differ in more than their frequency
 _SCENES = 4
@@ -71,7 +71,7 @@ def select_model_order(scene: Scene) -> Selected:
 
 
 def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
-    """Select for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
+    """Select for the points of a sweep: points with one model and tolerance have the choice that suits them all."""
     choices = choices_of(scenes)
     return [with_choice(scene, choices) for scene in scenes]
 
@@ -79,7 +79,7 @@ def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
 def choices_of(scenes: Iterable[Scene]) -> Choices:
     """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
-    Raises InputError for a scene with stops, whose impacts the estimate does not know, and for one whose sines it
+    Raises InputError for a scene with stops, whose impacts the estimate does not include, and for one whose sines it
     cannot try.
     """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
@@ -248,7 +248,7 @@ def _peak(scene: Scene) -> float:
 
 
 class _Ladders(NamedTuple):
-    """Errors of models at one speed: of the rigid one, and of those of natural modes, without and with attachments."""
+    """Errors of models at one speed: of the rigid model, and of natural modes without and with attachments."""
 
     rigid: float
     rungs: tuple[list[Rung], list[Rung]]
@@ -278,7 +278,7 @@ def _ladders(
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
-    """Return the difference of the responses with loose and with glued bodies, relative to the larger."""
+    """Return the difference of the responses with loose and with fixed bodies, relative to the larger."""
     loose, glued = (_waves(scene, item, frequencies) for item in (model, _glued(scene, model)))
     size = np.maximum(np.abs(loose), np.abs(glued)).max(axis=0)
     return float((np.abs(glued - loose).max(axis=0) / size).max())
@@ -304,7 +304,7 @@ def _waves(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> np.nda
 
 
 def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
-    """Return the model with every body glued to its cavity's floor."""
+    """Return the model with every body fixed to its cavity's floor."""
     floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
     return model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
 
@@ -342,7 +342,7 @@ def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
 def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple[list[float], int]:
     """Return frequencies (Hz) at which bodies collide if they do anywhere in the range, and the modes needed there.
 
-    The highest resonances in the range, from that of the loose to that of the glued bodies, between which a damped peak
+    The highest resonances in the range, from loose to fixed bodies, between which a damped peak
     lies; without one, the ends and the middle of the range.
     """
     low, high = float(frequencies[0]), float(frequencies[-1])

@@ -77,7 +77,7 @@ def _root(
 
     Orbits are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
     whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, the
-    zero is that of the chord.
+    zero is the chord's.
     """
     length = float((after.y - before.y) @ before.tangent)
     points: dict[float, Point] = {0.0: before, length: after}

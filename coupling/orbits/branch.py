@@ -80,7 +80,7 @@ class Branch:
     undetermined        (m,) whether stability is open: events meet or graze, and multipliers hold on one side only
     special             bifurcations, changes of the sequence, and the end
     end                 why it was not followed further
-    source              the branch, and its special point, from which this one goes out; None for the first
+    source              the branch, and its special point, from which this one bifurcates; None for the first
     """
 
     periods: int
@@ -130,7 +130,7 @@ class Branches(SceneRecord, Displayed):
     """Branches of periodic orbits of a scene over one of its numbers.
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
-    were found; iterations: of Newton's method; warnings: to be read before figures are used; provenance: versions and
+    were found; iterations: of Newton's method; warnings: to be read before results are used; provenance: versions and
     further data of the caller (JSON-able).
     """
 

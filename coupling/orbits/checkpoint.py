@@ -1,4 +1,4 @@
-"""Branches of orbits on disk while they are followed, from which an interrupted command goes on."""
+"""Branches of orbits on disk while they are followed, from which an interrupted command resumes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vanedamp.files.store import Variable
 class Checkpoint(SceneCheckpoint):
     """What was found so far, in a file (path None: nowhere).
 
-    found: branches, whose last one is unfinished if its end is ""; tangent, step: where that one goes on; current:
+    found: branches, whose last one is unfinished if its end is ""; tangent, step: where that one continues; current:
     returns all three as they are now.
     """
 
@@ -25,7 +25,7 @@ class Checkpoint(SceneCheckpoint):
         self, path: str | Path | None, scene: Scene, provenance: Mapping[str, Any],
         current: Callable[[], tuple[Branches, np.ndarray, float]],
     ) -> None:  # fmt: skip
-        """Take up what the file holds. Raises InputError for the file of other branches, or one that cannot be read."""
+        """Take up what the file holds. Raises InputError for a file of other branches or an unreadable one."""
         super().__init__(path, "orbits-checkpoint", scene, provenance)
         self._current = current
         self.found: Branches | None = None

@@ -54,7 +54,7 @@ class Continuation:
     def begin(
         cls, problem: Problem, table: Table, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None
     ) -> Continuation:
-        """Return a branch of one orbit that goes on in the direction of `row` (k + 1,)."""
+        """Return a branch of one orbit that continues in the direction of `row` (k + 1,)."""
         point = BranchPoint.of(with_symmetry(problem, orbit))
         return cls(problem, table, [point], point_of(problem, orbit, row), source)
 
@@ -173,7 +173,7 @@ class Continuation:
     # -- changes of the event sequence
 
     def _cross(self, step: float) -> None:
-        """Go on with the next sequence of events from where the present one ends, within a step; or end the branch."""
+        """Continue with the next sequence of events where the present one ends, within a step; or end the branch."""
         head = self.head
         last, point = self._last(head, step)
         if last is not head and self._search(head, last):

@@ -3,7 +3,7 @@
 It is the product, in the order of time, of the propagators of segments (orbits.dynamics) and of the saltation matrices
 of events (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 Systems, 2004, chapter 7). The engine decides everything: times, contact states, impulses. The derivative checks itself:
-at every event the motion that its own flows predict must be the engine's, and what is at rest must stay so.
+at every event the motion that its own flows predict must be the engine's, and coordinates at rest must stay so.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.response.segment import Event, Segment
 
-#: largest difference of the engine's motion and that of the own flows, relative to a coordinate's size, and that size
+#: largest difference of the engine's motion and the own flows', relative to a coordinate's size, and that size
 #: where it hardly moves, relative to its typical one
 _AGREEMENT, _LEAST = 1e-8, 1e-4
 #: difference of a speed after an impact and its law's, relative to the fastest there
@@ -81,7 +81,7 @@ def begins(segment: Segment) -> bool:
 class Derivative:
     """The derivative M (2N, k) of u by the state at the start, in units of its sizes `scale` (k,).
 
-    status: what is wrong with it so far, if anything.
+    status: its defect so far, if any.
     """
 
     def __init__(self, dynamics: Dynamics, start: Start) -> None:
@@ -106,7 +106,7 @@ class Derivative:
         return M * self._scale
 
     def after(self, before: Before, new: Segment, flow: Flow, u: np.ndarray, guards: list[Guard]) -> np.ndarray:
-        """Return M after an event, or a period's end, as the motion goes on from u (2N,). Raises Untrusted."""
+        """Return M after an event, or a period's end, as the motion continues from u (2N,). Raises Untrusted."""
         event, jump = before.event, np.eye(self.dynamics.one)
         if event.unit < 0:
             if not self._agrees(before.u, u):
@@ -208,7 +208,7 @@ class Derivative:
         self, before: Before, new: Segment, flow: Flow, u: np.ndarray, jump: np.ndarray, jumped: np.ndarray,
         guards: list[Guard],
     ) -> np.ndarray:  # fmt: skip
-        """Return the derivative after an event: jump M, and what the event's shift in time brings.
+        """Return the derivative after an event: jump M, and the effect of the event's shift in time.
 
         jumped: (N,) of w. Parts of the system that do not feel each other have their own events.
         """
@@ -283,7 +283,7 @@ class Derivative:
         return ways[0]
 
     def _check_still(self, new: Segment, M: np.ndarray) -> None:
-        """Raise Untrusted if the derivative moves what is at rest now."""
+        """Raise Untrusted if the derivative moves coordinates at rest."""
         dynamics, u = self.dynamics, len(new.state)
         rigid = np.isinf(self.system.spring) & presses(new.state) & (np.arange(u) < self.system.contacts)
         stuck, k = dynamics.flow(new.state, new.open_force).stuck, dynamics.one

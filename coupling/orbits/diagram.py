@@ -1,4 +1,4 @@
-"""A diagram of branches: the first one, and those that go out from its period doublings and pitchforks."""
+"""A diagram of branches: the first one, and those bifurcating at its period doublings and pitchforks."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Diagram:
 
     @property
     def place(self) -> tuple[np.ndarray, float]:
-        """Tangent (k + 1,) and step with which the last branch goes on."""
+        """Tangent (k + 1,) and step with which the last branch continues."""
         if self.current is None:
             return np.zeros(len(self.map.scale) + 1), 0.0
         return self.current.head.tangent, self.current.step
@@ -143,7 +143,7 @@ class Diagram:
         return point.note == "branches meet" and branch.special[-1].note.startswith("joins")
 
     def _switched(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> Continuation | None:
-        """Return the branch that goes out from a bifurcation; None, with a note, if no orbit of it is found."""
+        """Return the branch that starts at a bifurcation; None, with a note, if no orbit of it is found."""
         doubled = point.kind == "period doubling"
         periods = branch.periods * (2 if doubled else 1)
         if periods > _MOST_PERIODS:

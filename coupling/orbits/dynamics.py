@@ -6,7 +6,7 @@ squares of u, and every matrix has entries of the order of the frequencies. Betw
     z' = X z,    z = (u, size, size cos(omega_h t), size sin(omega_h t)),
 
 where loads and constants are columns of X. Gaps, slips and forces are functionals of z, so that their rates and second
-derivatives are those of z: whatever an event asks of its function is in one row.
+derivatives refer to z: whatever an event asks of its function is in one row.
 
 M q'' = -K q - C q' + loads + W lambda, with W the directions of the forces of units: a contact that slips has its
 friction in the direction of its normal force, W_N - sigma mu W_T. What closed contacts and units that stick hold, is
@@ -127,7 +127,7 @@ class Dynamics:
     def followed(self, state: np.ndarray) -> np.ndarray:
         """Return the map (2N, 2N) of u to that with sliders as they are in states (u,).
 
-        Those of Jenkins elements that slip follow what draws them, others rest.
+        Sliders of Jenkins elements that slip follow their driving motion, others rest.
         """
         size, matrix = len(self.root), np.eye(2 * len(self.root))
         for a, drawn, slips in zip(self.sliders, self.drawn, state[self.jenkins] != codes.STICK, strict=True):
@@ -158,7 +158,7 @@ class Flow:
         self.stuck = (state == codes.STICK) & self.rubs
         stick, slides = np.flatnonzero(self.stuck), np.flatnonzero(~contact & (self.way != 0.0))
         drag = (self.way * system.friction)[:, None]
-        # forces that are known, and what they act on: the force of a slider that moves is that on what draws it
+        # known forces, and their coordinates: the force of a moving slider acts on its driver
         self.forces, acts = np.zeros((2 * u, len(dynamics.turn))), rows.copy()
         self.forces[:, one] = open_force / dynamics.size
         pushed = system.spring[springs, None] * dynamics.gap[springs]
@@ -271,7 +271,7 @@ def _projector(rows: np.ndarray) -> np.ndarray:
 def _oblique(rows: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Return the projector (N, N) of accelerations onto what rows (m, N) leave, along wrenches (N, m).
 
-    By bases of both sides, whose condition is not the square of that of rows that nearly depend on each other. Where
+    By bases of both sides, whose condition is not the square of the condition of nearly dependent rows. Where
     these differ in number, as wrenches depend on each other and rows do not, by the least squares of the rows.
     """
     if np.array_equal(rows, wrench.T):

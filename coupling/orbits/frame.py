@@ -1,4 +1,4 @@
-"""States of a scene in the order of RestartState and those of its system, (q, q'): names, sizes, mirror images."""
+"""States of a scene in the order of RestartState and in its system's, (q, q'): names, sizes, mirror images."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from vanedamp.files.toml_input import InputError
 class Frame:
     """A scene's system, and its states (k,).
 
-    speed: of rotation whose modes those of the states are, rad/s; None: the scene's own. A reduced model's modes turn
+    speed: of rotation at which the states' modes were taken, rad/s; None: the scene's own. A reduced model's modes turn
     with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
-    to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; rates of sliders of Jenkins elements are none
+    to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders of Jenkins elements have no rates
     of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
     state; longest: (j,) m, elongations at their bounds.
     """
@@ -141,9 +141,9 @@ class Frame:
 
 
 def _image_of(system: System) -> np.ndarray | None:
-    """Return the map (N, N) of coordinates to those of the mirror image; None where that is another scene.
+    """Return the map (N, N) of coordinates to the mirror image; None where that is another scene.
 
-    The structure's motion turns its sign, and so do those of the bodies along their cavities, in reversed order.
+    The motions of the structure and of the bodies along their cavities change sign, bodies in reversed order.
     """
     size, u = len(system.mass), len(system.rest)
     image = -np.eye(size)

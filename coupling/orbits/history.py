@@ -42,7 +42,7 @@ class OrbitHistory:
 
 
 def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
-    """Return the motion that a period map passes from a state (k,), that of an orbit at the start of its period."""
+    """Return the motion that a period map passes from a state (k,), an orbit's at the start of its period."""
     scene, periods = period_map.scene, period_map.periods
     whole = replace(scene, time=Time(periods=periods, transient=0), sweep={}, orbit=None)
     response = simulate(whole, events=True, samples_per_period=SAMPLES, start=period_map.restart_of(state))

@@ -16,9 +16,9 @@ from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
-#: a speed after an impact below this fraction of the fastest of its contacts is none: the end of a chatter
+#: a speed after an impact below this fraction of the fastest of its contacts counts as zero: the end of a chatter
 _PLASTIC = 1e-9
-#: energy that an impact may bring, as a fraction of what is there
+#: energy that an impact may add, as a fraction of the present energy
 _GAIN = 1e-12
 #: fraction of its bound by which friction is short of it where a contact sticks; of a slip that is round-off
 _EDGE, _ROUND_OFF = 1e-9, 1e-13
@@ -29,7 +29,7 @@ _STEPS, _SMOOTH = (1e-2, 5e-3), 1e-8
 
 
 class Untrusted(ArithmeticError):
-    """The derivative's own motion has left that of the engine, or the motion has none."""
+    """The derivative's own motion differs from the engine's, or the motion has no derivative."""
 
 
 class Jump(NamedTuple):
@@ -83,7 +83,7 @@ def _expand(
     system: System, pressed: Jump, roles: _Roles, given: np.ndarray, steep: np.ndarray, impulse: np.ndarray,
     speed: float,
 ) -> Jump:  # fmt: skip
-    """Return the jump of an expansion with given normal impulses (u,), their derivatives (u, N), and what is more.
+    """Return the jump of an expansion with given normal impulses (u,), their derivatives (u, N), and the rest.
 
     impulse: (2u,) of the expansion, as the engine has it; speed: the fastest of the scene, m/s.
     """
@@ -119,7 +119,7 @@ def _newton(
     part = _blow(system, begun, roles, share * kept * approach, -share * steep[:, None] * rows).jump
     none = _blow(system, begun, roles, np.zeros(len(hit)), np.zeros(rows.shape)).jump
     by_share = (part.v - none.v) / share
-    # the impulses bring what is allowed, m (v+^2 - v^2) = GAIN m v^2:  m v+ dv+ = (1 + GAIN) m v dv
+    # the impulses add the allowed energy, m (v+^2 - v^2) = GAIN m v^2:  m v+ dv+ = (1 + GAIN) m v dv
     mass, after = system.mass, part.v
     along = ((1.0 + _GAIN) * mass * begun.v - mass * after @ part.derivative) / float(mass * after @ by_share)
     return Jump(after, part.derivative + np.multiply.outer(by_share, along))
@@ -131,7 +131,7 @@ def _roles(system: System, v: np.ndarray, impulse: np.ndarray, speed: float) -> 
     normal, tangential = impulse[:u], impulse[u:]
     hit = np.flatnonzero(normal)
     slip, after = system.J[u:] @ v, system.J[u:] @ (v + system.J.T @ impulse / system.mass)
-    # where contacts depend on each other, friction may be at its bound without slip; its round-off is that of the slip
+    # where contacts depend on each other, friction may be at its bound without slip; its round-off equals the slip's
     room = system.friction * normal - np.abs(tangential)
     noise = _EDGE * system.friction * normal * np.diag(system.delassus)[u:] + _ROUND_OFF * np.abs(slip)
     slides = (np.abs(after) > _SLOW * speed) | (room * np.diag(system.delassus)[u:] <= noise)

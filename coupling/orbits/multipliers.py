@@ -10,7 +10,7 @@ from scipy.linalg import eigvals, svd
 
 #: singular values of D - 1, relative to the largest, below which a direction is neutral
 NULL = 1e-10
-#: distance from 1 of the multipliers of neutral directions; those of a body in free flight are a double root
+#: distance from 1 of the multipliers of neutral directions; for a body in free flight they are a double root
 _UNITY = 1e-6
 
 
@@ -30,7 +30,7 @@ def multipliers(derivative: np.ndarray) -> tuple[np.ndarray, int]:
     """Return the multipliers (k,), largest first, and how many of them are neutral.
 
     derivative: (k, k) of the map in scaled coordinates. Neutral ones are 1 without a bifurcation: an orbit may be moved
-    that way and stays one, such as that of a body at rest on its floor, which rests anywhere.
+    that way and stays one, such as a body at rest on its floor, which rests anywhere.
     """
     values = eigvals(derivative)
     values = values[np.lexsort((values.imag, -values.real, -np.round(np.abs(values), 12)))]
@@ -38,7 +38,7 @@ def multipliers(derivative: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def null_space(derivative: np.ndarray) -> np.ndarray:
-    """Return orthonormal rows (n, k) that the map moves by what it moves the orbit."""
+    """Return orthonormal rows (n, k) that the map moves as it moves the orbit."""
     _, sizes, rows = svd(derivative - np.eye(len(derivative)))
     return rows[sizes <= NULL * max(1.0, sizes[0])] if len(sizes) else rows
 

@@ -26,7 +26,7 @@ from vanedamp.files.toml_input import InputError
 _SMALL = 1e-8
 #: scaled residual of an orbit, over the size of its map's derivative, which is what round-off of the state grows by
 _RESIDUAL = 1e-13
-#: that of an orbit whose map's derivative is nearly singular, so that steps do not become small
+#: the same for an orbit whose map's derivative is nearly singular, so that steps do not become small
 _ROUND_OFF = 1e-13
 #: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
 #: order one, has the smallest error (some 1e-9) at the cube root
@@ -217,7 +217,7 @@ class Problem:
 
 
 def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
-    """Return the periodic orbit that Newton's method finds from a state (k,), or its last state and why it is none."""
+    """Return the periodic orbit that Newton's method finds from a state (k,), or the last iterate and why it failed."""
     problem = Problem(period_map)
     start = problem.pack(np.asarray(start, float), math.nan)
     orbit = solve(problem, start, problem.along_parameter, np.zeros(problem.size))
@@ -295,7 +295,7 @@ def at_parameter(problem: Problem, y: np.ndarray, slope: np.ndarray) -> Orbit | 
 
 
 def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:
-    """Return the size of what a passage adds up: scaled states times its derivative."""
+    """Return the size of a passage's sums: scaled states times its derivative."""
     return size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0)))
 
 
@@ -336,7 +336,7 @@ def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.nd
 
 
 def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
-    """Return an orbit as a point of a branch that goes on in the direction of `row` (k + 1,)."""
+    """Return an orbit as a point of a branch that continues in the direction of `row` (k + 1,)."""
     y = problem.pack(orbit.state, orbit.parameter)
     slope = problem.slope(y, orbit.passage)
     return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))

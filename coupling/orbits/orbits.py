@@ -28,7 +28,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: tables whose numbers are none of the motion's equations
+#: tables whose numbers do not enter the equations of motion
 _NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down", "initial")
 
 
@@ -52,7 +52,7 @@ def orbits(
     """Follow the periodic orbits of a scene over a number of it, as its [orbit] table says.
 
     progress: called with the number of points found and of those that there may be; checkpoint: a file to which found
-    points are written and from which an interrupted call goes on; the caller removes it once the result is safe
+    points are written and from which an interrupted call resumes; the caller removes it once the result is safe
     (files.checkpoint_file.clear).
     Raises InputError for a scene without the table, one that the exact engine cannot run, a parameter that is no
     number of it, and a start from which no orbit is found.
@@ -108,7 +108,7 @@ class _Search:
         base = replace(scene, sweep={}, orbit=None)
         hertz = hertz_of(path, scene.excitation.engine_order)
         if math.isfinite(hertz) and self.to is not None and scene.excitation.resonance_near is None:
-            # the level is that of one resonance along the branch, as in a sweep
+            # the level refers to one resonance along the branch, as in a sweep
             near = (hertz * min(self.low, self.to), hertz * max(self.low, self.to))
             base = replace(base, excitation=replace(base.excitation, resonance_near=near))
         ends = [_at(base, path, value) for value in (self.low, self.to) if value is not None]

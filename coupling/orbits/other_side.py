@@ -1,8 +1,8 @@
 """Orbits beyond the place where the sequence of events along a branch ends.
 
-An orbit of another sequence is sought where the branch would go on, at the root of the distance along it where a
+An orbit of another sequence is sought where the branch would continue, at the root of the distance along it where a
 new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
-event does, while the orbit goes on as if nothing had happened. The state on the other side is how a passage ends that
+event does, while the orbit continues as if nothing had happened. The state on the other side is how a passage ends that
 begins close to the last orbit: the event, which comes at both of its ends, is then inside of the period at one
 end and outside at the other.
 """
@@ -28,7 +28,7 @@ from vanedamp.coupling.orbits.newton import (
 )
 from vanedamp.coupling.orbits.passage import Passage
 
-#: what happens to a body that comes to a wall and has room on the other side
+#: note on a body that reaches a wall and has free travel on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
 #: scaled distance within which a neutral coordinate is sought an end
 _FARTHEST = 10.0
@@ -93,9 +93,9 @@ class OtherSide:
         return None
 
     def centred(self, last: Point) -> Point | None:
-        """Return the orbit with its neutral coordinates amid those of its sequence; None if they are there already.
+        """Return the orbit with its neutral coordinates centred in its sequence's range; None if they already are.
 
-        A body that may rest anywhere has come to a wall, though its motion has room on the other side. The tangent
+        A body that may rest anywhere is at a wall, though its motion has free travel on the other side. The tangent
         takes it on along the middle.
         """
         y = self._amid(last.y, last)
@@ -119,7 +119,7 @@ class OtherSide:
         return orbit if orbit is not None and orbit.passage.sequence == last.orbit.passage.sequence else None
 
     def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
-        """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
+        """Return y with its neutral coordinates centred in its sequence's range; None for an orbit without any."""
         neutral = null_space(last.orbit.derivative)
         for free in neutral:
             direction, base = np.append(free, 0.0), y
@@ -138,8 +138,8 @@ class OtherSide:
 
         y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
         measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
-        orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). What is of second order, as
-        that distance is, is a root along the tangent.
+        orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). Terms of second order, as
+        that distance, are a root along the tangent.
         """
         problem, sequence = self.problem, last.orbit.passage.sequence
         residual = problem.residual(y, passage)

@@ -1,6 +1,6 @@
-"""What a period map returns for a state at the start of an excitation period, and where its event sequence changes.
+"""Result of a period map for a state at the start of an excitation period, and where its event sequence changes.
 
-States are physical: modal coordinates of the structure and their rates, then those of the bodies relative to their
+States are physical: modal coordinates of the structure and their rates, then of the bodies relative to their
 cavities, in the order of RestartState, without the coordinates that a body does not have.
 """
 
@@ -19,12 +19,12 @@ class PassageStatus(StrEnum):
     """How a passage ended."""
 
     OK = "ok"
-    #: an event is tangential within round-off: the map has a kink there, and the derivative is that of one side
+    #: an event is tangential within round-off: the map has a kink there, and the derivative holds on one side
     GRAZING = "grazing"
-    #: events that do not follow from each other meet at one instant, and their order matters: the derivative is that
-    #: of motions in which they still meet, and others part from it by a kink or a jump
+    #: events that do not follow from each other meet at one instant, and their order matters: the derivative holds
+    #: for motions in which they still meet, and others part from it by a kink or a jump
     COINCIDENT = "coincident"
-    #: no exact derivative, and the matrix is not to be used: contact forces that the laws leave open, a wedged block
+    #: no exact derivative, and do not use the matrix: contact forces that the laws do not determine, a wedged block
     UNDETERMINED = "undetermined"
     #: the engine did not reach the end: event budget, undecided, accuracy lost, diverged, ill-conditioned
     STOPPED = "stopped"
@@ -45,7 +45,7 @@ class Crossing(NamedTuple):
 
 
 class Passage(NamedTuple):
-    """What a period map returns for a state (k,).
+    """Result of a period map for a state (k,).
 
     state: (k,) after the periods; derivative: (k, k) of it with respect to the state before, one-sided where the map
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;

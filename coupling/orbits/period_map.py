@@ -48,7 +48,7 @@ class PeriodMap:
     periods: int
     scale: np.ndarray
     speed: float | None = None
-    #: the last run, whose subsystems the next one shares
+    #: the last run, whose subsystems the next one reuses
     _earlier: list[EventRun] = field(default_factory=list, init=False)
 
     @cached_property
@@ -186,7 +186,7 @@ class _PassageWalk:
 def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1) -> PeriodMap:
     """Return the map of a scene over excitation periods, with a number of it as parameter (dotted path).
 
-    What the scene leaves open is chosen first. Raises InputError for a scene that the exact engine cannot run.
+    Open choices of the scene are made first. Raises InputError for a scene that the exact engine cannot run.
     """
     if scene.solver.method != "exact":
         raise InputError(

@@ -12,7 +12,7 @@ from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.response.segment import Event, Segment
 from vanedamp.coupling.system.system import FLOOR
 
-#: gaps this close are closed, relative to the free travel; speeds this slow are none, relative to the fastest
+#: gaps this close are closed, relative to the free travel; speeds this slow count as zero, relative to the fastest
 _SHUT, _STILL = 1e-12, 1e-12
 #: a force this close to its bound, relative to its terms, is at it
 _NEAR = 1e-9
@@ -33,7 +33,7 @@ class Start:
         return np.asarray((np.arange(u) < system.contacts) & ((segment.state != OPEN) | rests))
 
     def derivative(self, event: Event, segment: Segment, flow: Flow, u: np.ndarray) -> tuple[np.ndarray, PassageStatus]:
-        """Return the derivative (2N, k) of u at the start of the first segment, and what is wrong with it, if anything.
+        """Return the derivative (2N, k) of u at the start of the first segment, and its defect, if any.
 
         event: at time zero. Raises Untrusted (orbits.jump).
         """

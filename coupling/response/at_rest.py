@@ -8,7 +8,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
 #: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
-#: scales, and motions of floors relative to that of the response, that are none
+#: scales, and motions of floors relative to the response's, that count as zero
 _CLOSED, _STILL, _ROUND_OFF = 1e-3, 1e-6, 1e-12
 
 
@@ -18,7 +18,7 @@ def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray
     scale: (3 + 2b,) of the states. The window has no impacts, and friction took no energy. A body that friction holds
     is at rest then: it would lose energy if it slid; a disc, though, rolls. Others have to keep their place at all
     sections, and a reason to stay: a wall or a body at rest on which they lie, or a floor that does not move along the
-    cavity. A section alone does not tell: at a resonance the motion turns round at the start of every period.
+    cavity. A section does not suffice: at a resonance the motion turns round at the start of every period.
     """
     b = system.bodies
     slip, speed = section[:, 3 : 3 + b], section[:, 3 + b :]

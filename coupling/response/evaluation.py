@@ -1,6 +1,6 @@
-"""From the records of a run to its response: means, harmonic, ledger, attached mass, list of events.
+"""From the records of a run to its response: means, harmonic, energies, attached mass, list of events.
 
-Every method leaves the same records behind, so that figures of different methods mean the same.
+Every method leaves the same records, so that results of different methods have the same meaning.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
 
-#: periods between two looks at whether the response is steady
+#: periods between two checks of whether the response is steady
 _CHUNK = 100
-#: relaxations within the longest run below which an open one does not go on
+#: relaxations within the longest run below which an open one ends
 _HOPELESS = 3.0
 #: fraction of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
-#: fraction of the largest order's load below which that of order 1 is none
+#: fraction of the largest order's load below which order 1 counts as unexcited
 _NO_SHARE = 1e-9
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
@@ -55,7 +55,7 @@ class Run(Protocol):
         """Continue to the end of the given number of periods, or to the run's end before. Returns its status."""
 
     def outcome(self) -> Outcome:
-        """Return the records of the run so far, and its figures."""
+        """Return the records of the run so far, and its results."""
 
     def final(self) -> RestartState | None:
         """Return the state that another run can begin with; None if the run ended within a period, or keeps none."""
@@ -66,7 +66,7 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; samples: those in the plane, from those of the response.
+    ok; samples: in the plane, from the response's samples.
     """
 
     tilt: np.ndarray
@@ -78,9 +78,9 @@ class Plane(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a run: records of `periods` periods, counters, chunks of its log and what their rows are.
+    """The outcome of a run: records of `periods` periods, counters, chunks of its log and the meaning of their rows.
 
-    open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
+    open_ledger: energy residual above which the method's results are not to be used; penetration: relative to the
     free travel.
     """
 
@@ -236,7 +236,7 @@ def _series(system: System, records: Records, done: int) -> dict[str, Any]:
 
 
 def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any], bool]:
-    """Return the figures of bodies in the plane over the evaluated periods, and whether they tilt too far."""
+    """Return the results of planar bodies over the evaluated periods, and whether they tilt too far."""
     tilt = plane.tilt[window].max(axis=0, initial=0.0)
     neglected = plane.neglected * tilt**2
     parts = {"tilt_max": tilt, "lift_share": plane.lifted[window].sum(axis=0) / span, "linearisation": neglected}
@@ -249,11 +249,11 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
-    """Return the imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
+    """Return the imbalance of the energies (periods + 1, 6), relative to the energy that flowed.
 
-    That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): energy that a heavy body only
-    carries along is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy always
-    counts: below it the ledger would be judged by the round-off of energy that is only carried along.
+    That flow is the largest term, with stored energy by its parts (periods + 1, 1 + b): energy that moves with a heavy
+    body, and no further, is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy
+    always counts: below it the imbalance would measure the round-off of energy that only moves with a body.
     """
     change = ledger - ledger[0]
     imbalance = change[-1, EXCITATION] - change[-1, VISCOUS:].sum()
@@ -295,9 +295,9 @@ def _without_first_order(scene: Scene, system: System) -> bool:
 def _attached(
     system: System, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
 ) -> float | None:
-    """Return the attached mass over that of the bodies, Re(F / (omega^2 X)) / sum m; F: all contact forces on it.
+    """Return the attached mass over the bodies' mass, Re(F / (omega^2 X)) / sum m; F: all contact forces on it.
 
-    Of several harmonics, those of order 1.
+    Of several harmonics, order 1 counts.
     """
     # a structure that does not move feels no mass: its harmonic is 0, or the remainder of a decayed start
     if not system.bodies or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:

@@ -1,4 +1,4 @@
-"""The log of a run: what its rows are, and the events that its entries tell.
+"""The log of a run: the meaning of its rows, and the events in its entries.
 
 An entry has time, kind, row, relative speed before and after, impulse; of bodies in the plane also the impulse of
 friction and the energy taken.
@@ -15,16 +15,16 @@ from vanedamp.coupling.response.records import DETACHES, IMPACT, KINDS
 from vanedamp.coupling.response.response import Event
 from vanedamp.coupling.system.system import FLOOR, SURFACES, System
 
-#: columns of the log of bodies in the plane, and of that of sliders
+#: columns of the log of bodies in the plane, and of the log of sliders
 WIDTH, LINE_WIDTH = 8, 6
 
 
 class Rows(NamedTuple):
-    """What the rows (r,) of a log are.
+    """Meaning of the rows (r,) of a log.
 
     places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). without_body: (r,)
     whether it is the latter. other: (r,) number of the body to the right, -1: none. sign: (r,) of the gap's speed in
-    that of the body relative to what it meets.
+    the sign of the body's speed relative to its counterpart.
     spring: (r,) stiffness of a contact, N/m; inf: rigid.
     """
 
@@ -36,7 +36,7 @@ class Rows(NamedTuple):
 
 
 def rows_of_units(system: System) -> Rows:
-    """Return the rows of a log by units: speeds are those of gaps in the plane, and of bodies along their line."""
+    """Return the rows of a log by units: speeds refer to gaps in the plane, and to bodies along their line."""
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
@@ -80,7 +80,7 @@ def named_bodies(rows: Rows, chunks: Sequence[np.ndarray], bodies: int) -> np.nd
     for row in {int(row) for chunk in chunks for row in chunk[chunk[:, 0] > 0.0, 2]}:
         body, _, _ = rows.places[row]
         if not rows.without_body[row]:
-            named[[body, rows.other[row]]] = True  # the last place is that of no body
+            named[[body, rows.other[row]]] = True  # the last index stands for no body
     return named[:bodies]
 
 

@@ -11,14 +11,14 @@ from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
-#: entries of the energy ledger, J
+#: entries of the energy balance, J
 ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
 
 
 @record_with(free_axes=2)
 class Records(NamedTuple):
-    """Records of a run, made once and filled as it advances. One entry a period unless said otherwise."""
+    """Records of a run, made once and filled as it advances. One entry per period unless stated otherwise."""
 
     peak: np.ndarray  # largest |x|, m
     harmonic: np.ndarray  # complex integral of x exp(-i omega t), m s
@@ -28,8 +28,8 @@ class Records(NamedTuple):
     section: np.ndarray  # (periods + 1, 3 + 2b): x, x', bodies' momentum, slips, slip velocities at the period's start
     ledger: np.ndarray  # (periods + 1, 6) cumulative, J
     parts: np.ndarray  # (periods + 1, 1 + b): energy of the structure with all springs, and of each body, J
-    collided: np.ndarray  # energy of the relative motion that impacts turned round or took, J
-    samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
+    collided: np.ndarray  # energy of the relative motion that impacts reversed or dissipated, J
+    samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples per period
     coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; first nan: not kept
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
@@ -53,7 +53,7 @@ def new_records(
     """
     b = system.bodies
     kept = np.empty((periods * samples, system.modes if coordinates else 0))
-    kept[:1] = np.nan  # those of a run that ends early take no memory
+    kept[:1] = np.nan  # unused entries of a run that ends early take no memory
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),

@@ -1,4 +1,4 @@
-"""The answer of a run: amplitudes, classification, energy ledger, events and samples (SI units)."""
+"""The result of a run: amplitudes, classification, energies, events and samples (SI units)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.files.display import Displayed
 from vanedamp.files.store import Variable, dataset, save
 
-#: figures of each body in the plane
+#: results of each planar body
 _OF_BODIES = ("tilt_max", "lift_share", "linearisation")
 
 
 class Status(StrEnum):
-    """How a run ended. Without `ok` the figures cover only the periods that were completed."""
+    """How a run ended. Without `ok` the results cover only the periods that were completed."""
 
     OK = "ok"
     """all periods done, or steady to the tolerance asked for"""
@@ -50,7 +50,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """One event. Speeds are relative to the wall or body met; of bodies in the plane and at stops, those of the gap."""
+    """One event. Speeds are relative to the wall or body met; of planar bodies and at stops, of the gap."""
 
     time: float
     """time [s]"""
@@ -79,9 +79,9 @@ class Event:
 class PlanarSamples(NamedTuple):
     """Samples of bodies in the plane, at the times of Response.time (n,): b bodies, c contacts.
 
-    body_lift: (n, b) m, height of each body's centre above that of the body flat on its floor; body_tilt: (n, b) rad,
-    relative to the cavity, against the clock. floor_along, floor_across: (n, b) m, displacement of the floor under a
-    body, that of a base which is prescribed to move included; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
+    body_lift: (n, b) m, height of each body's centre above its height flat on its floor; body_tilt: (n, b) rad,
+    relative to the cavity, counterclockwise. floor_along, floor_across: (n, b) m, displacement of the floor under a
+    body, including a prescribed motion of the base; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
     contact_closed: (n, c) bool, of methods with time steps whether it carried force in the step before. Lift, tilt and
     floor_across are nan for sliders. contacts: body, side and corner of each contact, as of an Event.
     """
@@ -118,7 +118,7 @@ class PlanarSamples(NamedTuple):
         return variables
 
 
-#: units of the figures of a response that have one
+#: units of the results of a response that have one
 UNITS = {
     "frequency": "Hz", "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m",
     "static_deflection": "m", "amplitude_max_dynamic": "m", "amplitude_mean_dynamic": "m",
@@ -128,7 +128,7 @@ UNITS = {
 
 @dataclass(frozen=True, repr=False)
 class Response(Displayed):
-    """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods."""
+    """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods."""
 
     status: Status
     """how the run ended"""
@@ -280,7 +280,7 @@ class Response(Displayed):
         }
 
     def _event_fields(self) -> list[str]:
-        """Return the names of the fields of events; some are those of bodies in the plane."""
+        """Return the names of the fields of events; some apply to planar bodies only."""
         planar = {"corner", "tangential_impulse", "loss"}
         return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
 

@@ -1,4 +1,4 @@
-"""Where every run begins: the state of its scene, or that of another run as far as it fits; and the way back."""
+"""Where every run begins: the state of its scene, or of another run as far as it fits; and the way back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUND_OFF = 1e-12
 
 
 def start_of(scene: Scene, system: System, state: RestartState | None = None) -> RestartState:
-    """Return the state that a run begins with: that of the scene, or another run's, moved to where it fits.
+    """Return the state that a run begins with: the scene's, or another run's, moved to where it fits.
 
     Structure beyond a stop and bodies beyond a surface are moved back (`_inside`), and springs of friction dampers are
     unloaded to the limits of their sliders. Raises InputError for a scene that begins beyond a surface or a stop, and
@@ -88,7 +88,7 @@ def _of_scene(scene: Scene, system: System) -> RestartState:
     n, bodies = system.modes, scene.damper
     rise = [damper.form.rise(damper, damper.tilt) for damper in bodies]  # on its lower corner
     parts = (
-        # an initial state is that of a rigid structure: others have none
+        # an initial state belongs to a rigid structure: others have none
         np.full(n, scene.initial.displacement), np.full(n, scene.initial.velocity),
         [damper.position for damper in bodies], [damper.velocity for damper in bodies],
         np.zeros(system.dampers), system.travels,

@@ -27,7 +27,7 @@ class RestartState:
     lift, lift_velocity: (b,) m and m/s across the cavity, of the bodies' centres above the floor, counted from where
     they lie flat on it; tilt, tilt_rate: (b,) rad and rad/s relative to the cavity; 0 for sliders, and empty without
     bodies that move in the plane
-    speed: (1,) rad/s, speed of rotation whose modes those of the structure are; empty: they are those of the scene
+    speed: (1,) rad/s, speed of rotation of the structure's modes; empty: the scene's modes
     """
 
     displacement: np.ndarray

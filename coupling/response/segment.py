@@ -28,11 +28,11 @@ _SMALL = 0.1
 
 
 class Event(NamedTuple):
-    """What ends a segment; u units.
+    """End of a segment; u units.
 
     unit: number of the unit at which it happens, -1: the end of an excitation period, or the start of the run
     what: its code, CLOSES, OPENS, RECLOSES, PARTS, STOPS, AT_LOW or AT_HIGH (numerics.codes); 0 without a unit
-    impulse: (2u,) N s on all rows, normals first; compression: (2u,) those of the first phase, of laws with two
+    impulse: (2u,) N s on all rows, normals first; compression: (2u,) impulses of the first phase, of laws with two
     struck: (k,) units that an impact hits, rigid or not; before, after: (k,) m/s, speeds of their gaps
     loss: energy that impacts take, J
     reduced: whether restitutions had to be smaller by one factor, so that they bring none
@@ -61,7 +61,7 @@ class Segment(NamedTuple):
     m/s, to which the round-off of others is relative
     rate: (m,) 1/s; amplitude: (m,) complex; shape, rate_shape: (N, m); force: (2u,) N; force_shape: (2u, m)
     drive, driver: (m,) growth of modes that a harmonic drives, 1/s, and the rate of that harmonic, 1/s; else 0
-    open_force: (2u,) N, constant forces that the laws leave open between units that depend on each other, as the engine
+    open_force: (2u,) N, constant forces left undetermined by the laws between interdependent units, as the engine
     has chosen them; part of `force`
     """
 
@@ -126,7 +126,7 @@ def beyond_line(z: np.ndarray) -> np.ndarray:
 
 
 class Begun(NamedTuple):
-    """What a run was when its segment began: time in the period, s; chunks of its log; energy lost in impacts, J.
+    """State of a run when its segment began: time in the period, s; chunks of its log; energy lost in impacts, J.
 
     reduced: impacts so far whose restitutions were smaller.
     """
@@ -137,7 +137,7 @@ class Begun(NamedTuple):
     reduced: int = 0
 
 
-#: what it was before the start
+#: the same before the start
 START = Begun()
 
 

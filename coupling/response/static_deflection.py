@@ -8,7 +8,7 @@ from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
-#: static deflections below this fraction of that under the excitation's amplitudes are round-off of directions
+#: static deflections below this fraction of deflections under the excitation's amplitudes are round-off of directions
 _ROUND_OFF = 1e-9
 
 

@@ -1,6 +1,6 @@
-"""Whether a run has forgotten its start: by what is known of its linear motion, by repetition, or by statistics.
+"""Whether a run has forgotten its start: by its known linear motion, by repetition, or by statistics.
 
-A motion without contacts is known: what is left of its transient is a bound. One that repeats itself moves on, if at
+A motion without contacts is known: its remaining transient is a bound. One that repeats itself moves on, if at
 all, by as much as its slowest decay allows. Of any other the mean is known as far as the window holds its memory often
 enough: it forgets its past at the rate at which it loses energy, loss/(2 energy) per period for amplitudes.
 """
@@ -26,7 +26,7 @@ _RELAXATIONS = 3.0
 _GIVEN, _ROOM = 1.0, 5.0
 #: correlation of neighbouring twentieths of a window in which the motion moves too slowly for statistics
 _SLOW = 0.7
-#: longest period, in those of the excitation, with which a motion is seen to repeat
+#: longest period, in excitation periods, with which a motion is seen to repeat
 _LONGEST = 16
 
 
@@ -58,7 +58,7 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
     if not quiet:
         rate, beat = _energy_rate(transient, records, first, done), 0.0
     remaining, allowed = _remaining(peaks, rate, tolerance), tolerance * mean
-    # where the start is forgotten, a window that was given may be short: its confidence says what it is worth
+    # where the start is forgotten, a window that was given may be short: its confidence shows its value
     given = left <= tolerance and not scene.time.open
     repeats = bool(remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat))
     relaxations = rate * n
@@ -73,7 +73,7 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
 
 
 def _moves_slowly(peaks: np.ndarray, confidence: float | None, allowed: float) -> bool:
-    """Whether neighbouring parts of a window are too much alike for statistics, beyond what is allowed of its mean."""
+    """Whether neighbouring parts of a window are too much alike for statistics, beyond the tolerance of its mean."""
     return confidence is not None and confidence > allowed and lag_correlation(peaks) > _SLOW
 
 

@@ -16,7 +16,7 @@ _CONSTANT = 1e-6
 
 
 def transient_length(series: np.ndarray) -> int | None:
-    """Return how many entries of a series (n,) precede its stationary part; None if the series is too short.
+    """Return how many entries of a series (n,) precede its steady-state part; None if the series is too short.
 
     The marginal standard error rule MSER (White 1997): the truncation after which the squared standard error of the
     mean is smallest. A minimum in the second half of the series means that its end is not in sight, unless that half is
@@ -39,10 +39,10 @@ def transient_length(series: np.ndarray) -> int | None:
 
 
 def mean_confidence(series: np.ndarray, relaxations: float = np.inf) -> float | None:
-    """Return the half width of the 95 % confidence interval of a stationary series' mean; None if it is too short.
+    """Return the half width of the 95 % confidence interval of a steady-state series' mean; None if it is too short.
 
     Batch means (Law and Kelton, section 9.5): means of ten long batches are nearly independent even where the entries
-    are not. What correlation is left between neighbours, seen in halves of the batches, widens the interval, as that of
+    are not. Remaining correlation between neighbours, seen in halves of the batches, widens the interval, as for
     a first-order process does (Tafazzoli, Steiger and Wilson 2011, "N-Skart"). relaxations: how often the process
     forgets its past within the series, which has no more independent parts than that.
     """

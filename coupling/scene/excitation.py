@@ -96,7 +96,7 @@ class Excitation:
             raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
 
     def _check_loads(self) -> None:
-        """Raise ValueError for loads beside what they replace, and for keys that belong to something left out."""
+        """Raise ValueError for loads next to keys that they replace, and for keys that belong to something left out."""
         if self.base_direction is not None and (self.distributed or self.force or self.resonance_amplitude):
             raise ValueError("base_direction: is that of base_acceleration; leave it out")
         if not self.distributed:
@@ -137,8 +137,8 @@ class Excitation:
     def shares(self) -> dict[int, complex]:
         """Complex amplitudes of the sines by their orders, 1 first: it is there even if it has none.
 
-        They multiply the level. Loads have amplitudes of their own, and nothing beside them: zeros, by their orders.
-        Of a `signal` those of its Fourier series, which drive no run (Waveform.harmonics).
+        They multiply the level. Loads have amplitudes of their own, and no others: zeros, by their orders.
+        For a `signal`, its Fourier series, which drive no run (Waveform.harmonics).
         """
         if self.waveform is not None:
             return self.waveform.harmonics()

@@ -1,4 +1,4 @@
-"""What a scene may name: contact laws, waveforms, shapes and elements, ours and those that other code registers.
+"""What a scene may name: contact laws, waveforms, shapes and elements, ours and other code's.
 
 An installed package adds one, a class derived from the base of its kind, without a call, in its pyproject.toml:
 
@@ -6,7 +6,7 @@ An installed package adds one, a class derived from the base of its kind, withou
     power = "acme.power_law:PowerLaw"
 
 The other groups are "vanedamp.waveforms", "vanedamp.shapes" and "vanedamp.elements", whose entries have the name of the
-shape and that of the element's table.
+shape and the element's table.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ class Time:
         return self.simulated * 2 // 3 if self.transient is None else self.transient
 
 
-#: share by which a frequency may be off that of a waveform with its own duration
+#: relative deviation allowed between a frequency and a waveform's with its own duration
 _SAME_PERIOD = 1e-4
 #: where a scene names files, relative to its own
 _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
@@ -218,7 +218,7 @@ class Scene(OpenRecord, Displayed):
 
     @property
     def planar(self) -> bool:
-        """Whether it needs the engine for planar bodies: one with extent or on a spring, or impacts of two phases."""
+        """Whether it needs the engine for planar bodies: a body planar or on a spring, or impacts of two phases."""
         rubs = any(element.rubs for _, _, element in self.elements)
         return rubs or self.contact.two_phases or any(damper.planar for damper in self.damper)
 
@@ -238,7 +238,7 @@ class Scene(OpenRecord, Displayed):
 
     @property
     def yields(self) -> bool:
-        """Whether contacts are springs: by the contact law, or those of elements."""
+        """Whether contacts are springs: by the contact law, or by elements."""
         return not self.contact.rigid or any(element.yields for _, _, element in self.elements)
 
     @classmethod
@@ -275,7 +275,7 @@ class Scene(OpenRecord, Displayed):
             )
 
     def _check_load(self, index: int, damper: Damper) -> None:
-        # a body with extent has a ceiling to fall on
+        # a planar body has a ceiling to fall on
         if damper.form.planar or damper.normal_load is not None or damper.friction == 0:
             return
         if self.speed:

@@ -1,4 +1,4 @@
-"""A scene as one would write it: without what the defaults give, and with ranges in place of long lists."""
+"""A scene as one would write it: without default values, and with ranges in place of long lists."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def short_form(scene: Scene) -> dict[str, Any]:
             continue
         if _reads_as(without, scene):
             data = without
-    if "law" in (contact := data.get("contact", {})):  # says what the other keys are
+    if "law" in (contact := data.get("contact", {})):  # determines the other keys
         data["contact"] = {"law": contact["law"]} | contact
     return data
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-#: samples of a period per order: a sum of sines is nowhere larger than its largest sample over cos(pi/16)
+#: samples per period and order: a sum of sines is nowhere larger than its largest sample over cos(pi/16)
 _SAMPLES = 16
-#: product of the number of sines and their highest order beyond which Newton's method begins near the top only
+#: product of the number of sines and their highest order beyond which Newton's method begins near the maximum only
 _FEW = 1024
-#: share of the largest sample from which on a sample is near the top: cos(pi/16) and less
+#: fraction of the largest sample above which a sample is near the maximum: cos(pi/16) and less
 _TOP = 0.98
 #: numbers in a batch of sampled sums
 _BATCH = 1 << 22
@@ -35,7 +35,7 @@ def peaks(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 
 def _climb(waves: np.ndarray, order: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return the largest value (f,) that Newton's method meets from angles (k, f) less than a sample from the tops."""
+    """Return the largest value (f,) that Newton's method meets from angles (k, f) within a sample of the maxima."""
     step = np.pi / (_SAMPLES / 2 * order.max())
     found = np.zeros(waves.shape[1])
     for _ in range(6):

@@ -1,6 +1,6 @@
 """The [solver] table of a scene: a method, and its options as the method's own file declares them.
 
-Methods are named here, and loaded when a scene asks for one: a scene of the exact engine needs nobody else's kernels.
+Methods are named here, and loaded when a scene asks for one: a scene of the exact engine needs no other kernels.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class SolverOptions(BaseModel):
 
     @property
     def seconds_per_period(self) -> float:
-        """Processor time of an excitation period, s, roughly: to refuse runs that nobody would wait for."""
+        """Processor time per excitation period, s, roughly: to reject runs that take too long."""
         return PERIOD_SECONDS
 
     def check_samples(self, samples: int) -> None:
@@ -75,7 +75,7 @@ class SteppingOptions(SolverOptions):
 
     @property
     def smallest_steps(self) -> int:
-        """Steps of the smallest size in a period."""
+        """Steps of the smallest size per period."""
         return self.steps_per_period
 
     @property

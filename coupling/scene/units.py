@@ -26,7 +26,7 @@ def _schema() -> dict[str, Any]:
 
 
 def _inside(whole: dict[str, Any], table: dict[str, Any], step: str) -> list[dict[str, Any]]:
-    """Return the schemas of what a step of a path leads to: a key, an entry of a list, or a key of all its entries."""
+    """Return the schemas at a step of a path: a key, an entry of a list, or a key of all its entries."""
     if "items" not in table:
         return [node for node in (key_in(table, step),) if node]
     found = [key_in(entry, step) for entry in options(whole, table["items"])]

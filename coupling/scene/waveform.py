@@ -2,7 +2,7 @@
 
 A waveform is the time signal of one period, w(omega t), where a plain excitation has sin(omega t): frequency, level
 (force, base acceleration) and place stay the excitation's. So a new excitation is one class, which need not know the
-structure, and all that reads a level goes on as it is.
+structure, and code that reads a level stays as it is.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from vanedamp.files.toml_input import InputError
 
-#: samples of a period from which the Fourier series of a waveform is taken, and its terms
+#: samples per period from which the Fourier series of a waveform is taken, and its terms
 _SAMPLES, _TERMS = 4096, 32
 
 

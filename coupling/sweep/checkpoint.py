@@ -28,7 +28,7 @@ class Checkpoint(SceneCheckpoint):
             self._take(str(path), found[0])
 
     def add(self, task: Task, result: TaskResult, more: bool) -> None:
-        """Take over a task's points; more: whether its chain goes on. Raises StoreError, such as for a full disk."""
+        """Take over a task's points; more: whether its chain continues. Raises StoreError, such as for a full disk."""
         self.finished.add(task, result, more)
         self.changed()
 

@@ -32,7 +32,7 @@ class Points:
     """Scenes of a grid from the values of their axes: little to send to a worker, however large the grid."""
 
     def __init__(self, base: Scene, choices: Choices = NOTHING) -> None:
-        """Take a scene without sweep, and the choices of what it leaves open."""
+        """Take a scene without sweep, and its open choices as made."""
         self.base, self.choices = base, choices
         self._data = base.to_dict()
 
@@ -69,10 +69,10 @@ class Grid:
     scene     the scene with its [sweep] table
     axes      dotted path -> the values as the scene has them
     base      the scene without its sweep
-    choices   that suit all points, of what they leave open
+    choices   that suit all points, for their open choices
     estimate  of the model chosen, None where there was no choice
     advice    on the bodies, None where their shapes were given
-    warnings  of the scenes of the first and the last point, to be read before figures are used
+    warnings  of the scenes of the first and the last point, to be read before results are used
     along     the axis along which runs are linked, None if they are not
     """
 
@@ -166,7 +166,7 @@ def grid(scene: Scene) -> Grid:
 
 
 def base_scene(scene: Scene) -> Scene:
-    """Return a scene without its sweep; its level is that of one resonance for all of the swept frequencies."""
+    """Return a scene without its sweep; its level refers to one resonance for all swept frequencies."""
     axes = {path: axis_values(values) for path, values in scene.sweep.items()}
     base = replace(scene, sweep={})
     swept, hertz = resonance_axis(base, axes)
@@ -179,7 +179,7 @@ def base_scene(scene: Scene) -> Scene:
 def resonance_axis(scene: Scene, axes: Iterable[str]) -> tuple[str | None, float]:
     """Return the axis along which a sweep meets resonances, and the frequency of a unit of it, Hz.
 
-    That of the frequency, or of the speed along an engine order; None without.
+    It is the frequency, or the speed along an engine order; None without.
     """
     paths = list(axes)
     order = None if "excitation.engine_order" in paths else scene.excitation.engine_order

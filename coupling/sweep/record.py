@@ -16,7 +16,7 @@ from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Displayed
 from vanedamp.files.store import Variable, frozen
 
-#: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
+#: peaks of the linear curves over the swept frequencies and their units, each an array over the other axes
 PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
@@ -29,7 +29,7 @@ class Sweep(SceneRecord, Displayed):
 
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
-    amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
+    amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` belong to the linear
                           structure without bodies and with every body fixed in its cavity; `mean_confidence` is the
                           half width of the mean's 95 % confidence interval, nan where there are too few periods;
                           `max_dynamic` and `mean_dynamic` count from the static deflection under the bodies' loads,
@@ -40,7 +40,7 @@ class Sweep(SceneRecord, Displayed):
     in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
                           floor, what small tilts neglect over the smallest play; nan for sliders; empty for a scene
                           of sliders
-    peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
+    peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
                           empty for a sweep at one frequency

@@ -113,7 +113,7 @@ def _ended(
     """Yield tasks that have ended, taken from those that run.
 
     A process pool that loses a worker gives up all of its tasks: their points run again, one by one, to find the point
-    that breaks it. Raises SweepError for what is no fault of a point.
+    that breaks it. Raises SweepError for errors that are no fault of a point.
     """
     done = wait(running, return_when=FIRST_COMPLETED).done
     if any(isinstance(future.exception(), BrokenExecutor) for future in done if not future.cancelled()):
@@ -151,6 +151,6 @@ def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[TaskResult], ex
 
 
 def _raise_sweep_error(future: Future[TaskResult]) -> None:
-    """Raise what a worker found that is no fault of a point."""
+    """Raise an error of a worker that is no fault of a point."""
     if not future.cancelled() and isinstance(future.exception(), SweepError):
         future.result()

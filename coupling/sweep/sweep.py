@@ -35,7 +35,7 @@ def sweep(
 
     scene: or its TOML file, or its grid; progress: called with the number of points done and their total, at
     the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
-    goes on; the caller removes it once the result is safe (files.checkpoint_file.clear).
+    resumes; the caller removes it once the result is safe (files.checkpoint_file.clear).
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the executor has lost its workers for good.
@@ -92,7 +92,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
 
 
 def _peaks(grid: Grid) -> dict[str, np.ndarray]:
-    """Return the tops of the linear curves over the swept frequencies; nan where there is none."""
+    """Return the peaks of the linear curves over the swept frequencies; nan where there is none."""
     swept = resonance_axis(grid.base, grid.axes)[0]
     if swept is None or len(set(grid.axes[swept])) < 2:
         return {}
@@ -110,7 +110,7 @@ def _peaks(grid: Grid) -> dict[str, np.ndarray]:
 
 
 def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
-    """Return the tops of both linear curves by the names of PEAKS."""
+    """Return the peaks of both linear curves by the names of PEAKS."""
     values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
     return dict(zip(PEAKS, values, strict=True))
 

@@ -34,7 +34,7 @@ LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
 #: columns of every point: measures, then fractions of the losses; behind them IN_PLANE, body by body
 COLUMNS = (*MEASURES, *LOSSES)
-#: faults of a point: what its parameters may cause; all others, such as of imports, files and memory, would meet the
+#: faults of a point: errors of its parameters; all others, such as of imports, files and memory, would meet the
 #: next point as well
 _OF_A_POINT = (ArithmeticError, LookupError, RuntimeError, ValueError)
 _LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
@@ -42,7 +42,7 @@ _OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in 
 
 
 class SweepError(VanedampError):
-    """A sweep that cannot go on: its workers are gone, or the machine lacks what every run needs."""
+    """A sweep that cannot continue: its workers are gone, or the machine lacks a requirement of every run."""
 
 
 class Task(NamedTuple):
@@ -66,7 +66,7 @@ class TaskResult(NamedTuple):
 def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     """Run some points, given by the values of the axes: the task of a worker.
 
-    Raises SweepError for what is no fault of a point.
+    Raises SweepError for errors that are no fault of a point.
     """
     started = time.perf_counter()
     maker, state = Points(base, choices), task.start
@@ -113,7 +113,7 @@ class SweepTable:
         return list(self._places)
 
     def add(self, task: Task, result: TaskResult, more: bool) -> None:
-        """Take over the result of a task; more: whether its chain goes on."""
+        """Take over the result of a task; more: whether its chain continues."""
         where = list(task.points)
         codes = [[self._places.setdefault(text, len(self._places)) for text in pair] for pair in result.texts]
         self.put(where, result.values, np.array(codes))

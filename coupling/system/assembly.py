@@ -30,7 +30,7 @@ from vanedamp.coupling.system.units import (
     friction_elements,
 )
 
-#: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
+#: the moment after which contacts are checked again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
 
 #: loads (k, N) on the coordinates of a system, N, at angles omega t (k,) in [0, 2 pi)
@@ -70,7 +70,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     units = _columns([*contacts, *own, *rubbing], size)
     sliders = len(casing["tangential"])
     massive = slice(size - sliders)
-    # rows of sliders are not to be small beside others
+    # rows of sliders are not to be small compared with others
     pulled = (casing["elongation"][:, :n] ** 2).sum(axis=1)
     mobility = (units["J"][:, massive] ** 2 / mass[massive]).sum(axis=1)
     mass[massive.stop :] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
@@ -156,7 +156,7 @@ def _places(
 
 
 def _mass(bodies: list[Body], size: int) -> np.ndarray:
-    """Return the masses (N,) of the coordinates; those of sliders are still open."""
+    """Return the masses (N,) of the coordinates; sliders' masses are still open."""
     mass = np.ones(size)
     for body in bodies:
         mass[body.coordinates] = body.damper.mass
@@ -169,7 +169,7 @@ def _contacts(
     scene: Scene, law: Law, bodies: list[Body], surfaces: list[tuple[Surface, ...]], placed: dict[str, Any],
     force: np.ndarray,
 ) -> tuple[list[Unit], list[Unit]]:  # fmt: skip
-    """Return the contacts, cavity by cavity, then those of elements; and friction elements of these.
+    """Return the contacts, cavity by cavity, then of elements; and the elements' friction elements.
 
     placed: where the bodies are; force: (e, n) on the modes. Raises InputError.
     """

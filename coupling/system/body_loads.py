@@ -8,7 +8,7 @@ floor turns towards the load: the body is brought back by N/rho per displacement
 plane of rotation both leave m W^2 R/rho, R from the axis to the track's centre of curvature (Den Hartog 1956,
 Mechanical Vibrations, section 6.7: the rotating pendulum).
 
-The gradient counts for bodies with a spring or a track, which it detunes; for others it is small beside friction, and
+The gradient counts for bodies with a spring or a track, which it detunes; for others it is small against friction, and
 `load_warnings` says where it is not. Gravity turns once a revolution in that frame: only its part along the axis, which
 stays, counts there.
 """
@@ -30,7 +30,7 @@ from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
 from vanedamp.files.toml_input import InputError
 
-#: share of what it is compared with from which on a neglected term is warned of
+#: fraction of its reference above which a neglected term is warned of
 _SEEN = 0.01
 #: directions along and across of cavities of a structure without a geometry: both in the plane of rotation
 _ALONG, _ACROSS = np.eye(3)[:2]
@@ -101,7 +101,7 @@ def centres(scene: Scene) -> np.ndarray:
 
 
 def greatest_pull(scene: Scene) -> float:
-    """Return the greatest acceleration, m/s^2, that gravity and rotation give a body."""
+    """Return the largest acceleration, m/s^2, that gravity and rotation give a body."""
     if not scene.speed:
         return scene.gravity.acceleration
     loads = body_loads(scene, basis_of(scene))
@@ -142,7 +142,7 @@ class _Body(NamedTuple):
 
     @property
     def pressed(self) -> float:
-        """Acceleration that presses on the floor, or of a body with extent on the ceiling, m/s^2."""
+        """Acceleration that presses on the floor, or of a planar body on the ceiling, m/s^2."""
         return abs(self.across)
 
     @property
@@ -157,7 +157,7 @@ class _Body(NamedTuple):
 
     @property
     def inertia(self) -> float:
-        """Its greatest acceleration then, m/s^2."""
+        """Its largest acceleration then, m/s^2."""
         return 2 * math.pi * self.scene.frequency * self.speed
 
     def aside(self, field: _Field) -> float:
@@ -168,7 +168,7 @@ class _Body(NamedTuple):
 
 
 def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tuple[str, str]]:
-    """Yield kinds and sentences of what the loads in a rotating frame neglect. gravity: (3,) that counts, m/s^2."""
+    """Yield kinds and sentences on neglected effects in a rotating frame. gravity: (3,) that counts, m/s^2."""
     scene, pull = body.scene, float(np.linalg.norm(field.acceleration))
     turning = math.sqrt(max(scene.gravity.acceleration**2 - float(gravity @ gravity), 0.0))
     if turning > _SEEN * pull > 0.0:
@@ -212,7 +212,7 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
 
 
 def _of_track(body: _Body, radius: float) -> Iterator[tuple[str, str]]:
-    """Yield kinds and sentences of what a track of that radius (m) neglects."""
+    """Yield kinds and sentences on neglected effects of a track of that radius (m)."""
     angle = body.reach / radius
     neglected = {"the frequency": angle**2 / 16}
     if body.damper.form.extended and not body.damper.form.rolls:
@@ -256,7 +256,7 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
             )
     place = basis.positions[label] - point
     walls = [str(wall) for wall in cavity.labels()[:2]]
-    own = cavity.floor is None or label not in walls  # else a wall is the floor, and its place that of the cavity
+    own = cavity.floor is None or label not in walls  # else a wall is the floor, at the cavity's position
     if own and all(wall in basis.positions for wall in walls):
         middle = 0.5 * (basis.positions[walls[0]] + basis.positions[walls[1]]) - point
         place = place + along * float((middle - place) @ along)

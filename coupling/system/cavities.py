@@ -1,6 +1,6 @@
 """Directions of cavities in space: those that a reduced model gives, and checks that they fit together.
 
-Left wall, right wall, floor and ceiling of a cavity have one direction, that of the body's motion from the left wall to
+Left wall, right wall, floor and ceiling of a cavity have one direction, the body's motion from the left wall to
 the right one. Along it the body feels gravity and the base's motion. Across it they have one, too, from the floor to
 the ceiling, where they have coordinates of that motion.
 """
@@ -43,7 +43,7 @@ def check_directions(scene: Scene, basis: ModalBasis) -> None:
         )
     labels = [label for cavity in scene.cavity for label in (*cavity.labels(), cavity.ceiling) if label]
     if not {str(label) for label in [scene.excitation.at, *labels]} <= set(basis.rows):
-        return  # an unknown label is refused where its row is wanted
+        return  # an unknown label is rejected where its row is wanted
     _check_displacements(scene, basis.rotations)
     _check_known(scene, basis.directions)
     for index, cavity in enumerate(scene.cavity):
@@ -133,7 +133,7 @@ def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors
 def _check_across(cavity: Cavity, key: str, directions: Vectors, normals: Vectors) -> None:
     """Raise InputError for surfaces with several directions across, and a floor or ceiling on the other side.
 
-    The facets that make a floor look along its direction across, those of a ceiling against it.
+    The facets that make a floor face along its transverse direction, a ceiling's against it.
     """
     left, right, floor = map(str, cavity.labels())
     across = directions.get(floor + NORMAL, np.zeros(3))

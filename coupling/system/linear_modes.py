@@ -1,4 +1,4 @@
-"""The linear systems that bodies make of a structure, and how long what is not steady lasts in them.
+"""The linear systems that bodies make of a structure, and the duration of their transients.
 
 Two of them bound what contacts do: `loose`, in which bodies on springs, dashpots or tracks are attached as they are (a
 disc with friction rolls) and the others are not there, and `held`, in which friction and walls hold those that they
@@ -23,7 +23,7 @@ from vanedamp.coupling.system.system import System
 
 #: eigenvalues of an oscillator this close to each other, relative to its frequency, are taken to lie so far apart
 _CRITICAL = 1e-6
-#: share of the largest motion of the response, at equal energy, below which contacts excite a mode in vain
+#: fraction of the largest motion of the response, at equal energy, below which contacts excite a mode in vain
 _FELT = 1e-2
 
 
@@ -68,7 +68,7 @@ def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
 
 
 def weight_energy(scene: Scene, system: System) -> float:
-    """Return the energy, J, by which weight lowers that of the springs and tracks that hold bodies."""
+    """Return the energy, J, by which weight lowers the energy of the springs and tracks that hold bodies."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     if not system.of_bodies.weight[sprung].any():
         return 0.0
@@ -129,7 +129,7 @@ def _static(stiffness: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def _wave(made: _Matrices, omega: float, load: np.ndarray) -> np.ndarray:
-    """Return the complex displacements (k,) in step with a load; infinite at a resonance without damping."""
+    """Return the complex displacements (k,) in steady state under a load; infinite at a resonance without damping."""
     try:
         return np.linalg.solve(made.stiffness - omega**2 * made.mass + 1j * omega * made.damping, load)
     except np.linalg.LinAlgError:
@@ -142,7 +142,7 @@ def _modes(made: _Matrices, frequency: np.ndarray) -> LinearModes:
     pairs = zip(frequency, made.load, strict=True)
     wave = np.reshape([_wave(made, omega, load) for omega, load in pairs], (len(frequency), k))
     with np.errstate(invalid="ignore"):
-        # displacements and rates that are not those of the steady motion
+        # displacements and rates beyond the steady motion
         q, v = made.q - still - wave.real.sum(axis=0), made.v + (frequency[:, None] * wave.imag).sum(axis=0)
         together = (made.mass, made.damping, made.stiffness)
         if all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together):

@@ -1,4 +1,4 @@
-"""The linear responses that a damped one is compared with: without bodies, and with every body glued to its floor."""
+"""The linear references of a damped response: without bodies, and with every body fixed to its floor."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vanedamp.files.toml_input import InputError
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 #: local maxima that are refined; the others are lower
 _REFINED = 3
-#: half-power widths beside a crossing of an engine order that hold the top of its resonance
+#: half-power widths around a crossing of an engine order that contain the peak of its resonance
 _WIDTHS = 3.0
 
 
@@ -56,9 +56,9 @@ class LinearResponse:
     order: np.ndarray
 
     def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak over a period.
+        """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak per period.
 
-        Infinite at a frequency that is, to the last bit, that of a resonance without damping.
+        Infinite at a frequency that is, to the last bit, a resonance without damping.
         """
         waves = np.array([self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))])
         finite = np.isfinite(waves).all(axis=0)
@@ -157,7 +157,7 @@ def linear_peaks(scene: Scene, low: float, high: float) -> tuple[LinearPeak, Lin
 def peak_along(response: Callable[[float], LinearResponse], order: float, low: float, high: float) -> LinearPeak:
     """Return the largest amplitude of a linear response along an engine order from low to high, rad/s.
 
-    response: at a speed, rad/s. Frequency and half-power width of the peak are those along the line, Hz; it lies at an
+    response: at a speed, rad/s. Frequency and half-power width of the peak refer to the line, Hz; it lies at an
     end where no resonance in the range is higher.
     """
 
@@ -197,7 +197,7 @@ def _resonances(
 
 
 def linear_responses(scene: Scene, system: System | None = None) -> tuple[LinearResponse, LinearResponse]:
-    """Return the responses without bodies, and with every body glued to its cavity's floor. system: of the scene.
+    """Return the responses without bodies, and with every body fixed to its cavity's floor. system: of the scene.
 
     Raises InputError, also for an excitation that is no sum of sines: the peak that a truncated Fourier series leaves
     out has no bound that holds for every waveform.
@@ -219,7 +219,7 @@ def linear_responses(scene: Scene, system: System | None = None) -> tuple[Linear
 
 
 def glued_mass(system: System) -> np.ndarray:
-    """Return the modal mass matrix (n, n) of the structure with every body glued to its floor."""
+    """Return the modal mass matrix (n, n) of the structure with every body fixed to its floor."""
     floor = system.floor[:, : system.modes]
     mass: np.ndarray = np.diag(system.of_structure.mass) + (floor.T * system.of_bodies.mass) @ floor
     return mass
@@ -228,7 +228,7 @@ def glued_mass(system: System) -> np.ndarray:
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
     """Return the complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
 
-    Without bodies, or (`fixed`) with every body glued to its cavity's floor.
+    Without bodies, or (`fixed`) with every body fixed to its cavity's floor.
     """
     system = assemble(scene)
     modes, mass = system.of_structure, glued_mass(system) if fixed else np.eye(system.modes)

@@ -16,7 +16,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
 from vanedamp.rom.reduced import NORMAL, ReducedModel
 
-# share of a natural frequency that round-off of the stiffness may be worth
+# fraction of a natural frequency that round-off of the stiffness may change
 _FREQUENCY_ERROR = 1e-3
 
 
@@ -47,14 +47,14 @@ class ModalBasis:
     inertia: np.ndarray | None = None
 
     def across(self, label: str) -> np.ndarray | None:
-        """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
+        """Return the direction (3,) of the transverse motion at an interface label; None where unknown."""
         direction = self.directions.get(label + NORMAL)
         return direction if direction is not None and direction.any() else None
 
     def flexibility(self, shares: Mapping[str, float]) -> float:
-        """Return the residual flexibility, m/N, of a displacement that is the sum of shares of interface coordinates.
+        """Return the residual flexibility, m/N, of a displacement that is a weighted sum of interface coordinates.
 
-        shares: by label, such as 1 of a patch's motion across and x of its rotation for its point at x.
+        shares: the weights by label, such as 1 of a patch's motion across and x of its rotation for its point at x.
         """
         if self.residual is None:
             return 0.0

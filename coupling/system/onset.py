@@ -2,7 +2,7 @@
 
 A body that the floor moves by R sin(omega t) sticks while its inertia stays below its friction. Beyond, it slips: to
 and fro about its place, or downhill where its cavity is inclined, until it lies at the lower wall. The amplitudes are
-those of motions that grow slowly; a transient may lead to impacts at smaller ones.
+for motions that grow slowly; a transient may lead to impacts at smaller ones.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Onset(NamedTuple):
 
 
 def onset(room: float, friction: float, pull: float, omega: float) -> Onset:
-    """Return the onsets of a body with room, m, to either wall at an angular frequency, rad/s.
+    """Return the onsets of a body with free travel `room`, m, to either wall at an angular frequency, rad/s.
 
     friction: mu N/m, that holds it, and pull, along the cavity: accelerations, m/s^2.
     """

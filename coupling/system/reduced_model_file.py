@@ -37,7 +37,7 @@ def reduced_model(structure: Rom, speed: float) -> ReducedModel:
 
 
 def restricted(structure: Rom, speed: float) -> Restricted:
-    """Return the same with its coordinates in those of the file."""
+    """Return the same with its coordinates in terms of the file's."""
     if structure.modes == "auto":
         raise InputError('structure.modes: "auto" is still open; model_order.selection.select_model_order chooses')
     return _restricted(structure, speed, file_stamp(structure.file))

@@ -16,7 +16,7 @@ from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_la
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 
-#: share of the largest product of response and loads below which loads do not excite a mode
+#: fraction of the largest product of response and loads below which loads do not excite a mode
 _UNMOVED = 1e-9
 
 
@@ -42,7 +42,7 @@ class Resonance(NamedTuple):
 def chosen_resonance(scene: Scene) -> Resonance:
     """Return the resonance that `resonance_amplitude` means: of the mode that responds most within `resonance_near`.
 
-    With an engine order and a range it is that of the highest response along the order, at the speed where it is met.
+    With an engine order and a range it has the highest response along the order, at the speed where it is met.
     Raises InputError for a structure without damping.
     """
     scene = _at_resonance(scene)

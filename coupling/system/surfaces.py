@@ -1,7 +1,7 @@
 """Motion of a cavity's surfaces: walls, floor and ceiling, each as its best rigid motion in the plane.
 
 A point at the height y above the floor moves along the cavity by u - theta y, u the floor's motion and theta the
-cavity's rotation: what a body feels of a cavity that turns depends on the height of its centre.
+cavity's rotation: the motion of a rotating cavity at a body depends on the height of its centre.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vanedamp.rom.reduced import NORMAL, ROTATION
 class Surface(NamedTuple):
     """Motion (n,) of a surface of a cavity, along and across at a place (x, y) of it, and its rotation.
 
-    x, y: m, from the middle of the floor, along and across; None: that of the contact, wherever the surface is.
+    x, y: m, from the middle of the floor, along and across; None: the contact's, wherever the surface is.
     """
 
     along: np.ndarray
@@ -40,7 +40,7 @@ class Surface(NamedTuple):
 def heights(scene: Scene) -> np.ndarray:
     """Return the height (b,) of each body's centre above its floor, m; 0 of sliders without one.
 
-    Sliders that share a cavity have the mean of their heights by mass: two that touch and are nowhere held move freely
+    Sliders in one cavity have the mean of their heights by mass: two that touch and are nowhere held move freely
     of the structure only if it moves them alike.
     """
     found = np.array([damper.half_extent[1] for damper in scene.damper])

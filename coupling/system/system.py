@@ -1,13 +1,13 @@
 """The record of a scene as matrices, the same for every method: M q'' + C q' + K q = loads + J^T lambda.
 
 q = (p, bodies, sliders): real modal coordinates of the structure, mass-normalised; of each body its position x along
-its cavity and, of one with extent, y across it and its tilt; and the sliders of Jenkins elements, coordinates without
+its cavity and, of a planar one, y across it and its tilt; and the sliders of Jenkins elements, coordinates without
 mass. All motion is relative to the base: a prescribed motion is a structure without modes on a moving base. x and y
 count from where the bodies of a cavity stand side by side on the floor, in the middle of the free travel. Tilts are
 small: a point (a, b) of a body, from its centre, moves by (x - tilt b, y + tilt a).
 
 The excitation is a sum of e exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t).
-Those of an excitation that is no such sum are a function of the angle (system.assembly.loads_of), whose first harmonics
+For an excitation that is no such sum, they depend on the angle (system.assembly.loads_of), whose first harmonics
 these are.
 
 Everything unilateral or frictional is a unit (system.units).
@@ -22,7 +22,7 @@ import numpy as np
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.scene.shapes.shape import SIDES
 
-#: names of what a unit meets, also those of the elements that have been assembled
+#: names of a unit's counterparts, also of elements assembled so far
 SURFACES = [*SIDES, "body", "stop", "casing"]
 LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 
@@ -51,7 +51,7 @@ class System(NamedTuple):
     """Matrices of a scene: N coordinates, n of them modes, e harmonics, u units, b bodies, d friction dampers.
 
     A unit is a contact with its normal row and its slip, or, behind the contacts, a friction element with a constant
-    limit, which has only a slip. The last j units are Jenkins elements, whose slip is that of their slider; the sliders
+    limit, which has only a slip. The last j units are Jenkins elements, whose slip is their slider's; the sliders
     are the last j coordinates. Rows (2u, N): normals first, then slips. Compiled functions take it as it is.
     """
 
@@ -72,7 +72,7 @@ class System(NamedTuple):
     frequency: np.ndarray  # (e,) angular frequencies of the harmonics, rad/s
     omega: float  # the first of them, rad/s
     period: float  # s
-    moment: float  # after which what an instant leaves open is looked at again, s
+    moment: float  # after which undecided states are checked again, s
     speed: float  # that the loads give the rows within a period, m/s: a scale for round-off
     J: np.ndarray  # (2u, N)
     rest: np.ndarray  # (u,) gap at q = 0, m
@@ -88,7 +88,7 @@ class System(NamedTuple):
     in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
-    body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body that of its own table
+    body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body, of its own table
     other: np.ndarray  # (u,) number of the body to its right; -1: none
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
     corner: np.ndarray  # (u,) int: 0 to 3, counterclockwise from the lower left one; -1: none
@@ -164,7 +164,7 @@ class System(NamedTuple):
 
 
 def on_structure(system: System) -> System:
-    """Return the system whose slips of Jenkins elements are those of what draws them, in place of their sliders'."""
+    """Return the system whose slips of Jenkins elements follow their drivers, in place of their sliders."""
     if not len(system.tangential):
         return system
     J = system.J.copy()

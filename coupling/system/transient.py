@@ -1,6 +1,6 @@
 """The linear transient: its length is known before a run.
 
-From rest, each mode of the structure with what is attached to it starts with its steady amplitude missing, and the
+From rest, each mode of the structure with attached bodies starts with its steady amplitude missing, and the
 difference decays at the mode's own rate (system.linear_modes). At its resonance a mode of damping ratio zeta has
 exp(-2 pi zeta n) left after n periods.
 """
@@ -24,14 +24,14 @@ LIMIT = 10_000
 #: periods up to which a run whose length is open is made longer until it is steady
 MOST = 24_000
 #: steady response, relative to what begins with it, below which a structure is at rest: an absorber without damping
-#: leaves round-off, of which no share is ever reached
+#: leaves round-off, of which no fraction is ever reached
 _NOTHING = 1e-6
-#: share of the transient that is left as a short run of a choice has settled, and the fewest periods which that takes
+#: fraction of the transient left when a short run of a choice has settled, and the fewest periods which that takes
 _LEFT, _SETTLE = 0.05, 100
 
 
 def left_over(scene: Scene, periods: float) -> float:
-    """Return an upper bound of the transient left after `periods` periods, as a share of the steady response.
+    """Return an upper bound of the transient left after `periods` periods, as a fraction of the steady response.
 
     Of the structure with bodies on springs and tracks attached, others loose or held by friction, without impacts.
     0 where nothing excites it.
@@ -40,7 +40,7 @@ def left_over(scene: Scene, periods: float) -> float:
 
 
 class Length(NamedTuple):
-    """Periods of a run: those left out, those simulated, and those up to which it goes on until it is steady."""
+    """Periods of a run: those left out, those simulated, and the limit up to which it continues until steady."""
 
     dropped: int
     simulated: int
@@ -48,7 +48,7 @@ class Length(NamedTuple):
 
 
 class Transient:
-    """The linear transient of a scene: its start, its rates of decay and its beats. system: that of the scene."""
+    """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's."""
 
     def __init__(self, scene: Scene, system: System | None = None) -> None:
         self.scene, self.system = scene, assemble(scene) if system is None else system
@@ -58,7 +58,7 @@ class Transient:
         self.driven = self.excited or signal is not None or isinstance(scene.structure, Prescribed)
 
     def left_over(self, periods: float) -> float:
-        """Return the bound of what is left, as left_over."""
+        """Return the bound of the remainder, as left_over."""
         return max(self._left(modes, periods) for modes in self.systems) if self.excited else 0.0
 
     def _left(self, modes: LinearModes, periods: float) -> float:
@@ -68,7 +68,7 @@ class Transient:
         return float(share) if np.isfinite(share) else np.inf
 
     def slowest(self, periods: int) -> tuple[float, float]:
-        """Return the slowest decay, a period, that the response may show, and the longest beat, in periods.
+        """Return the slowest decay per period that the response may show, and the longest beat, in periods.
 
         Beats, with the excitation at the same phase of each period, of modes that do not decay within `periods`.
         """
@@ -83,13 +83,13 @@ class Transient:
         return float(slowest), float(longest)
 
     def weight_energy(self) -> float:
-        """Return the energy, J, by which weight lowers that of the springs and tracks that hold bodies."""
+        """Return the energy, J, by which weight lowers the energy of the springs and tracks that hold bodies."""
         return weight_energy(self.scene, self.system)
 
     def settled_after(self, lengths: range, share: float | None = None) -> int:
-        """Return the first of rising numbers of periods that leaves at most a share; their end where none does.
+        """Return the first of rising numbers of periods that leaves at most a fraction; their end where none does.
 
-        share: of the steady response; default: `time.tolerance`.
+        share: fraction of the steady response; default: `time.tolerance`.
         """
         share = self.scene.time.tolerance if share is None else share
         place = bisect_left(lengths, True, key=lambda periods: self.left_over(periods) <= share)

@@ -2,7 +2,7 @@
 
 A contact is a normal row, its gap, and a slip row with a coefficient of friction; a friction element is a slip row with
 a constant limit: the floor under a body that only slides, or a friction damper between structure and casing. Contacts
-come first, cavity by cavity from left to right, then those of stops and other elements; of the friction elements,
+come first, cavity by cavity from left to right, then contacts of stops and other elements; of the friction elements,
 Jenkins elements come last.
 
 A body whose height is known lies in a cavity that turns by theta: a point at the height y above the floor meets walls
@@ -73,7 +73,7 @@ class Law(NamedTuple):
     def element(self, normal: np.ndarray, restitution: float, yields: float) -> Element:
         """Return the element of a contact from its normal row (N,) and the residual flexibility of its wall, m/N.
 
-        The structure's mass is that of its first mode, the same for every number of modes.
+        The structure's mass is its first mode's, the same for every number of modes.
         """
         mobility = normal**2 / self.mass
         mobility[1 : len(self.basis.stiffness)] = 0.0
@@ -174,7 +174,7 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
 
 
 class ElementParts(NamedTuple):
-    """What the elements of a scene make their rows of (scene.elements.element.Parts): N coordinates, n of them modes.
+    """Ingredients of the rows of a scene's elements (scene.elements.element.Parts): N coordinates, n of them modes.
 
     law: of contacts; label: of the response; reach: (n,) static displacements of the modes under the excitation; start:
     displacement of the structure by its initial motion, m; floor (b, N), along (b,): as in System.
@@ -236,7 +236,7 @@ def friction_elements(
 ) -> Iterator[Unit]:
     """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, then Jenkins elements.
 
-    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System. Elements without a limit are none.
+    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System. Elements without a limit do not count.
     """
     none = np.zeros(floor.shape[1])
     for body in bodies:

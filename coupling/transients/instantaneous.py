@@ -98,7 +98,7 @@ class TurningPoints:
     def __init__(self) -> None:
         self.found: list[TurningPoint] = []
         self._sign, self._speed, self._energy = 0.0, 0.0, 0.0
-        #: where the speed has vanished, while it is open whether the coordinate goes on
+        #: where the speed has vanished, until it is known whether the coordinate moves on
         self._stop: TurningPoint | None = None
 
     @property
@@ -160,7 +160,7 @@ def _point(segment: Followed, t: float) -> TurningPoint:
 def without_rebounds(points: list[TurningPoint]) -> list[TurningPoint]:
     """Return the turning points that bound half cycles: rebounds of impacts within a half cycle are left out.
 
-    Rebounds are swings that are all smaller than a tenth of both the swing before and that after them. At the end of a
+    Rebounds are swings that are all smaller than a tenth of both the swings before and after them. At the end of a
     half cycle its outermost turning point stays, on its way none.
     """
     kept: list[TurningPoint] = []
@@ -215,7 +215,7 @@ def cycles(
 ) -> Cycles:
     """Return the damping over windows of `count` cycles between turning points (k,).
 
-    Both estimates are exact for a linear mode. The loss of energy is that of all parts: in a window in which bodies
+    Both estimates are exact for a linear mode. The loss of energy includes all parts: in a window in which bodies
     lose more than the structure has at its start, that estimate is nan.
     """
     half = 2 * count

@@ -8,7 +8,7 @@ u(s) = kappa (s + (omega_0 + i lambda)/alpha),
     I = sqrt(pi)/(2 kappa) (exp(lambda t) w(i u(0)) - exp(i phi(t)) w(i u(t))),   w(z) = exp(-z^2) erfc(-i z),
 
 the Faddeeva function. Before the resonance u has a negative real part, where w is large: there
-w(i u) = 2 exp(u^2) - w(-i u), and the first terms of both ends are one exponential, which they share.
+w(i u) = 2 exp(u^2) - w(-i u), and the first terms of both ends are one common exponential.
 
 F. M. Lewis, Vibration during acceleration through a critical speed, Trans. ASME 54 (1932) 253-261.
 """
@@ -49,7 +49,7 @@ def _integral(value: complex, omega: float, rate: float, t: np.ndarray, rest: bo
     if rest and start.real >= 0.0:
         found = found + np.exp(value * t) * wofz(1j * start)
     else:
-        # the exponential that both ends share: of the lower one while the upper one is before the resonance, too
+        # the common exponential of both ends: of the lower one while the upper one is before the resonance, too
         found = found + 2.0 * np.exp(np.where(behind, value * t + start**2, -np.inf))
         if rest:
             found = found - np.exp(value * t) * wofz(-1j * start)
@@ -57,7 +57,7 @@ def _integral(value: complex, omega: float, rate: float, t: np.ndarray, rest: bo
 
 
 def peak_ratio(q: np.ndarray) -> np.ndarray:
-    """Return the largest amplitude of a lightly damped mode at rates q (k,) > 0, over that of its resonance.
+    """Return the largest amplitude of a lightly damped mode at rates q (k,) > 0, over its resonance amplitude.
 
     q = |alpha|/(zeta omega)^2, with alpha (rad/s^2) the rate of the angular frequency: the change of the frequency in
     a decay time 1/(zeta omega), over zeta omega. The envelope of a mode with zeta much below one depends on q only,
@@ -67,7 +67,7 @@ def peak_ratio(q: np.ndarray) -> np.ndarray:
 
 
 def _peak(q: float) -> float:
-    """Return the top of the envelope of I(lambda_1), with time in decay times, counted from the resonance."""
+    """Return the maximum of the envelope of I(lambda_1), with time in decay times, counted from the resonance."""
 
     def negative(tau: np.ndarray) -> np.ndarray:
         return -np.abs(_integral(-1.0 + 0.0j, 0.0, q, tau, rest=False))

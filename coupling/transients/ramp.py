@@ -1,7 +1,7 @@
 """Run-up and run-down: the excitation's frequency, or the speed of rotation, changes at the start of every period.
 
 Within a period both are constant (transients.ramp_course), so that the exact engine stays exact. Phase and force are
-continuous, and the motion goes on as it is: a period begins with the state that the one before has left
+continuous, and the motion continues unchanged: a period begins with the state that the one before has left
 (response.restart). Where the speed changes the stiffness, it changes the energy stored in it: work of the rotation.
 """
 
@@ -60,7 +60,7 @@ def ramp(
     """Run a scene up or down, or both, at all rates of its [ramp] table.
 
     progress: called with the number of periods done and of those to do, of all runs.
-    Raises InputError for a scene without the table, or one that cannot be run so; numerical trouble is a status of the
+    Raises InputError for a scene without the table, or one that cannot be run so; numerical failure is a status of the
     run.
     """
     table, base, planned = table_of(scene), ramped(scene), courses(scene)
@@ -90,7 +90,7 @@ def ramp(
 
 
 def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, list[str]]:
-    """Return the end of a run of the scene, and what is to be said about it. Raises InputError if it ends early."""
+    """Return the end of a run of the scene, and remarks on it. Raises InputError if it ends early."""
     response = simulate(scene, start=start)
     if response.final is None:
         raise InputError(
@@ -104,7 +104,7 @@ def seen_only(system: System) -> System:
     """Return a system without the loads on modes that neither the response nor a body nor a contact feels.
 
     The engine lets such modes be: it carries no free motion of them from one period to the next. At rest they have no
-    energy either, and the ledger is that of all that moves.
+    energy either, and the energies include all moving parts.
     """
     n = system.modes
     rows = np.abs(np.vstack([
@@ -137,7 +137,7 @@ class _Run:
         self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
-        # the ledger without the work of the rotation, which is counted apart
+        # the energies without the work of the rotation, which is counted apart
         self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
 
     def advance(self) -> Iterator[int]:
@@ -160,7 +160,7 @@ class _Run:
             self.system = seen_only(assemble(self.scene))
             if self.state is not None:
                 state = at_speed_of(self.scene, self.state)
-                # fewer modes than the model has may not hold the motion: what they lose is no work of the rotation
+                # fewer modes than the model has may not hold the motion: their loss is no work of the rotation
                 self.rotation -= 0.5 * (_square(state.velocity) - _square(self.state.velocity))
         else:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
@@ -222,7 +222,7 @@ def _square(values: np.ndarray) -> float:
 
 
 def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:
-    """Return the amplitudes of the linear structure in steady state over the ramp, and their tops: see Ramp."""
+    """Return the amplitudes of the linear structure in steady state over the ramp, and their peaks: see Ramp."""
     low, high = min(table.from_, table.to), max(table.from_, table.to)
     hertz, unit = hertz_of(table.path, scene.excitation.engine_order), SPEEDS.get(table.path, 1.0)
     if np.isfinite(hertz):

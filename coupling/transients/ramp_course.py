@@ -130,7 +130,7 @@ def ramped(scene: Scene) -> Scene:
         if order is not None and not min(table.from_, table.to) > 0.0:
             raise InputError("ramp: an engine order has no frequency at standstill; give from and to above zero")
     hertz = hertz_of(table.path, order)
-    if near is None and math.isfinite(hertz):  # the level is that of one resonance, as in a sweep
+    if near is None and math.isfinite(hertz):  # the level refers to one resonance, as in a sweep
         ends = sorted((table.from_ * hertz, table.to * hertz))
         scene = replace(scene, excitation=replace(excitation, resonance_near=(ends[0], ends[1])))
     return replace(scene, ramp=None, sweep={}, orbit=None)

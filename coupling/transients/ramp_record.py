@@ -34,7 +34,7 @@ class RampRun:
     """A run through p excitation periods with b bodies.
 
     rate             change of the ramp's quantity per second, below zero where it falls
-    status           "ok", or another response.response.Status that ended the run early or spoils its figures
+    status           "ok", or another response.response.Status that ended the run early or spoils its results
     time             (p,) s, at the start of each period
     frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
     amplitude        (p,) m, the largest |x| in it
@@ -44,7 +44,7 @@ class RampRun:
     stuck            (p, b) whether a body stays at rest in its cavity over the period
     displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
     energy           J by the names of WORKS, over the run
-    energy_residual  imbalance of the run's ledger, relative to the largest term
+    energy_residual  imbalance of the run's energies, relative to the largest term
     """
 
     rate: float
@@ -86,11 +86,11 @@ class Ramp(SceneRecord):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
-    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the largest of both
+    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the peaks of both
     from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
     `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
     which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
-    be read before figures are used; provenance: versions and further data of the caller (JSON-able).
+    be read before results are used; provenance: versions and further data of the caller (JSON-able).
     """
 
     KIND: ClassVar[str] = "ramp"
@@ -108,7 +108,7 @@ class Ramp(SceneRecord):
         return self.scene.ramp
 
     def share(self, run: RampRun) -> float:
-        """Return the dynamic peak of a run over that of the linear structure without bodies in steady state."""
+        """Return the dynamic peak of a run over the linear structure's without bodies in steady state."""
         top = self.tops["undamped_peak"]
         return float(run.amplitude_dynamic.max(initial=0.0)) / top if len(run.time) and 0.0 < top < np.inf else np.nan
 

@@ -51,7 +51,7 @@ def ring_down(
     """Let a scene ring down as its [ring_down] table says, and find the turning points of one natural mode.
 
     progress: called with the number of periods done and of those to do. Raises InputError for a scene without the
-    table, one that the exact engine cannot run, or in which nothing moves; numerical trouble is a status of the result.
+    table, one that the exact engine cannot run, or in which nothing moves; numerical failure is a status of the result.
     """
     began, table = time.perf_counter(), table_of(scene)
     chosen = choose(scene)
@@ -118,7 +118,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 
 
 def _linear(system: System, mode: int) -> LinearMode:
-    """Return the figures of a mode without bodies, and with all of them fixed: of the mode that is most like it."""
+    """Return the results of a mode without bodies, and with all of them fixed: of the mode that is most like it."""
     modes = system.of_structure
     squares, shapes = eigh(np.diag(modes.stiffness), glued_mass(system))
     like = int(np.argmax(np.abs(shapes[mode])))

@@ -17,7 +17,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.store import Variable, frozen
 
-#: energies of a ring-down: at its start, what it loses, and at its end
+#: energies of a ring-down: at its start, lost, and at its end
 PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 
 
@@ -42,13 +42,13 @@ class RingDown(SceneRecord):
     scene: with its [ring_down] table; linear: the mode without bodies
     duration            s, of the free motion
     time                (k,) s of the turning points, from the start of the free motion
-    displacement        (k,) m there, the mode's contribution to that at excitation.at
+    displacement        (k,) m there, the mode's contribution at excitation.at
     energy              (k,) J there, of structure, bodies and springs
     structure_energy    (k,) J there, of all modes of the structure
     impacts             (k - 1,) in each half cycle
     rest_time           s, at which the mode comes to rest; None if it moves to the end
     energies            J over the free motion: initial, viscous, friction, impact, contact and left
-    energy_residual     imbalance of the ledger, relative to its largest term
+    energy_residual     imbalance of the energies, relative to its largest term
     drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """

@@ -43,7 +43,7 @@ def table_of(scene: Scene) -> RingDownTable:
 
 
 def _check_at_rest(scene: Scene, table: RingDownTable) -> None:
-    """Raise InputError where a blow or a pull moves nothing, or leaves open what only a steady motion decides."""
+    """Raise InputError where a blow or a pull moves nothing, or has open choices that only a steady motion decides."""
     if table.start == "impulse" and not table.impulse:
         raise InputError("ring_down.impulse: nothing moves; give an impulse that is not 0 (N s)")
     if table.start == "displacement" and not (table.displacement or scene.initial != Initial()):
@@ -76,7 +76,7 @@ def free_scene(scene: Scene, table: RingDownTable) -> Scene:
 def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     """Return the state right after a hammer blow, at a static pull, or the scene's initial one.
 
-    A blow acts on the structure only: what it makes bodies do comes by friction and impacts. A pull moves the cavities
+    A blow acts on the structure only: bodies move by friction and impacts only. A pull moves the cavities
     with their bodies, and leaves the springs of friction dampers unloaded. Raises InputError.
     """
     system = assemble(scene)
@@ -108,10 +108,10 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
 
 
 def check_impacts(free: Scene, system: System, start: RestartState) -> None:
-    """Refuse a motion whose impacts nobody would wait for, such as one of a blow that slipped by powers of ten.
+    """Reject a motion with too many impacts to wait for, such as one of a blow that slipped by powers of ten.
 
     A body that meets its walls at a speed u loses it as exp(-n log(1/e)) in n impacts at restitution e, each a free
-    travel g apart: in a time T these are log(1 + (1 - e) u T / g) / log(1/e). Every period begins anew. InputError.
+    travel g apart: in a time T these are log(1 + (1 - e) u T / g) / log(1/e). Every period starts again. InputError.
     """
     rows = np.flatnonzero(~system.across)
     rigid, bounce = np.isinf(system.spring[rows]), np.clip(system.restitution[rows], 0.01, 1.0 - 1e-12)

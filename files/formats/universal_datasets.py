@@ -81,7 +81,7 @@ def curve_dataset(
     """Return dataset 58 of a curve, values (n,) over x (n,), for `write_universal`.
 
     function: type of the function; abscissa, ordinate, per: specific data types of x, of the values, and of what they
-    are over, as those of `AXES`; more: further entries, or others in place of these.
+    are over, as in `AXES`; more: further entries, or others in place of these.
     """
     data: dict[str, Any] = {
         "type": 58, "binary": 0, "func_type": function, "id1": title[:80], "rsp_node": 1, "rsp_dir": 0, "ref_node": 0,

@@ -1,1 +1,1 @@
-"""Reduction bases: `craig_bampton`, `free_interface` (Rubin, MacNeal), and `projection`, which they share."""
+"""Reduction bases: `craig_bampton`, `free_interface` (Rubin, MacNeal), and `projection`, common to both."""

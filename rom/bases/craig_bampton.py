@@ -2,11 +2,11 @@
 
 Craig and Bampton (1968), AIAA J. 6(7), hold DOFs; here functionals W^T q = u are held, such as the mean displacement
 of a patch. One factorisation serves constraint modes and the shift-invert iteration for fixed-interface modes
-K phi = omega^2 M phi + W force, W^T phi = 0. Where the supports hold the structure it is that of the stiffness:
+K phi = omega^2 M phi + W force, W^T phi = 0. If the supports hold the structure, the stiffness is factorised:
 
     constraint modes  C = K^-1 W (W^T K^-1 W)^-1,   held response  q = (1 - C W^T) K^-1 load.
 
-A structure that only its interface holds has that of the stiffness bordered by W, so that it needs no shift:
+If only the interface holds it, the stiffness is bordered by W, so that no shift is needed:
 
     [K    W] [q     ]   [load]
     [W^T  0] [-force] = [u   ].
@@ -31,13 +31,13 @@ from vanedamp.rom.bases.projection import Factorize, ReductionError, lowest_mode
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 
-# a round trip through a well-posed matrix loses 5 to 8 digits, through a singular one all of them
+# a round trip through a well-posed matrix loses 5 to 8 digits; through a singular one, all of them
 _ROUND_TRIP = 1e-2
 # the same for a structure that its supports hold
 _EXACT = 1e-6
 # fraction of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
-# lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
+# lowest eigenvalue of the mass of fields of unit norm that a factorisation tolerates
 _SMALLEST = 1e-14
 
 
@@ -71,8 +71,8 @@ def reduce(
 
     factorize      solves with a symmetric indefinite matrix, such as modal.eigen.factorize
     keep_recovery  keep the basis, to reconstruct full displacements
-    quasi_static   insert the quasi-static modes between interface and fixed-interface modes: for the price of as many
-                   coordinates as the interface has, frequencies and receptances are right by orders of magnitude more;
+    quasi_static   insert the quasi-static modes between interface and fixed-interface modes: at the cost of as many
+                   coordinates as the interface has, frequencies and receptances gain orders of magnitude in accuracy;
                    a number: that many blocks of them, each the quasi-static response to the inertia of the one before
     characteristic number of characteristic constraint modes kept of patches of kind "full"; the interface's own
                    coordinates stay statically exact
@@ -92,7 +92,7 @@ def basis_of(
     quasi_static: int = 0,
     characteristic: int = 6,
 ) -> Basis:
-    """Return the basis of `reduce`, with arguments and errors of that, from one factorisation."""
+    """Return the basis of `reduce`, with its arguments and errors, from one factorisation."""
     stiffness, mass, vectors = interface.restrict(matrices)
     boundary, labels = _boundary(interface, vectors)
     held = _held(matrices, interface, stiffness, mass, boundary, factorize)
@@ -115,7 +115,7 @@ def reduced_model(
 def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the held functionals (n, b): of the nodes of full patches, and of the rest of the interface.
 
-    Second, the interface coordinates (k, b) in these.
+    Then the interface coordinates (k, b) in terms of these.
     """
     if not interface.full.size:
         return vectors, np.eye(vectors.shape[1])
@@ -207,7 +207,7 @@ class _Bordered:
         self.constraint = self._factor.solve(given)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Return the same as that of _Supported."""
+        """Return the same as _Supported."""
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
@@ -257,9 +257,9 @@ def _quasi_static_blocks(
 
 
 def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
-    """Count the last fields (n, m), their own shares ascending, that leave the mass of all together well conditioned.
+    """Count the last fields (n, m), by rising own fractions, that leave the mass of all together well conditioned.
 
-    A small share multiplies with those of known fields that are nearly dependent, so it does not decide by itself.
+    A small fraction multiplies with the fractions of nearly dependent known fields, so it does not decide by itself.
     """
     for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
         together = np.hstack([known, fields[:, -count:]])

@@ -31,7 +31,7 @@ from vanedamp.rom.bases.projection import (
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 
-# of the squared frequency of uniform strains: small beside those of modes, far above round-off of the factorisation
+# of the squared frequency of uniform strains: small compared with modes, far above round-off of the factorisation
 _SHIFT = 1e-4
 _ROUNDS = 200
 _CONVERGED = 1e-12
@@ -49,8 +49,8 @@ def reduce_free(
 ) -> ReducedModel:
     """Reduce a structure to its lowest `modes` natural modes, after `blocks` blocks of residual attachment modes.
 
-    blocks = 0: the modes only; 1: Rubin's basis; more: higher orders of the residual's inertia. The other arguments
-    are those of bases.craig_bampton.reduce. Raises ReductionError for fewer modes than the structure has rigid motions,
+    blocks = 0: the modes only; 1: Rubin's basis; more: higher orders of the residual's inertia. Other arguments:
+    see bases.craig_bampton.reduce. Raises ReductionError for fewer modes than the structure has rigid motions,
     or more than it has at all, and for a structure with a mechanism.
     """
     stiffness, mass, vectors = interface.restrict(matrices)

@@ -1,4 +1,4 @@
-"""Parts that the bases share: the factorisation they solve with, and the reduced model of a basis."""
+"""Common parts of the bases: factorisation and reduced model of a basis."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def project(
     origin     which basis of how many modes and blocks, for the provenance
     squares    (f,) squared frequencies of natural modes, the last f of the basis, if it ends with such
 
-    fixed_interface_modes is that of ReducedModel.
+    fixed_interface_modes: as in ReducedModel.
     """
     recovery = interface.motions @ basis
     mass, stiffness = (

@@ -1,4 +1,4 @@
-"""What a calibration leaves to go on with: the case with the tuned numbers, and a scene with the rigid model."""
+"""Output of a calibration for further work: the case with the tuned numbers, and a scene with the rigid model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vanedamp.studies.case.calibration import Calibration
 from vanedamp.studies.case.tables import FILES
 from vanedamp.studies.file_kinds import KINDS
 
-#: digits of a tuned number: the frequencies are those of the calibration to 1e-11
+#: digits of a tuned number: frequencies agree with the calibration to 1e-11
 _DIGITS = 12
 #: gaps over the fatigue amplitude, mass of the body over the rigid model's, and range of the frequencies: a
 #: start that shows impact mistuning
@@ -26,7 +26,7 @@ _SCHEMA = "#:schema "
 def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write the case file of a calibration with its tuned numbers, and all else as it was.
 
-    source: the case file that was calibrated. Files that it names are those of the source, relative to the new place.
+    source: the case file that was calibrated. Files that it names stay the source's, relative to the new folder.
     """
     with replacing(path) as temporary:
         temporary.write_bytes(tuned_text(Path(source), calibration, Path(path)).encode())
@@ -160,14 +160,14 @@ def _scale(table: AbstractTable, key: str, factor: float) -> None:
 
 
 def _change(table: AbstractTable, key: str, value: float, note: str) -> None:
-    """Give a key another number, and a comment that says why and what it was."""
+    """Give a key another number, and a comment with the reason and the old value."""
     was = f"; was {float(table[key]):.6g}" if key in table else ""
     table[key] = _number(value)
     _remark(table, key, note + was)
 
 
 def _remark(table: AbstractTable, key: str, note: str) -> None:
-    if isinstance(table, InlineTable):  # has no room for comments
+    if isinstance(table, InlineTable):  # holds no comments
         return
     item: Any = table[key]
     old = item.trivia.comment.removeprefix("#").strip()

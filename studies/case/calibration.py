@@ -123,7 +123,7 @@ class Calibration:
         }
 
     def save(self, path: str | Path) -> None:
-        """Write an HDF5 record: the numbers as attributes, what the tuning did as arrays."""
+        """Write an HDF5 record: the numbers as attributes, the tuning's changes as arrays."""
         result = self.to_json()
         frequencies = self.analysis.modes.frequencies_hz
         variables = {"frequency": Variable(frequencies, ("mode",), "Hz")}
@@ -250,7 +250,7 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
 
 
 def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, list[str]]:
-    """Return the damping of the mode nearest to a computed frequency, Hz, and what is odd about it."""
+    """Return the damping of the mode nearest to a computed frequency, Hz, and anything odd about it."""
     frf = read_frf(table.frf, table.quantity, table.columns)
     low, high = band = table.band or (0.95 * frequency, 1.05 * frequency)
     poles = _poles(frf, band, table.modes, frequency)
@@ -281,7 +281,7 @@ def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) ->
 
 
 def _doubts(frf: Frf, band: tuple[float, float], misfit: float, measured: float, computed: float) -> Iterator[str]:
-    """Yield what is odd about the mode measured in a band of a response."""
+    """Yield anomalies of the mode measured in a band of a response."""
     if abs(measured / computed - 1.0) > _OFF:
         yield (
             f"the response's mode lies at {measured:.6g} Hz, {measured / computed - 1.0:+.1%} off the computed first "

@@ -1,4 +1,4 @@
-"""Import of another code's reduced model: a TOML file that says where its matrices are and what they mean."""
+"""Import of another code's reduced model: a TOML file with the location and meaning of its matrices."""
 
 from __future__ import annotations
 

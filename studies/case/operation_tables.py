@@ -50,7 +50,7 @@ class RotationTable:
 
     @property
     def greatest(self) -> float:
-        """Greatest speed that a reduced model is for, rad/s."""
+        """Maximum speed that a reduced model covers, rad/s."""
         if self.max_speed is not None:
             return self.max_speed
         return self.omega if self.max_rpm is None else _RPM * self.max_rpm

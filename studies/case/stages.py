@@ -62,7 +62,7 @@ _START, _MOST = 16, 64
 class Structure:
     """A case with its finite elements: the solid on its mesh, and the matrices.
 
-    rotating: those of a case that rotates, of which `matrices` are the ones at its speed.
+    rotating: matrices of a case that rotates; `matrices` holds at its speed.
     """
 
     case: Case
@@ -73,7 +73,7 @@ class Structure:
 
 def assemble(case: Case) -> Structure:
     """Return mesh, groups and matrices. Raises the errors of the modal package, and InputError for unknown groups."""
-    label = case.response_label  # an open choice is refused before the work
+    label = case.response_label  # an open choice is rejected before the work
     with _mesh(case) as path:
         scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
         materials = {
@@ -141,7 +141,7 @@ def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = N
 
 
 def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) -> list[InterfaceCoordinate]:
-    """Return the interface coordinates of a table: one, or those of a motion in a plane."""
+    """Return the interface coordinates of a table: one, or several of a motion in a plane."""
     direction = _direction(label, "direction", table.direction, table, matrices)
     if not table.planar:
         return [InterfaceCoordinate(label, table.facets, direction, table.kind, table.motion)]
@@ -174,7 +174,7 @@ def _direction(
 class Fatigue:
     """The level at which the first bending's stress reaches a fraction of the fatigue strength.
 
-    share      of the strength
+    share      fraction of the strength
     amplitude  m, displacement of the response coordinate
     spot       where the stress does
     """
@@ -186,16 +186,16 @@ class Fatigue:
 
 @dataclass(frozen=True, eq=False)
 class ModalAnalysis:
-    """Modes and their figures.
+    """Modes and their results.
 
-    effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
+    effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is their sum over all modes
     first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
                     when a free structure, or a range of frequencies, has no such mode
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
     cavities        how that mode moves the case's cavities, those interface coordinates that move across, too, by label
     functional      (N,) that coordinate; None without
     fatigue         of that mode; None without a rigid model or a fatigue strength
-    warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
+    warnings        points to check: frequencies that hint at wrong units, the reason for no first bending
     gyroscopic      as many modes with the gyroscopic coupling, if the case wants them
     """
 
@@ -347,7 +347,7 @@ def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> t
 
 
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
-    """Return the first bending among the modes that strain the structure, or None and why there is none.
+    """Return the first bending among the modes that strain the structure, or None and the reason.
 
     It is the mode most like the case's shape, or the one of most effective mass along its direction.
 
@@ -485,7 +485,7 @@ def reduction(
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:
-    """Return the greatest speed, rad/s, that a reduced model of the structure is for; 0 if it does not rotate.
+    """Return the maximum speed, rad/s, that a reduced model of the structure covers; 0 if it does not rotate.
 
     Raises InputError for none, or a basis that does not hold over speeds, and UnstableError beyond the stable ones.
     """

@@ -452,7 +452,7 @@ class Case:
 
 
 def _value(table: Any, keys: Iterable[str]) -> Any:
-    """Return what a key of tables within tables has; None where one of them is not given."""
+    """Return the value of a key of nested tables; None if one of them is missing."""
     for key in keys:
         table = getattr(table, key, None)
     return table
@@ -521,7 +521,7 @@ def _names(record: Any) -> list[str]:
 
 
 def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
-    """Raise InputError for a group that is none of those known, by kind; the first kind is the usual one."""
+    """Raise InputError for an unknown group, by kind; the first kind is the usual one."""
     if any(group in names for names in known.values()):
         return
     (kind, names), *others = known.items()

@@ -14,7 +14,7 @@ from vanedamp.studies.commands.support.messages import cavity_lines, write_resul
 
 def run(arguments: Namespace, case: Case) -> None:
     """Compute the modes, and what follows from them."""
-    if arguments.vtk:  # loads matplotlib and meshio, and says before the work what is missing
+    if arguments.vtk:  # loads matplotlib and meshio, and reports missing packages before the work
         from vanedamp.studies.report.pictures import save_vtk
 
     analysis = modal_analysis(assemble(case))

@@ -1,4 +1,4 @@
-"""`vanedamp orbits`: periodic orbits over a number of the scene; what is found is kept and survives a kill."""
+"""`vanedamp orbits`: periodic orbits over a number of the scene; points found are kept and survive a kill."""
 
 from __future__ import annotations
 

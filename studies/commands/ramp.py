@@ -29,7 +29,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
 
 
 def _summary(result: Ramp, seconds: float) -> Iterator[str]:
-    """Yield the peak of every run, and how it compares with that of the steady state without bodies."""
+    """Yield the peak of every run, and its ratio to the steady state without bodies."""
     yield (
         f"{f'rate, {result.table.unit}/s':>18} direction {'peak, m':>12} {'at, Hz':>10} "
         f"{'of the steady-state peak':>24}  status"

@@ -40,7 +40,7 @@ def run(arguments: Namespace, case: Case) -> None:
 
 
 def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
-    """Yield sizes, the estimates of errors, and natural frequencies: at rest, and at the greatest speed."""
+    """Yield sizes, the estimates of errors, and natural frequencies: at rest, and at maximum speed."""
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     kind = "natural" if model.free_modes else "fixed-interface"
     yield f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}"

@@ -1,6 +1,6 @@
-"""The claims that the demonstration judges, and how: rules on figures, in words of our own.
+"""The claims that the demonstration judges, and how: rules on results, in words of our own.
 
-Where a claim holds in part or not, `why` says what the model has or lacks. Amplitudes are relative to the undamped
+Where a claim holds in part or not, `why` names the cause in the model. Amplitudes are relative to the undamped
 maximum.
 """
 
@@ -21,7 +21,7 @@ SHOWN, PARTLY, NOT_SHOWN = "shown", "partly", "not shown"
 
 
 def claim(said: str, ours: str, word: str, why: str = "", figures: Mapping[str, float | None] | None = None) -> Claim:
-    """Return a claim of the paper, the finding here, and plain figures."""
+    """Return a claim of the paper, the finding here, and plain numbers."""
     plain = {name: None if value is None else float(value) for name, value in (figures or {}).items()}
     if word != SHOWN and not why:
         why = "The figures lie outside of what counts as shown here."

@@ -17,7 +17,7 @@ _SMOOTHING = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Top of a curve: frequency (Hz), height over the undamped maximum with its 95 % confidence, index of the point."""
+    """Peak of a curve: frequency (Hz), height over the undamped maximum with 95 % confidence, index of the point."""
 
     frequency: float
     height: float
@@ -88,7 +88,7 @@ class Curve:
         return {name: float(np.sqrt(np.mean(values[hit] ** 2))) for name, values in distance.items()}
 
     def peak(self, values: np.ndarray | None = None) -> Peak:
-        """Return the top of a curve (n,), by default of the means."""
+        """Return the peak of a curve (n,), by default of the means."""
         values = self.mean if values is None else values
         top = int(np.argmax(values))
         return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top)

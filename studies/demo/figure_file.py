@@ -1,8 +1,8 @@
 """A figure as a file: scenes in the units of the structure that they are made for.
 
-The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
+The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` common to all curves,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
-none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of what the structure is like:
+none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of the structure's own:
 "0.5 amplitude". A cavity or damper with a `count` stands for that number of equal cavities, or of bodies in a row.
 """
 
@@ -67,7 +67,7 @@ class Structure:
     def unit(self, name: str) -> float:
         """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N).
 
-        `speed` (rad/s) is that at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
+        `speed` (rad/s) is the one at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
         times that.
         """
         speed = 2 * math.pi * self.frequency
@@ -93,7 +93,7 @@ class Frequencies:
 
 @dataclass(frozen=True)
 class Effort:
-    """Less than a figure's file says: frequencies per curve, periods of a run and its transient (None: the file's)."""
+    """Reductions of a figure's file: frequencies per curve, periods of a run and its transient (None: the file's)."""
 
     points: int
     periods: int | None = None
@@ -149,7 +149,7 @@ class FigureScenes:
 
 
 def frequency_grid(scene: Scene, frequencies: Frequencies, peaks: Sequence[float], points: int) -> list[float]:
-    """Return ascending frequencies, Hz, finer around those of the peaks (Hz) that lie between the ends."""
+    """Return ascending frequencies, Hz, finer around the peaks (Hz) that lie between the ends."""
     peaks = [peak for peak in peaks if frequencies.start < peak < frequencies.stop]
     if not peaks:
         return np.linspace(frequencies.start, frequencies.stop, points).tolist()

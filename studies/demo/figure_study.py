@@ -39,7 +39,7 @@ CASE = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(
 class Session:
     """Folder, pool and effort of studies.
 
-    pool: of processes, None for this one; effort: less than the figures' files say; resume: go on from the checkpoints
+    pool: of processes, None for this one; effort: less than the figures' files say; resume: continue from checkpoints
     that the folder has.
     """
 
@@ -114,7 +114,7 @@ def study(of: FigureStudy, session: Session) -> Study:
 
 
 def provenance(scene: Scene) -> dict[str, Any]:
-    """Return what a sweep's result says of its making: versions, and the digest of its reduced model."""
+    """Return the provenance of a sweep's result: versions, and the digest of its reduced model."""
     model = {"model": digest(scene.structure.file)} if isinstance(scene.structure, Rom) else {}
     return {"versions": versions()} | model
 

@@ -1,4 +1,4 @@
-"""The picture of a forced response under way, and its key figures."""
+"""The picture of a forced response under way, and its key results."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ def _hover(value: float, status: str) -> str:
 
 
 class Figure(NamedTuple):
-    """A key figure: a name and its value as text."""
+    """A key result: a name and its value as text."""
 
     name: str
     value: str
 
 
 def key_figures(response: ForcedResponse) -> list[Figure]:
-    """Return the key figures of a curve for people, those of the headline that `vanedamp sweep` prints."""
+    """Return the key results of a curve for people, from the headline that `vanedamp sweep` prints."""
     headline = response.headline
     return [
         Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
@@ -92,7 +92,7 @@ def key_figures(response: ForcedResponse) -> list[Figure]:
 
 
 def remarks(sweep: Sweep, response: ForcedResponse, complete: bool) -> list[str]:
-    """Return what keeps the figures of a curve from being taken as they are."""
+    """Return the reservations about the results of a curve."""
     found = [*sweep.provenance.get("warnings", ())]
     if complete:
         found += response.headline.remarks

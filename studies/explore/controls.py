@@ -141,7 +141,7 @@ def _control(measure: _Measure, name: str, label: str, value: float, changes: An
 
 
 def _listed(table: str, entries: Sequence[Any], measures: Sequence[_Measure], changes: Any) -> Iterator[Control]:
-    """Yield one control of a key that all entries share, or one of each where they differ."""
+    """Yield one control for a key with one value in all entries, or one for each where they differ."""
     for measure in measures:
         values = [getattr(entry, measure.key) for entry in entries]
         if not values or None in values:

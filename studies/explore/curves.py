@@ -103,7 +103,7 @@ def transient_note(scene: Scene) -> str | None:
 def _ends(scene: Scene, band: Band) -> tuple[float, float]:
     """Return lowest and highest frequency, Hz: as given, or round numbers beyond the resonances of both linear curves.
 
-    Of a structure with several modes that of the one nearest to the excitation frequency.
+    With several modes, the mode nearest to the excitation frequency counts.
     """
     free, fixed = linear_responses(scene)
     natural, widths = free.resonances()
@@ -145,7 +145,7 @@ class Curve:
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))
         self._news, self._cancelled, self.asked = Condition(), False, time.monotonic()
-        first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends are those of all its parts
+        first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends belong to all its parts
         self.coarse = len(first)
         self._futures = list[Future[TaskResult]]()
         for point in [*first, *sorted(set(range(self.size)) - set(first))]:
@@ -209,7 +209,7 @@ class Curves:
     def take(self, tab: str, version: int, scene: Callable[[], Scene]) -> Curve | None:
         """Return a tab's curve of some version, begun if it is not there; then the tab's older one is cancelled.
 
-        None if the tab has a newer one. Raises InputError, also what `scene` raises; the older one goes on then.
+        None if the tab has a newer one. Raises InputError, also what `scene` raises; the older one then continues.
         """
         with self._lock:
             known, curve = self._of_tab.get(tab, (-1, None))

@@ -1,4 +1,4 @@
-"""The page: its parts, and what they do."""
+"""The page: its parts, and their callbacks."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def register(app: Dash, exploration: Exploration, submit: Submit, apart: Submit)
 
 
 class Changes(NamedTuple):
-    """What a request changes in the page: the properties of its parts, in the order of the callback's outputs."""
+    """Changes of the page by a request: the properties of its parts, in the order of the callback's outputs."""
 
     answer: dict[str, Any]
     figure: Any = no_update
@@ -213,7 +213,7 @@ def changes(exploration: Exploration, curves: Curves, request: dict[str, Any]) -
 
 
 def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
-    """Return figure, key figures and a line on what there is of a curve so far."""
+    """Return figure, key results and a line on the progress of a curve."""
     sweep = curve.sweep()
     (response,) = forced_responses(sweep)
     count, complete = len(sweep.status), len(sweep.status) == curve.size

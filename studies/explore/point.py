@@ -22,7 +22,7 @@ from vanedamp.studies.explore.point_view import PointView, axis_of, point_view
 from vanedamp.studies.report.charts import GRAPH
 from vanedamp.studies.report.forced_response import setting
 
-#: runs that are kept for the tabs of the page, and ms between looks at them
+#: runs that are kept for the tabs of the page, and ms between checks of them
 _MOST_RUNS, _EVERY = 32, 200
 _HIDDEN = {"display": "none"}
 
@@ -61,7 +61,7 @@ class PointRuns:
             run.future.cancel()
 
     def look(self, key: str | None) -> PointView | str:
-        """Return what a run shows, or a line on how long it has been at work; an unknown one has failed."""
+        """Return the view of a run, or a line on how long it has been at work; an unknown one has failed."""
         run = self._runs.get(key or "")
         if run is None:
             return PointView("This run is not known any more: choose the point again.")
@@ -188,7 +188,7 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
 def chosen_value(trigger: str, click: Any, given: Any, figure: Any) -> float | None:
     """Return the value on the axis of a curve that a user has chosen; None for nonsense.
 
-    trigger: identifier of what was moved; click: plotly's data of a click; given: in the field; figure: the curve.
+    trigger: identifier of the moved control; click: plotly's data of a click; given: in the field; figure: the curve.
     """
     if trigger == "curve":
         points = (click or {}).get("points") or [{}]

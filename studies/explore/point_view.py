@@ -26,7 +26,7 @@ _SAMPLES, _MOST_SAMPLES, _MOST_PERIODS = 200, 1_000_000, 100_000
 
 
 class PointView(NamedTuple):
-    """A run as it is shown: its figures in words, two charts, and the document of the motion.
+    """A run as it is shown: its results in words, two charts, and the document of the motion.
 
     Charts are None, and the document is empty, where there is nothing to show.
     """
@@ -38,7 +38,7 @@ class PointView(NamedTuple):
 
 
 def axis_of(data: Mapping[str, Any]) -> str:
-    """Return the axis along which the curve of a scene runs, given as data: that of its [sweep], or the frequency."""
+    """Return the axis along which the curve of a scene runs, given as data: its [sweep] axis, or the frequency."""
     return next(iter(data.get("sweep") or ()), FREQUENCY)
 
 
@@ -54,12 +54,12 @@ def point_view(data: Mapping[str, Any], value: float) -> PointView:
 
 
 def run_in_full(scene: Scene) -> Response:
-    """Return the response of a scene with its samples and its events; they change none of its figures."""
+    """Return the response of a scene with its samples and its events; they change none of its results."""
     return simulate(scene, events=True, samples_per_period=_samples(scene))
 
 
 def view_of(scene: Scene, response: Response) -> PointView:
-    """Return what is shown of a run that kept samples and events."""
+    """Return the view of a run that kept samples and events."""
     if not len(response.time):
         return PointView(f"{_summary(response)}. The run ended within its first period: there is nothing to draw.")
     late = History.of(response, scene).late()
@@ -95,7 +95,7 @@ def _samples(scene: Scene) -> int:
 
 
 def _summary(response: Response) -> str:
-    """Return the figures of a run in a sentence."""
+    """Return the results of a run in a sentence."""
     attached = response.attached_mass_fraction
     parts = [
         f"{response.frequency:.6g} Hz: mean of peaks {1e6 * response.amplitude_mean:.4g} µm",

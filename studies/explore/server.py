@@ -76,7 +76,7 @@ def _guide(exploration: page.Exploration | None) -> str:
 
 
 def guard(app: Dash, port: int, token: str) -> None:
-    """Refuse requests under another host's name or without the token, and forbid the page all other addresses."""
+    """Reject requests under another host's name or without the token, and forbid the page all other addresses."""
     hosts, cookie = {f"{name}:{port}" for name in (HOST, "localhost")}, f"vanedamp-{port}"
     server: Flask = app.server
     server.config["MAX_CONTENT_LENGTH"] = _MOST_BYTES
@@ -103,7 +103,7 @@ def guard(app: Dash, port: int, token: str) -> None:
 
     @server.errorhandler(Exception)
     def fail(error: Exception) -> tuple[str, int] | HTTPException:
-        """Say in a line what a request of odd values has met; a page that fails says so, too."""
+        """Describe in a line the error of a request with odd values; a page that fails reports it, too."""
         if isinstance(error, HTTPException):
             return error
         place = traceback.extract_tb(error.__traceback__)[-1]
@@ -176,5 +176,5 @@ def serve(
 
 
 def _has_display() -> bool:
-    """Say whether a browser has a window to open; those of the terminal would be in its way."""
+    """Say whether a browser has a window to open; a browser in the terminal would be in its way."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

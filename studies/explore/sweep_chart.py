@@ -27,7 +27,7 @@ from vanedamp.studies.report.forced_response_charts import LOOKS, trace
 
 #: curves behind the chosen one at most; of more, evenly chosen ones are drawn
 _MOST_BEHIND = 60
-#: of runs to the end of time whose figures may still change
+#: of runs to the end of time whose results may still change
 _UNSURE = (Status.NOT_STEADY, Status.UNCERTAIN)
 _CHOSEN, _BEST, _LINEAR = COLOURS[0], COLOURS[1], "#0f172a"
 
@@ -36,7 +36,7 @@ _CHOSEN, _BEST, _LINEAR = COLOURS[0], COLOURS[1], "#0f172a"
 class Best:
     """The best design of a sweep: the one whose highest amplitude is the lowest, however its runs begin.
 
-    places    a place on every axis: of the frequency and of the starts those of its highest amplitude
+    places    an index on every axis: on the frequency and the starts, of its highest amplitude
     amplitude highest mean of the periods' peaks, m
     relative  over the maximum without bodies; nan where there is none
     designs   number of designs, and how many of them are left out: with points that are not ok
@@ -51,7 +51,7 @@ class Best:
 
 
 def abscissas(sweep: Sweep) -> list[str]:
-    """Return the axes along which curves are drawn: those of several numbers, the frequency or speed first."""
+    """Return the axes along which curves are drawn: axes of several numbers, the frequency or speed first."""
     swept = resonance_axis(sweep.scene, sweep.axes)[0]
     several = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) > 1]
     return sorted(several, key=lambda path: (path != swept, is_start(path))) or list(sweep.axes)[:1]
@@ -69,7 +69,7 @@ def best_design(sweep: Sweep) -> Best | None:
         return None
     peak = np.where(ok, sweep.amplitude_mean_dynamic, 0.0).max(axis=over)
     relative = peak / _undamped_maximum(sweep, swept, over)
-    # designs that share their maximum without bodies rank by either figure
+    # designs with one maximum without bodies rank alike by either measure
     figure = relative if np.isfinite(relative[complete]).all() else peak
     chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
     places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
@@ -218,7 +218,7 @@ def _add_best(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[str, 
 
 
 def start_places(sweep: Sweep) -> dict[str, int]:
-    """Return the places with which to begin: those of the best design, or the first on every axis."""
+    """Return the initial indices: of the best design, or the first on every axis."""
     best = best_design(sweep)
     return dict.fromkeys(sweep.axes, 0) if best is None else dict(best.places)
 

@@ -27,7 +27,7 @@ from vanedamp.studies.report.charts import GRAPH, axis_title
 from vanedamp.studies.report.forced_response import quantity
 from vanedamp.studies.report.results import collect, short_names
 
-#: values of an axis whose slider has them all beside it
+#: values of an axis whose slider has them all next to it
 _MOST_MARKS = 8
 
 
@@ -162,7 +162,7 @@ def _at(sweep: Sweep, path: str, place: int) -> int:
 
 
 def _remarks(sweep: Sweep) -> list[str]:
-    """Return what is to be read before figures are used."""
+    """Return the warnings to be read before results are used."""
     remarks = [f"Warning: {warning}." for warning in sweep.provenance.get("warnings", ())]
     if sweep.scene.continuation.direction != "independent":
         remarks.append("Runs of this sweep begin where their neighbours end; a motion at a point begins as the scene.")

@@ -35,10 +35,10 @@ class Format(Protocol):
 
 
 def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str], **options: Any) -> tuple[str, ...]:
-    """Write a result, or that of a file, to a file of another program, whose ending names the format.
+    """Write a result, or a file's result, to a file of another program, whose ending names the format.
 
-    options: those of the format, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings: what the
-    file does not hold. Raises InputError for an ending that is none, a format that cannot hold this kind of result, or
+    options: the format's, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings: what the
+    file does not hold. Raises InputError for an unknown ending, a format that cannot hold this kind of result, or
     an option that is not for it, StoreError for a file that cannot be read or written.
     """
     chosen = format_of(path)

@@ -38,7 +38,7 @@ class Optimum:
 
     @property
     def reduction(self) -> float:
-        """Share of the amplitude without bodies that is taken away, as designed."""
+        """Relative reduction of the amplitude without bodies, as designed."""
         return 1.0 - self.amplitude
 
     @property
@@ -62,10 +62,10 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Optimisation:
-    """Result of an optimisation. Amplitudes are those in the band (worst or mean, as the study says) over `reference`.
+    """Result of an optimisation. Amplitudes refer to the band (worst or mean, as the study says), over `reference`.
 
     study              the [optimise] table and the scene, as plain data
-    mass, amplitude    kg of the structure and m of X: what mass ratio and gap ratio refer to
+    mass, amplitude    kg of the structure and m of X: references of mass ratio and gap ratio
     reference          m, amplitude without bodies in the band: its maximum, at the points or between them, or its mean
     resonance_frequency  Hz of the resonance that X and mass are of
     nominal, robust    the best design as it is, and the best within the tolerances
@@ -75,7 +75,7 @@ class Optimisation:
     frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
                        where a run is not ok
     headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
-    scenes, trouble    how many runs it took, and how many of them have another status than ok
+    scenes, trouble    number of runs, and of those with another status than ok
     wall_time_s        s
     sentence           the answer in words
     """

@@ -2,7 +2,7 @@
 
 Both searches are scipy's differential evolution (Storn and Price, 1997), which evaluates a whole generation at a time,
 on all workers. The second starts from the best designs of the first, and judges each by the same sample of the
-tolerances (a Latin hypercube and the design itself), so that designs differ by what they are, not by their luck.
+tolerances (a Latin hypercube and the design itself), so that designs differ by their own values, not by chance.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ _KEYS = (
 
 
 def _of_band(headline: Headline) -> dict[str, Any]:
-    """Return the figures of a headline that are about the measure in the band."""
+    """Return the results of a headline on the measure in the band."""
     data: dict[str, Any] = finite(headline.to_json())
     return {key: data[key] for key in _KEYS}
 

@@ -30,7 +30,7 @@ from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive,
 _MOST_FREQUENCIES = 10_000
 #: longest transient that is proposed, in periods
 _MOST_PERIODS = 10_000_000
-#: what the points of a band are, and their unit
+#: quantity of the points of a band, and its unit
 _UNITS = {"band": ("frequencies", "Hz"), "speeds": ("speeds", "rad/s"), "rpm": ("speeds", "rpm")}
 
 
@@ -172,7 +172,7 @@ class Optimise:
 
 
 class Design(NamedTuple):
-    """Mass of all bodies over that of the structure, free travel over X, number of bodies."""
+    """Mass of all bodies over the structure's, free travel over X, number of bodies."""
 
     mass_ratio: float
     gap_ratio: float
@@ -255,7 +255,7 @@ class Study(NamedTuple):
         return study
 
     def _check_corners(self) -> None:
-        """Raise InputError where the tolerances lead to what is no scene."""
+        """Raise InputError if the tolerances lead to an invalid scene."""
         variables, widths = self.table.variables, asdict(self.table.tolerances)
         design = Design(variables.mass_ratio[1], variables.gap_ratio[0], variables.bodies[1])
         for side in (-1.0, 1.0):
@@ -276,14 +276,14 @@ class Study(NamedTuple):
         return replace(self.scene, damper=bodies)
 
     def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
-        """Return the amplitudes (f,), m, without bodies, and with those of a design fixed, and their peaks by PEAKS."""
+        """Return the amplitudes (f,), m, without bodies, and with a design's bodies fixed, and their peaks by PEAKS."""
         point = self.point(design, deviation, float(self.frequencies[0]))
         scene = Points(self.with_bodies(design.bodies)).scene(point)
         peaks = tops(*linear_peaks(scene, *_ends(scene, self.frequencies)))
         return *linear_amplitudes(scene, self.frequencies), peaks
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
-        """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""
+        """Return the changes in the scene by a design, off by a deviation of the tolerances."""
         scene, first = self.scene, self.scene.damper[0]
         gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
         level = scene.excitation.resonance_amplitude or scene.excitation.level

@@ -1,1 +1,1 @@
-"""One command from a case to a report: tables (the file), stages (what it does), record (what was done), pipeline."""
+"""One command from a case to a report: tables (the file), stages (the work), record (the work done), pipeline."""

@@ -25,9 +25,9 @@ from vanedamp.studies.workers import workers as worker_processes
 class StageResult:
     """What became of a stage.
 
-    status   "kept": nothing has changed, "done"; of a dry run "runs", or "perhaps": if what it takes changes
+    status   "kept": nothing has changed, "done"; of a dry run "runs", or "perhaps": if its inputs change
     reasons  why it is not kept
-    found    what it found, in a line
+    found    its result, in one line
     outputs  its files
     """
 
@@ -66,13 +66,13 @@ def pipeline(
 ) -> PipelineResult:
     """Run the stages of a pipeline file whose inputs have changed since their results were made.
 
-    Inputs are what the stage reads: tables of the case and the scene, files that they name, results of earlier stages,
-    options, and the versions of the software; a comment is none. What was done is kept in PIPELINE.record.json beside
-    the results, so that a run that was killed goes on, sweeps at their last points.
+    Inputs of a stage are tables of the case and the scene, files that they name, results of earlier stages,
+    options, and the versions of the software; comments do not count. Finished work is kept in PIPELINE.record.json with
+    the results, so that a killed run resumes, sweeps at their last points.
 
     folder: of the results, by default the one that the file names; workers: processes of sweeps, by default one for
     every core; dry_run: only say what would run; note: takes a line as stages begin and end; check_scene: takes every
-    scene that will run, and whether its peak runs with samples, to refuse it. Raises InputError, with the stage's
+    scene that will run, and whether its peak runs with samples, to reject it. Raises InputError, with the stage's
     file: nothing has run then if the file, the case or a scene is bad.
     """
     started = time.perf_counter()
@@ -100,7 +100,7 @@ def pipeline(
 
 
 def adopt(path: str | Path) -> None:
-    """Note that results in the folder of a pipeline file are those of its inputs as they are: made by other means."""
+    """Note that results in the folder of a pipeline file match its inputs as they are: made by other means."""
     table, source = PipelineFile.load(path), Path(path)
     folder = source.parent / table.folder
     record = Record(folder / f"{source.stem}.record.json")
@@ -110,7 +110,7 @@ def adopt(path: str | Path) -> None:
 
 
 def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callable[[], Executor | None]) -> StageResult:
-    """Run a stage unless its results are those of its inputs."""
+    """Run a stage unless its results match its inputs."""
     outputs, inputs = tuple(map(_shown, stage.outputs)), stage.inputs()
     reasons = tuple(record.reasons(stage.name, inputs, stage.outputs))
     if not reasons:
@@ -167,7 +167,7 @@ def _check(
 
 
 def _keep_edited(listed: Sequence[Stage], record: Record) -> None:
-    """Refuse to write in place of a case or a scene that somebody has edited; other results are made again."""
+    """Reject overwriting a case or a scene that somebody has edited; other results are made again."""
     for stage in listed:
         for path in record.edited(stage.name, [path for path in stage.outputs if path.suffix == ".toml"]):
             raise InputError(

@@ -43,7 +43,7 @@ class Record:
             ) from None
 
     def reasons(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> list[str]:
-        """Return why a stage must run; nothing where its results are those of these inputs."""
+        """Return why a stage must run; nothing if its results match these inputs."""
         done = self._done.get(name)
         if done is None:
             return ["not done so far"]

@@ -48,7 +48,7 @@ _DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
 
 @dataclass(frozen=True)
 class Tools:
-    """What a stage works with.
+    """The inputs of a stage's work.
 
     note: takes a line for the user, to which it adds the stage's name; pool: returns the worker processes, started when
     first asked for; fresh: what an earlier start left is of other inputs.
@@ -92,7 +92,7 @@ class Stage(ABC):
 
     @abstractmethod
     def work(self, tools: Tools) -> str:
-        """Do it, and return what was found in a line. Raises VanedampError."""
+        """Do it, and return the result in one line. Raises VanedampError."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class CaseStage(Stage):
         return Case.load(self.file)
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's tables without those of other stages, and the files that it names."""
+        """Return the case's tables without other stages', and the files that it names."""
         if not self.file.exists():
             return {}
         tables, case = read_toml(self.file), Case.load(self.file)
@@ -175,7 +175,7 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return those of the case, and the options."""
+        """Return the case's inputs, and the options."""
         return super().inputs() | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
@@ -210,7 +210,7 @@ class Sweep(Stage):
         return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
 
     def inputs(self) -> dict[str, Any]:
-        """Return the scene, what the pipeline gives it, and the files that it names."""
+        """Return the scene, its changes by the pipeline, and the files that it names."""
         if not self.file.exists():
             return {}
         scene, (rigid, amplitude) = self._scene(), self._model()
@@ -367,7 +367,7 @@ def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path
         takes.append(products["reduced"])
     elif table.structure is None and "reduced" in products and scene.is_file():
         # a scene may name the pipeline's own model
-        with suppress(InputError, AttributeError):  # the stage's check tells what is wrong
+        with suppress(InputError, AttributeError):  # the stage's check reports the error
             named = read_toml(scene).get("structure", {}).get("file")
             if isinstance(named, str) and (scene.parent / named).resolve() == products["reduced"]:
                 takes.append(products["reduced"])
@@ -381,7 +381,7 @@ def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
 
 
 def _software(*packages: str) -> dict[str, Any]:
-    """Return the versions of what the numbers of a stage depend on."""
+    """Return the versions of the software that the numbers of a stage depend on."""
     found = versions()
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):

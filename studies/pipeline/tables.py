@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Real, Whole, read_toml, validate
 from vanedamp.rom.basis import basis_named
 
-#: what the stages write into the folder of the results, with a file for every sweep
+#: outputs of the stages in the folder of the results, with a file for every sweep
 CALIBRATION, TUNED_CASE, RIGID_SCENE = "calibration.h5", "tuned.toml", "rigid.toml"
 MODES, REDUCED = "modes.h5", "rom.h5"
 

@@ -1,4 +1,4 @@
-"""Charts of a page: a figure, its data as a table, and the files that they come from."""
+"""Charts of a page: a figure, its data as a table, and its source files."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def chart(
 
 
 def dressed(figure: go.Figure, height: int) -> go.Figure:
-    """Return the looks that all charts of a page share."""
+    """Return the common style of all charts of a page."""
     figure.update_xaxes(**AXIS)
     figure.update_yaxes(**AXIS)
     figure.update_layout(

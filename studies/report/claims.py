@@ -1,4 +1,4 @@
-"""The claims of a study: a file of its own beside the results that they rest on."""
+"""The claims of a study: a file of its own next to the results that they rest on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ CLAIMS = ".claims.json"
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the paper, our figures, and a verdict: "shown", "partly" or "not shown"."""
+    """A statement of the paper, our results, and a verdict: "shown", "partly" or "not shown"."""
 
     claim: str
     ours: str
@@ -21,7 +21,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Study:
-    """A study of several results; sources: names of their files, beside its own."""
+    """A study of several results; sources: names of their files, in its own folder."""
 
     study: str
     title: str

@@ -20,7 +20,7 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.studies.headline import Headline, format_value, headline, reference_of
 
-#: share by which a linear amplitude that is computed again may differ from the one that the sweep has kept
+#: relative difference allowed between a linear amplitude computed again and the sweep's
 _SAME = 1e-6
 #: no further frequencies
 _NOWHERE = np.zeros(0)
@@ -40,14 +40,14 @@ class LinearCurves(NamedTuple):
 class ForcedResponse:
     """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
 
-    reference          what amplitudes are divided by in charts: the maximum without bodies over the range
+    reference          divisor of amplitudes in charts: the maximum without bodies over the range
     undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks, from the static
                        deflection under the bodies' loads, which linear amplitudes leave out, too
     energy_share       (n, 4) of viscous, friction, impact and contact loss
     in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
                        bodies in the plane
-    headline           figures and sentence of the curve
+    headline           results and sentence of the curve
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
     source             the file it comes from
@@ -83,7 +83,7 @@ class ForcedResponse:
         return f"{self.name}: {sentence}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return the headline as plain data: name and range of the curve, its figures and the sentence."""
+        """Return the headline as plain data: name and range of the curve, its results and the sentence."""
         ends = [value.item() if isinstance(value, np.generic) else value for value in (self.x[0], self.x[-1])]
         curve = {"name": self.name, "axis": self.axis, "range": ends}
         return curve | self.headline.to_json() | {"sentence": self.sentence}
@@ -131,8 +131,8 @@ def response_along(
 ) -> ForcedResponse:
     """Return the forced response along an axis of a sweep, at settings of the others by their paths.
 
-    point: what is taken of each axis, in the axes' order: of `axis` the places in the order of the curve, of the others
-    one place.
+    point: indices on each axis, in the axes' order: on `axis` in the order of the curve, on the others
+    one index.
     """
     ok = sweep.status[point] == "ok"
     damped = {
@@ -167,9 +167,9 @@ def response_along(
 
 
 def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
-    """Return the linear curves of a response so fine that they hide no peak; those at its points where that cannot be.
+    """Return the linear curves of a response so fine that they hide no peak; at its points only where that cannot be.
 
-    They are computed from the sweep's scene, and taken if they are what the sweep has kept at its points: a reduced
+    They are computed from the sweep's scene, and taken if they agree with the sweep's at its points: a reduced
     model may lie elsewhere by now, or be another one.
     """
     kept = response.linear
@@ -203,9 +203,9 @@ def linear_between(scene: Scene, low: float, high: float, further: np.ndarray = 
 
 
 def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
-    """Return the tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS.
+    """Return the peaks of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS.
 
-    Places and widths are those on the axis of the sweep, in its unit.
+    Positions and widths refer to the axis of the sweep, in its unit.
     """
     swept, hertz = resonance_axis(sweep.scene, sweep.axes)
     if not sweep.peaks or swept is None:
@@ -236,7 +236,7 @@ def setting(path: str, value: Any, units: str) -> str:
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:
     """Return ascending frequencies (num,) from start to stop, half of them evenly and half around the peaks.
 
-    peaks: frequencies, each of which is a point of the grid; width: of a peak, as a share of its frequency.
+    peaks: frequencies, each of which is a point of the grid; width: of a peak, relative to its frequency.
     """
     fine = np.linspace(start, stop, 4001)
     bells = sum(1 / (1 + ((fine - peak) / (width * peak)) ** 2) for peak in peaks)

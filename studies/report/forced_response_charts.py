@@ -34,7 +34,7 @@ def responses_figure(
     """Draw linear and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
 
     linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
-    first; the others wait for `curves.js`, and the table beside the chart is its legend. Default: all, with a legend.
+    first; the others wait for `curves.js`, and the table next to the chart is its legend. Default: all, with a legend.
     """
     figure = go.Figure()
     colours = cycle(len(responses))
@@ -69,11 +69,11 @@ def _add_amplitude(
 def _distinct(
     responses: Sequence[ForcedResponse], linear: Sequence[LinearCurves], curve: str
 ) -> list[tuple[list[str], ForcedResponse, LinearCurves]]:
-    """Return the linear curves that differ: names of the responses that share one, the first of them, and the curve."""
+    """Return the linear curves that differ: names of responses with a common curve, their first, and the curve."""
     found: list[tuple[list[str], ForcedResponse, LinearCurves]] = []
     for response, curves in zip(responses, linear, strict=True):
         for owners, first, other in found:
-            # sweeps of gaps, friction ... share their linear curves
+            # sweeps of gaps, friction ... have common linear curves
             if response.reference == first.reference and all(
                 np.array_equal(one, two)
                 for one, two in ((curves.x, other.x), (getattr(curves, curve), getattr(other, curve)))

@@ -62,7 +62,7 @@ def map_panels(sweep: Sweep) -> list[Panel]:
     return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep))
 
 
-#: name, values of the axes across and up, and those of the map (up, across)
+#: name, values of the horizontal and vertical axes, and of the map (vertical, horizontal)
 Panel = tuple[str, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -172,7 +172,7 @@ def _names(states: Sequence[SteadyState]) -> list[str]:
 
 
 def _motions(states: SteadyStates) -> list[str]:
-    """Return the name of runs that are not ok, then those of all motions, that in which most runs end first."""
+    """Return the name of runs that are not ok, then of all motions, by falling number of runs."""
     runs: Counter[str] = Counter()
     for found in states.states.flat:
         runs.update(dict(zip(_names(found), (state.runs for state in found), strict=True)))
@@ -193,7 +193,7 @@ def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
 
 
 def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:
-    """Yield values of the parameters, number of the state from 1, and the state's figures."""
+    """Yield values of the parameters, number of the state from 1, and the state's results."""
     axes = [sweep.axes[path].tolist() for path in states.parameters]
     for place, found in np.ndenumerate(states.states):
         at = [values[index] for values, index in zip(axes, place, strict=True)]

@@ -25,7 +25,7 @@ from vanedamp.studies.report.charts import COLOURS
 
 #: periods that are drawn, the last of a run; frames of each at most
 _PERIODS, _MOST_FRAMES = 3, 200
-#: share of a period for which a contact shows that it was hit
+#: fraction of a period for which a contact shows that it was hit
 _FLASH = 0.03
 #: free travels as drawn, over the bodies' length and height, and the cavity's own motion over their length
 _ALONG, _ACROSS, _SWING = 0.35, 0.6, 0.25
@@ -42,7 +42,7 @@ class BodyMotion:
     """A body as drawn in n frames, in units of the drawing, y upwards.
 
     form: as which it ran
-    outline: (n, k, 2) corners, of a slider those of a rectangle; (n, 2, 2) centre and a point of the rim
+    outline: (n, k, 2) corners, of a slider as a rectangle; (n, 2, 2) centre and a point of the rim
     face: heights at which it touches a neighbour
     along, lift (m), tilt (rad): (n,) in the cavity, as sampled; nan of a slider
     """
@@ -100,8 +100,8 @@ class CavityMotion:
 class Motion:
     """Frames of the last periods of a run.
 
-    time: (n,) periods; each: frames a period; displacement: (n,) m, of the response; factor: by which free travels are
-    exaggerated beside the bodies; swing: the same for the motion of the cavities; scale: units of the drawing a metre
+    time: (n,) periods; each: frames per period; displacement: (n,) m, of the response; factor: by which free travels
+    are exaggerated; swing: the same for the motion of the cavities; scale: units of the drawing per metre
     """
 
     time: np.ndarray
@@ -135,7 +135,7 @@ class Motion:
         return int(np.argmax(light == light.max()))
 
     def to_json(self) -> str:
-        """Return what the player of the page (motion.js) needs, y downwards."""
+        """Return the data for the player of the page (motion.js), y downwards."""
         data = {
             "time": _short(self.time, 4), "each": self.each, "first": self.first,
             "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(each) for each in self.cavities],
@@ -190,7 +190,7 @@ def motion_of(
 
 @dataclass(frozen=True, eq=False)
 class _Drawing:
-    """What all cavities of a drawing share."""
+    """Common data of all cavities of a drawing."""
 
     scene: Scene
     plane: PlanarSamples
@@ -264,7 +264,7 @@ class _Drawing:
     def _moved(self, k: int, side: str, play: float, *ends: float) -> np.ndarray:
         """Return by how much a surface has moved towards its outside, relative to the floor: (n, 2) at two ends.
 
-        That is its gap less what the body's pose leaves of the play, at the contacts, and on the line through two.
+        That is its gap less the play left by the body's pose, at the contacts, and on the line through two.
         ends: from the body's centre, across it for walls, along it for a ceiling.
         """
         along, lift, tilt = self._pose(k)

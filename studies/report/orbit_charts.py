@@ -40,7 +40,7 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
 
 
 def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> None:
-    """Draw the phase plane of the structure into a column of a row, and that of the bodies into the next."""
+    """Draw the phase plane of the structure into a column of a row, and the bodies' into the next."""
     states = (history.displacement, history.velocity, history.slip, history.slip_velocity)
     for column, curve in _curves(states):
         figure.add_scatter(

@@ -105,7 +105,7 @@ def _html(results: Results) -> str:
 
 
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
-    """Return what all templates share: filters, and the macro `plot` of a chart."""
+    """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     shared.filters["body_note"] = body_note_of_run
@@ -119,7 +119,7 @@ def _anchor(name: str) -> str:
 
 
 def _provenance(results: Results) -> dict[str, dict[str, str]]:
-    """Return what is known of every file, by its path; of the page itself under ""."""
+    """Return the known facts of every file, by its path; of the page itself under ""."""
     return {"": versions()} | {
         file: _flat(result.provenance) | {"sha256": digest(file)}
         for file, result in results.by_file.items()
@@ -163,5 +163,5 @@ def body_note(notes: Mapping[str, Any], sliders: bool) -> str | None:
 
 
 def body_note_of_run(measures: Mapping[str, Any]) -> str | None:
-    """Return the sentence on the bodies of a run with these figures."""
+    """Return the sentence on the bodies of a run with these results."""
     return body_note(measures, "attached_mass_fraction" in measures and "tilt_max" not in measures)

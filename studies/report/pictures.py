@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes
     from vanedamp.studies.report.forced_response import ForcedResponse
 
-#: names of VTK's cells: linear ones, and those of any order, as dolfinx has them
+#: names of VTK's cells: linear ones, and of any order, as dolfinx has them
 _CELLS = {10: "tetra", 12: "hexahedron", 71: "VTK_LAGRANGE_TETRAHEDRON", 72: "VTK_LAGRANGE_HEXAHEDRON"}
 #: part of the light that comes from all sides
 _AMBIENT = 0.55

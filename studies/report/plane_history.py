@@ -12,7 +12,7 @@ from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 
-#: sides of events as a chart names them, and the corners of each in the order against the clock
+#: sides of events as a chart names them, and the corners of each counterclockwise
 _SURFACES = {
     "floor": ("floor", {-1: "", 0: "left corner", 1: "right corner"}),
     "right": ("right wall", {-1: "", 1: "lower corner", 2: "upper corner"}),
@@ -21,7 +21,7 @@ _SURFACES = {
     "body": ("next body", {-1: ""}),
     "stop": ("stop", {-1: ""}),
 }
-#: share of its free travel within which a body touches
+#: fraction of its free travel within which a body touches
 _TOUCHES = 1e-9
 
 
@@ -29,7 +29,7 @@ _TOUCHES = 1e-9
 class ImpactsAtPlace:
     """The impacts of one contact in the evaluated periods.
 
-    body counts from 0 (of a stop: its number); four: whether its corners are those of a block; impulses (N s) are sums,
+    body counts from 0 (of a stop: its number); four: whether it has a block's corners; impulses (N s) are sums,
     of tangential ones of their sizes; loss: J, nan for files that have none.
     """
 
@@ -82,13 +82,13 @@ def _four(scene: Scene | None, body: int) -> bool:
 
 
 def _walk(side: str, corner: int) -> tuple[int, int]:
-    """Return the place of a contact in a walk against the clock through the cavity."""
+    """Return the position of a contact in a counterclockwise walk through the cavity."""
     corners = list(_SURFACES.get(side, ("", {}))[1])
     return [*_SURFACES, side].index(side), corners.index(corner) if corner in corners else len(corners) + corner
 
 
 def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
-    """Return the places of impacts, in the order of a walk against the clock through the cavity."""
+    """Return the places of impacts, in the order of a counterclockwise walk through the cavity."""
     return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
 
 

@@ -1,4 +1,4 @@
-"""The figure of a result, for notebooks: the chart of the report that shows most of it."""
+"""The figure of a result, for notebooks: the most complete chart of the report."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from vanedamp.studies.report.time_history import History, history_figure
 
 #: curves of a sweep that one figure can show, of more the best
 _MOST_CURVES = 8
-#: figures of records that one chart shows in full
+#: charts of records that one figure shows in full
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
     Branches: branches_figure, Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure
 }  # fmt: skip

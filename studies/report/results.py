@@ -22,10 +22,10 @@ SECTIONS = ExtensionPoint(
 class Result:
     """The result in a file.
 
-    record      what its section shows
+    record      content of its section
     provenance  how it was made, as nested data; None if the page has no table of that
     scene       what was run, as nested data, for the page's comparison of scenes
-    parts       names of files beside its own whose results stand within its section
+    parts       names of files in its folder whose results stand within its section
     """
 
     record: Any
@@ -49,7 +49,7 @@ class Section(Protocol):
         """Read a file of the kind. Raises StoreError or InputError."""
 
     def section(self, results: Mapping[str, Result], page: Any) -> Any:
-        """Return what the template shows of results by the path of their file; page: a studies.report.page.Page."""
+        """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def short_names(paths: Iterable[str]) -> dict[str, str]:
 def collect(paths: Sequence[str | Path]) -> Results:
     """Read the results in files, and in all files of folders that may hold any (others there are passed over).
 
-    Raises InputError for a file that is none, and when there is nothing to report.
+    Raises InputError for any other file, and when there is nothing to report.
     """
     known = sections()
     results = Results({kind: {} for kind in known})

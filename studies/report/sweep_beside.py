@@ -1,4 +1,4 @@
-"""Points of a sweep that belong beside branches: runs of the same scene at values of the branches' parameter."""
+"""Points of a sweep that belong next to branches: runs of the same scene at values of the branches' parameter."""
 
 from __future__ import annotations
 

@@ -27,14 +27,14 @@ _SHOWN_PERIODS = 25
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Samples of a run and the figures about it.
+    """Samples of a run and its results.
 
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
     bodies        (n, dampers) m, relative to their cavities
     plane         samples of bodies in the plane; None for sliders and for files without them
     hits          time (s) and place, as of an event, of the impacts
-    by_place      those of bodies in the plane in the evaluated periods, by contact
-    measures      plain figures and energies of the run, as `vanedamp run --json` has them
+    by_place      impacts of planar bodies in the evaluated periods, by contact
+    measures      plain results and energies of the run, as `vanedamp run --json` has them
     scene         what was run; None if the file does not say
     """
 
@@ -116,12 +116,12 @@ class History:
         return ["time", "displacement", *(f"{kind}_{k + 1}" for kind in kinds for k in range(self.bodies.shape[1]))]
 
     def rows(self) -> Iterator[list[float]]:
-        """Yield time and displacement, and those of the bodies: along, in the plane lift and tilt as well."""
+        """Yield time and displacement, and the bodies': along, in the plane lift and tilt as well."""
         plane = [] if self.plane is None else [self.plane.body_lift, self.plane.body_tilt]
         yield from np.column_stack([self.time, self.displacement, self.bodies, *plane]).tolist()
 
     def motion(self) -> Motion | None:
-        """Return what the player of the page shows; None without samples in the plane."""
+        """Return the data for the player of the page; None without samples in the plane."""
         if self.plane is None or self.scene is None:
             return None
         return motion_of(self.scene, self.time, self.displacement, self.bodies, self.plane, self.hits)
@@ -184,7 +184,7 @@ def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
     if history.scene is not None:
         discs = np.array([damper.form.rolls for damper in history.scene.damper])
-        if np.isfinite(tilt[:, ~discs]).any():  # beside the turns of discs, tilts would not show
+        if np.isfinite(tilt[:, ~discs]).any():  # next to the turns of discs, tilts would not show
             tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
 

@@ -2,7 +2,7 @@
 
 Real modes come from the factors of mass and stiffness, never from these matrices: in a sum with a body of 1e12 times
 its mass nothing is left of the structure. Complex modes are computed in the coordinates of the real ones, ordered from
-quick to slow and measured by their energy, where a slow mode's small numbers stand among those of its like (Demmel et
+quick to slow and measured by their energy, where a slow mode's small numbers stand among similar ones (Demmel et
 al., Linear Algebra Appl. 299, 1999, on factors; Tisseur and Meerbergen, SIAM Review 43, 2001, on quadratic eigenvalue
 problems).
 """
@@ -62,7 +62,7 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
     project = np.where(_reach(r.T) < _reach(elastic.T) / frequency, r.T @ v, (elastic.T @ strain) / frequency).T
     size, lossy = np.abs(strain), np.abs(loss)
     damping, noise = strain.T @ loss @ strain, size.T @ lossy @ size
-    # strains are known to round-off of a mode's whole strain: by that alone, equal modes would be coupled and mixed
+    # strains are known to round-off of a mode's whole strain: by that only, equal modes would be coupled and mixed
     whole = lossy.sum(axis=0) @ size
     noise = np.where(np.eye(len(whole), dtype=bool), noise, np.maximum(noise, np.maximum(whole, whole[:, None])))
     # sums of as many terms, and rotations of as many columns
@@ -73,7 +73,7 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
 def _inverse(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (r, r^-1, factor^-1) of factor (k, q) = orthonormal times r; r need not be triangular.
 
-    Rows in the order of their sizes and columns in that of their remainders: rows may differ by any factor.
+    Rows in the order of their sizes and columns by their remainders: rows may differ by any factor.
     """
     order = np.argsort(-np.abs(factor).max(axis=1), kind="stable")
     q, r, pivot = qr(factor[order], mode="economic", pivoting=True)

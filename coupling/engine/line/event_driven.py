@@ -53,7 +53,7 @@ def is_common(system: LineSystem, modes: int) -> bool:
 
 
 class EngineRun(EventDrivenRun):
-    """A run of sliders. system: rows of the whole; known: subsystems that it has met, and those of `reuse`."""
+    """A run of sliders. system: its rows; known: subsystems met so far, including those from `reuse`."""
 
     rows_of: ClassVar = staticmethod(rows_of_line)
 
@@ -107,7 +107,7 @@ class EngineRun(EventDrivenRun):
         self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
 
     def _segment(self) -> Segment:
-        # roots of other segments are none of this
+        # roots of other segments do not apply
         self.event_functions.status[int(self.counters[CARRIED]) :] = BOUNDED
         system, line, rows, flows, st = self.whole, self.system, self._rows, self.flows, self.state
         s, active = int(st.counters[FLOW]), slice(int(st.counters[ACTIVE]))

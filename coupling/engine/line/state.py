@@ -29,7 +29,7 @@ class State(NamedTuple):
     # modal amplitudes, the first e the phases of the excitation's harmonics; the first counters[ACTIVE] are active, the
     # others zero
     amplitude: Annotated[np.ndarray, "m", complex]
-    # real and imaginary parts of their changes since the spell began (line.energy_balance)
+    # real and imaginary parts of their changes since the interval began (line.energy_balance)
     change: Annotated[np.ndarray, "2m"]
     displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation
     low_word: Annotated[np.ndarray, "r"]  # of slips, sums of two doubles: the part beyond `displacement`, m
@@ -44,7 +44,7 @@ class State(NamedTuple):
     # changes with the contact states, or is set with their event functions
     state: np.ndarray  # (r,) int: state of each row
     active_set: Annotated[np.ndarray, "r", bool]  # the counters[CLOSED_ROWS] closed rows, which name the subsystem
-    # bound at which a row's force was when it let go at this instant, otherwise 0; -bound: a spring that starts to
+    # bound at which a row's force was when it released at this instant, otherwise 0; -bound: a spring that starts to
     # carry load at that bound
     released: Annotated[np.ndarray, "r", int]
     applied_force: Annotated[np.ndarray, "r"]  # constant force of rows that are not closed, N
@@ -53,7 +53,7 @@ class State(NamedTuple):
     # set when a subsystem begins
     coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
     constant: Annotated[np.ndarray, "n"]  # constant part of p
-    offset: Annotated[np.ndarray, "1"]  # that of the response, m
+    offset: Annotated[np.ndarray, "1"]  # of the response, m
     slip_constant: Annotated[np.ndarray, "b"]  # constant part of the displacements of bodies on springs, m
     constant_force: Annotated[np.ndarray, "r"]  # constant part of a closed row's force, N
     free_acceleration: Annotated[np.ndarray, "r"]  # constant acceleration of each row by its free bodies, m/s^2
@@ -77,7 +77,7 @@ class EventFunctions(NamedTuple):
     k0: Annotated[np.ndarray, "k 2"]  # constant of each side
     k1: Annotated[np.ndarray, "k"]  # slope of its polynomial
     k2: Annotated[np.ndarray, "k"]  # second derivative of its polynomial
-    noise: Annotated[np.ndarray, "k"]  # round-off of its value at the start, apart from that of k0
+    noise: Annotated[np.ndarray, "k"]  # round-off of its value at the start, apart from k0's
     g: Annotated[np.ndarray, "k m", complex]  # amplitudes of its exponentials
     drive: Annotated[np.ndarray, "k m", complex]  # rates of growth of the driven modes
 
@@ -98,7 +98,7 @@ class Scratch(NamedTuple):
     bend: Annotated[np.ndarray, "m", complex]  # the same less its tangent, for displacements
 
     # a segment: energy balance and peak
-    total: Annotated[np.ndarray, "2m"]  # sums of the amplitudes at both ends of a spell
+    total: Annotated[np.ndarray, "2m"]  # sums of the amplitudes at both ends of an interval
     wave: Annotated[np.ndarray, "m", complex]  # part of each active mode in the response
     ahead: Annotated[np.ndarray, "m", complex]  # that at the next point of a grid
     step_factor: Annotated[np.ndarray, "m", complex]  # exp(rate t) for one step of a grid
@@ -127,12 +127,12 @@ class Scratch(NamedTuple):
     decision: Annotated[np.ndarray, "r", int]  # state of each listed row in the complementarity problem
     bound: Annotated[np.ndarray, "r", int]  # bound at which its force is, 0 between both; a mark of contacts in impacts
     reaction: Annotated[np.ndarray, "r"]  # force of each listed row, N; in impacts its impulse, N s
-    members: Annotated[np.ndarray, "r", int]  # places in the list of the rows in the second problem, that of the rates
+    members: Annotated[np.ndarray, "r", int]  # indices in the list of the rows in the second problem, for the rates
     problem: Problem
 
 
 def new_state(system: LineSystem, modes: int, start: RestartState) -> State:
-    """Return the state at time zero; `modes` is the room for complex modes."""
+    """Return the state at time zero; `modes` is the number of complex modes that fit."""
     p, rate = (structure / system.scale for structure in (start.displacement, start.velocity))
     displacement, velocity = row_motion(system, start.slip, start.slip_velocity, p, rate, start.elongation)
     friction = np.arange(len(displacement)) < system.friction_rows
@@ -146,7 +146,7 @@ def new_state(system: LineSystem, modes: int, start: RestartState) -> State:
 
 
 def new_event_functions(system: LineSystem, modes: int) -> EventFunctions:
-    """Return room for two event functions per row."""
+    """Return storage for two event functions per row."""
     return room(EventFunctions, _sizes(system, modes), expansion=new_expansion(modes))
 
 

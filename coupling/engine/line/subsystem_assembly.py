@@ -47,7 +47,7 @@ class Flows(NamedTuple):
 
     # the subsystem
     active_set: Annotated[np.ndarray, "s r", bool]  # which rows are closed
-    modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: a free place
+    modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: a free index
     eigenvalue: Annotated[np.ndarray, "s m", complex]  # of the modes, 1/s
     sprung: Annotated[np.ndarray, "s", bool]  # whether springs are closed
     attached: Annotated[np.ndarray, "s b", bool]  # whether rigid rows hold a body to the structure
@@ -82,7 +82,7 @@ class Flows(NamedTuple):
     acceleration: Annotated[np.ndarray, "s m"]  # largest of its terms, whether closed rows hold them or not
     grid_factor: Annotated[np.ndarray, "s grids m", complex]  # of its amplitude over a step of each grid (line.peaks)
 
-    # Antiderivatives of the terms of the ledger, as forms of c: an integral over a segment is the form at its end minus
+    # Antiderivatives of the energies' terms, as forms of c: a segment's integral is the form at its end minus
     # the form at its start. Where the rate by which a product of two modes changes vanishes relative to the frequency,
     # the form would cancel: such pairs are left out of the forms, and listed.
     linear: Annotated[np.ndarray, "s m maps"]  # linear maps, by the columns of numerics.codes
@@ -103,7 +103,7 @@ class Flows(NamedTuple):
 
 
 def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
-    """Return room for `capacity` subsystems, none of them filled (modes 0)."""
+    """Return storage for `capacity` subsystems, none of them filled (modes 0)."""
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = 2 * n + e + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
@@ -136,7 +136,7 @@ class Subsystem(NamedTuple):
 def add_flow(
     flows: Flows, system: LineSystem, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None
 ) -> Flows:
-    """Return the stack with the subsystem of the closed rows (r,) in its first free place.
+    """Return the stack with the subsystem of the closed rows (r,) at its first free index.
 
     known: subsystems of this system by their closed rows, or of one that differs by its frequency only, to which new
     ones are added. Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins
@@ -260,10 +260,10 @@ def _fill(flows: Flows, system: LineSystem, s: int, subsystem: Subsystem) -> Non
 def _check_split(
     system: LineSystem, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
 ) -> None:
-    """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
+    """Reject a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
     Each coordinate counts by its part in the rows, the response and the motion of carried bodies (felt (n,)), its rate
-    by its own frequency or that of the excitation.
+    by its own frequency or the excitation's.
     """
     n, b = system.modes, system.bodies
     size = np.r_[1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
@@ -272,14 +272,14 @@ def _check_split(
     size = np.r_[size, size * rate]
     grows = np.finfo(float).eps * size / size[:, None]
     parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
-    # the search for events knows no more of an amplitude than its modulus
+    # the search for events uses only the modulus of an amplitude
     whole = np.abs(shape) @ np.abs(project)
     if not (np.all(parts * grows <= LOST) and np.all(whole * grows <= FAR)):
         raise IllConditioned("its modes cancel")
 
 
 def _check_rest(system: LineSystem, felt: np.ndarray, static: np.ndarray) -> None:
-    """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
+    """Reject a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
     n, eps = system.modes, np.finfo(float).eps
     far = felt @ np.abs(static[:n, n:] @ system.of_bodies.weight)
     if not eps * far.max(initial=0.0) <= FAR * system.free_travel.min(initial=np.inf):
@@ -313,7 +313,7 @@ def _fill_forces(
 def _excite(
     system: LineSystem, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the
+    """Return the modes, driven ones first, in order of the harmonics that drive them; steady eta (k, e) under the
     harmonics of a load (k, e), without the part of driven modes; harmonic and growth (d,) of each driven mode.
     """
     eigenvalue, shape, project = modes
@@ -330,7 +330,7 @@ def _excite(
         push = project[:, k:] @ load[:, h]
         harmonic[:, h] = shape[:k] @ np.where(driven, 0, push / np.where(driven, 1, apart))
         driver[driven] = h
-        # a real load turns half with the harmonic, half against it, in step with the conjugate
+        # a real load turns half with the harmonic, half against it, with the conjugate
         growth[driven] = push[driven] / 2
     if np.all(driver == e):
         return modes, harmonic, driver[:0], growth[:0]
@@ -430,7 +430,7 @@ def _fill_energy(flows: Flows, system: LineSystem, s: int, full: np.ndarray, bod
 
 
 def _fill_kicks(flows: Flows, s: int) -> None:
-    """Set what a unit impulse on each row changes in the forms."""
+    """Set the changes in the forms by a unit impulse on each row."""
     m = flows.modes[s]
     change = flows.impulse_response[s, :, :m].view(float)
     for place, form in enumerate((flows.loss, flows.square, flows.dashpot)):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 # --- gaps and contacts, times the free travel
-#: gaps below this are computed anew from slips and structure, since they close soon
+#: gaps below this are recomputed from slips and structure, since they close soon
 CLOSING = 1e-6
 #: overlap beyond which round-off has lost a contact, and the run ends
 OVERLAP = 1e-9

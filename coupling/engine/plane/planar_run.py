@@ -59,7 +59,7 @@ class PlanarRun(EventDrivenRun):
         self.flows = add_flow(self.flows, self.system, self.state.state)
 
     def _segment(self) -> Segment:
-        self.watched.status[:] = BOUNDED  # roots of other segments are none of this
+        self.watched.status[:] = BOUNDED  # roots of other segments do not apply
         st, flows = self.state, self.flows
         s = int(st.counters[FLOW])
         modes = slice(int(flows.modes[s]))

@@ -29,20 +29,20 @@ class State(NamedTuple):
     # carry its force, or nothing presses it; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
     # contact without friction counts. A friction element sticks or slips
     state: np.ndarray
-    other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
+    other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` has them, too
     known: np.ndarray  # (u,) int: states as last logged
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
     pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
-    lost: np.ndarray  # (u,) what it has taken since then, J
+    lost: np.ndarray  # (u,) its loss since then, J
     ledger: np.ndarray  # (6,) J
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
     force: np.ndarray  # (2u,) constant part of the forces, N
-    # (2u,) self-stress of contacts that depend on each other, N: what their forces have beside the least ones
+    # (2u,) self-stress of contacts that depend on each other, N: excess of their forces over the least ones
     prestress: np.ndarray
 
 
@@ -82,20 +82,20 @@ class Scratch(NamedTuple):
     before: np.ndarray  # (u,) int: states before the event
     listed: np.ndarray  # (u,) int: units of a problem
     way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
-    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop; what it does in a short step
-    place: np.ndarray  # (u,) int: where its unknowns begin
+    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop; its motion in a short step
+    place: np.ndarray  # (u,) int: index of its first unknown
     verdict: np.ndarray  # (u,) int
     doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
     first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
     doubt: np.ndarray  # (u,) int: doubtful now
     sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
-    resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and what it does then
+    resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and its state then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     split: Lemke  # the problem with friction split in two (friction_problem._solve_split)
     part: np.ndarray  # (4u,) int: kind of each of its unknowns
     column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
-    attempt: np.ndarray  # (1,) int: how often a decision has been made anew
+    attempt: np.ndarray  # (1,) int: how often a decision has been repeated
     turn: np.ndarray  # (m,) complex
     # of integrals in closed form (exponential_integrals)
     moment: np.ndarray  # (3, m) complex: integrals of t^k exp(lambda t)
@@ -122,7 +122,7 @@ def new_state(system: System, modes: int, initial: Motion) -> State:
 
 
 def new_event_functions(system: System, modes: int) -> EventFunctions:
-    """Return room for three event functions a unit."""
+    """Return storage for three event functions per unit."""
     k = 3 * len(system.rest)
     return EventFunctions(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),

@@ -2,7 +2,7 @@
 
 The forces of closed contacts keep their gaps (and the slips of those that stick) at zero: they are linear in what
 presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
-the projection of the accelerations is oblique. Only what is stretched, xi = B q with B a basis of the rows of stiffness
+the projection of the accelerations is oblique. Only the stretches, xi = B q with B a basis of the rows of stiffness
 and damping, moves by a differential equation of its own, whose modes are complex and may grow; everything else follows
 by quadrature. A closed compliant contact is a spring and a dashpot whose force has the direction W_N - sigma mu W_T.
 Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
@@ -43,7 +43,7 @@ class Flows(NamedTuple):
     """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
 
     key: np.ndarray  # (s, u) int: the states
-    modes: np.ndarray  # (s,) int, 0: a free place
+    modes: np.ndarray  # (s,) int, 0: a free index
     eigenvalue: np.ndarray  # (s, m)
     project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
     offset: np.ndarray  # (s, m)
@@ -52,7 +52,7 @@ class Flows(NamedTuple):
     motion: np.ndarray  # (s, N, m): q of each mode
     rows: np.ndarray  # (s, 2u, m): J motion
     bend: np.ndarray  # (s, N): constant acceleration
-    bend_held: np.ndarray  # (s, N, N): and what displacements held by constraints add
+    bend_held: np.ndarray  # (s, N, N): and the addition by displacements held by constraints
     force: np.ndarray  # (s, 2u, m)
     force_constant: np.ndarray  # (s, 2u)
     force_held: np.ndarray  # (s, 2u, N)
@@ -68,7 +68,7 @@ class Flows(NamedTuple):
 
 
 def empty_flows(system: System, capacity: int = 8) -> Flows:
-    """Room for `capacity` flows."""
+    """Storage for `capacity` flows."""
     size, u, e = len(system.mass), len(system.rest), len(system.frequency)
     springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
     m = e + 2 * len(_stretched(system, springs))
@@ -85,7 +85,7 @@ def empty_flows(system: System, capacity: int = 8) -> Flows:
 
 
 def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
-    """The stack with the flow of the states (u,) in its first free place.
+    """The stack with the flow of the states (u,) at its first free index.
 
     Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
     """
@@ -101,7 +101,7 @@ def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
 
 
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
-    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and those of springs (s, N)."""
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and of springs (s, N)."""
     root = np.sqrt(system.mass)
     matrix = system.stiffness / root / root[:, None]
     size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
@@ -118,11 +118,11 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
 
 
 class _Contacts:
-    """What units do in their states (u,), in coordinates sqrt(M) q.
+    """The behaviour of units in their states (u,), in coordinates sqrt(M) q.
 
     closed, pressed: rigid and compliant contacts with forces; stick: units whose slips are kept at rest; slides:
     friction elements that slip. kept (k,): the rows at rest; wrench (N, k): directions of their forces; push (N, p): of
-    those of springs; drag (u,): friction per normal force; drawn (u, N): slips, a slider's with what draws it.
+    of springs; drag (u,): friction per normal force; drawn (u, N): slips, a slider's with what draws it.
     """
 
     def __init__(self, system: System, state: np.ndarray) -> None:
@@ -154,7 +154,7 @@ class _Contacts:
         return forces
 
     def projectors(self) -> dict[str, np.ndarray]:
-        """Return the entries of Flows that bring gaps, slips and forces to what they must be."""
+        """Return the entries of Flows that correct gaps, slips and forces."""
         u, rows, root, kept, drawn = self.u, self.rows, self.root, self.kept, self.drawn
         self_stress = np.zeros((2 * u, 2 * u))
         close_gaps, stop_rows = np.zeros((len(root), u)), np.zeros((len(root), 2 * u))
@@ -205,7 +205,7 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
     rate = np.r_[1j * system.frequency, eigenvalue]
-    # constant part, of loads and of what constraints hold
+    # constant part, of loads and of displacements that constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
     rest, rest_held = still @ weight, -still @ stiffness @ held
     if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
@@ -221,7 +221,7 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
     motion = (oblique @ net) / rate**2
     bend, bend_held = oblique @ net_constant, oblique @ net_held
-    if len(pressed) or len(holds):  # forces of stiff springs nearly cancel: of what they stretch, more is known
+    if len(pressed) or len(holds):  # forces of stiff springs nearly cancel: their stretches are more accurate
         motion += inner.T @ (eta - inner @ motion)
         bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
     for a, row in zip(size - sliders + follows, system.elongation[follows] / root, strict=True):
@@ -333,7 +333,7 @@ def _polish(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Take two of Newton's steps on the quadratic problem for eigenvalues (m,) and shapes (k, m), lengths kept.
 
-    Beside stiff contacts the linear problem leaves slow modes with round-off relative to the quick ones. Equal modes,
+    With stiff contacts, the linear problem leaves slow modes with round-off relative to the quick ones. Equal modes,
     whose steps are not small, stay as they are.
     """
     values, eye = values.copy(), np.eye(len(stiffness))

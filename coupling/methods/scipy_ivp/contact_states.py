@@ -25,7 +25,7 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Wrong,
 )
 
-#: states that may be tried in turn: all of six contacts with friction, and what is near of more
+#: states that may be tried in turn: all of six contacts with friction, the nearest of more
 _MOST = 5000
 
 Found = TypeVar("Found")
@@ -34,7 +34,7 @@ Found = TypeVar("Found")
 def search(
     options: Sequence[Sequence[int]], begin: Sequence[int], judge: Callable[[States], tuple[Found, list[Wrong]] | None]
 ) -> Found | None:
-    """Return what `judge` makes of the first states it finds nothing wrong with; None if there are none.
+    """Return the result of `judge` for the first states that it accepts; None if there are none.
 
     options: the states that each unit may have; begin: those to begin with. `judge` returns None where the states are
     impossible.
@@ -76,7 +76,7 @@ def decide(
 ) -> tuple[Motion, np.ndarray] | None:  # fmt: skip
     """Return the motion that begins at an extended state (extent,), and the orders of its event functions' zeros.
 
-    None if no states are possible. Gaps and speeds that are none are zero. motions: the motion of states; sizes:
+    None if no states are possible. Negligible gaps and speeds are zero. motions: the motion of states; sizes:
     (extent,) of the state's terms; present: (u,) states so far; slow: speed below which a Jenkins element sticks, m/s.
     """
     gaps, speed = now[free.d], now[free.s]

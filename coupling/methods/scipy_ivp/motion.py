@@ -2,7 +2,7 @@
 
 Between two events every unit keeps its state, and all is linear in the extended state (z, 1, cos, sin) of the
 excitation's harmonics. z = (q, v, d, s) holds coordinates and velocities, and again the gaps of the units and the
-speeds of all rows. What is zero at an event is then zero to the last bit, and a gap grows from there with all digits.
+speeds of all rows. Zeros at an event are then zero to the last bit, and a gap grows from there with all digits.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class Holding:
         self.possible = bool(np.all(np.abs(left).max(axis=1, initial=0.0) <= _LOST * sizes))
 
     def spread(self, forces: np.ndarray, u: int) -> np.ndarray:
-        """Return the forces (2u, ...) of all rows from those of the kept ones (k, ...)."""
+        """Return the forces (2u, ...) of all rows from the kept ones (k, ...)."""
         count, spread = len(self.closed), np.zeros((2 * u, *forces.shape[1:]))
         spread[self.closed] = forces[:count]
         spread[u + self.closed] = -(self.drag * forces[:count].T).T
@@ -144,7 +144,7 @@ class Motion:
     """The linear motion while units keep their states (u,): rate (extent, extent), force (2u, extent), event functions.
 
     guard (k, extent): positive until its event; pressed: (u,) contacts whose springs push; possible: whether forces can
-    hold what the states keep at rest.
+    hold the coordinates that the states keep at rest.
     """
 
     def __init__(self, free: Unforced, states: States) -> None:
@@ -170,7 +170,7 @@ class Motion:
         self.rate[free.s][holding.kept] = 0.0
         self.rate[free.cosine, free.sine] = -np.diag(system.frequency)
         self.rate[free.sine, free.cosine] = np.diag(system.frequency)
-        #: of the sums that rates are: those of coordinates that contacts hold cancel
+        #: of the sums that form rates: terms of coordinates that contacts hold cancel
         self.terms = np.abs(self.rate)
         self.terms[free.v] = np.abs(free.accelerations) + np.abs(free.respond) @ np.abs(force)
         self.terms[free.s] = np.abs(free.relative) + np.abs(system.delassus) @ np.abs(force)

@@ -57,7 +57,7 @@ class Recorder:
         self.on_floor = (system.surface == FLOOR) & free.contact
         self._set_products()
         self.before = np.zeros(self.count)
-        #: time, values and rates of what is watched at the last point
+        #: time, values and rates of the watched quantities at the last point
         self.last = 0.0, np.zeros(len(self.watched)), np.zeros(len(self.watched))
 
     # -- integrals
@@ -193,7 +193,7 @@ class Recorder:
         return entry
 
     def stopped(self, before: np.ndarray, after: np.ndarray) -> None:
-        """Enter what the end of a chatter has taken."""
+        """Enter the loss at the end of a chatter."""
         self.impact_loss += 0.5 * float(self.system.mass @ (before**2 - after**2))
 
     def follow(self, t: float, y: np.ndarray, motion: Motion) -> None:
@@ -229,7 +229,7 @@ class Recorder:
         self.section(y)
 
     def section(self, y: np.ndarray) -> None:
-        """Record section and ledger at the start of a period."""
+        """Record section and energies at the start of a period."""
         free, system, q, integrals = self.free, self.system, y[self.free.q], y[self.free.size :]
         ledger = np.zeros(len(ENERGIES))
         ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]

@@ -31,7 +31,7 @@ def _from_samples(nodes: np.ndarray) -> np.ndarray:
     return np.linalg.inv(np.array(basis))
 
 
-#: of a function, and of what is left of it without a zero at x = 0, of one degree less, raised to the same degree
+#: of a function, and of its quotient without a zero at x = 0, of one degree less, raised to the same degree
 _RAISE = np.eye(_DEGREE + 1, _DEGREE) * (1 - np.arange(_DEGREE + 1) / _DEGREE)[:, None]
 _RAISE[1:] += np.diag(np.arange(1, _DEGREE + 1) / _DEGREE)
 _WHOLE = _from_samples(NODES).T

@@ -41,7 +41,7 @@ from vanedamp.coupling.system.system import System
 
 #: events without time between them before the run is given up
 _STANDING = 100
-#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
+#: imbalance of the energies above which a response is not to be used, in units of rtol or of _LEAST
 _OPEN_LEDGER, _LEAST = 1e3, 1e-9
 #: the shortest first step, as a fraction of a period
 _SHORTEST = 1e-26
@@ -50,7 +50,7 @@ _SHORTEST = 1e-26
 _AT_ONCE, _FRESH = 1e-13, 1e-9
 #: gaps below this fraction of the play are closed at the start; above this one they are taken from the coordinates
 _TOUCHING, _FAR = 1e-12, 1e-6
-#: speeds below this fraction of the run's largest are none
+#: speeds below this fraction of the run's largest count as zero
 _STILL = 1e-11
 #: flights shorter than this fraction of a period, and all that follow them, are the end of a chatter; of elastic
 #: contacts, the part of it that a flight must last
@@ -191,7 +191,7 @@ class IvpRun:
         return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
-        """Return twice the time to the first event by the functions' parabolas: round-off is that of the flight, s."""
+        """Return twice the time to the first event by the functions' parabolas: round-off is the flight's, s."""
         now = self.free.extended(self.time, self.y[: self.free.size])
         # accelerations of what leaves by its third derivative are round-off
         early = self.order < 3
@@ -271,7 +271,7 @@ class IvpRun:
     def _motion(self, closed: np.ndarray, touch: np.ndarray, slow: float) -> tuple[Motion, np.ndarray] | None:
         """Return the motion that begins now, and the orders of its zeros. Speeds that are round-off are set to zero.
 
-        touch: (u,) gaps that are none, m; slow: speed that is none, m/s.
+        touch: (u,) gaps that count as zero, m; slow: speed that counts as zero, m/s.
         """
         free, J, v = self.free, self.system.J, self.y[self.free.v]
         slips = np.union1d(closed, np.flatnonzero(~free.contact))
@@ -283,7 +283,7 @@ class IvpRun:
         self.y[free.s] = np.where(np.abs(speed) <= slow, 0.0, speed)
         sizes = np.ones(free.extent)
         sizes[: free.size] = self.sizes[: free.size]
-        # what is below these bounds is zero already
+        # values below these bounds are zero already
         sizes[free.d], sizes[free.s] = 0.5 * touch / ROUND_OFF, 0.5 * slow / ROUND_OFF
         now = free.extended(self.time, self.y[: free.size])
         return decide(free, self.motions, now, sizes, self.state, slow)

@@ -1,4 +1,4 @@
-"""Machine code of compiled functions on disk: what is damaged there is compiled again.
+"""Machine code of compiled functions on disk: damaged code is compiled again.
 
 numba replaces its files one by one, the index before the code, and does not force them to the disk. After a loss of
 power they may be empty or cut, hold zeros in place of code, or an index may name the code of another version. numba

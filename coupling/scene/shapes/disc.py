@@ -20,7 +20,7 @@ class Disc(Shape):
         return radius, radius
 
     def inertia(self, body: Measured) -> float:
-        """Return that of a homogeneous disc."""
+        """Return it for a homogeneous disc."""
         a, _ = self.half_extent(body)
         return body.mass * (a * a / 2)
 

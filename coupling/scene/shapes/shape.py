@@ -1,6 +1,6 @@
 """The contract of shapes: other code asks the shape of a body these questions, and never for its name.
 
-Points count from the body's centre, along and across the cavity, m. The centre is that of mass and of the smallest
+Points count from the body's centre, along and across the cavity, m. It is the centre of mass and of the smallest
 rectangle around the body, whose sides lie along and across.
 """
 

@@ -22,7 +22,7 @@ from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Whole
 
 #: half of the exponents p of the norms, one after the other, and the iterations of each
 _HALF_NORMS, _ITERATIONS = (2, 4, 8, 16, 32, 64, 128), 200
-#: least samples of a period per order for a norm
+#: least samples per period and order for a norm
 _SAMPLES = 8
 
 Order = Annotated[Whole, Field(gt=0, le=10_000)]
@@ -70,7 +70,7 @@ class Multisine(Waveform):
 def _shares(
     orders: tuple[int, int], spectrum: str | tuple[float, ...], crest_factor: float | None, seed: int, level: str
 ) -> dict[int, complex]:
-    """Return the shares of a multi-sine, as its fields say. Raises ValueError for a crest factor out of reach."""
+    """Return the components of a multi-sine, as its fields say. Raises ValueError for a crest factor out of reach."""
     order = np.arange(orders[0], orders[1] + 1)
     size = np.asarray(spectrum) if isinstance(spectrum, tuple) else {"flat": order**0.0, "pink": order**-0.5}[spectrum]
     order, size = order[size > 0], size[size > 0]
@@ -122,7 +122,7 @@ def _between(order: np.ndarray, size: np.ndarray, one: np.ndarray, other: np.nda
 
 
 def _flatter(order: np.ndarray, size: np.ndarray, random: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield phases whose crest factors are lower and lower as a rule: Schroeder's, then those of growing norms."""
+    """Yield phases whose crest factors are lower and lower as a rule: Schroeder's, then phases of growing norms."""
     from scipy.optimize import minimize
 
     power = size**2 / (size**2).sum()

@@ -51,7 +51,7 @@ def _text(value: float) -> str:
 def read_matrices(path: Path) -> dict[str, np.ndarray]:
     """Read stiffness, mass and damping of a substructure by name; one global matrix has the name "".
 
-    Global matrices are those of *MATRIX OUTPUT: FORMAT=MATRIX INPUT (node, freedom, node, freedom, entry), of nodes
+    Global matrices come from *MATRIX OUTPUT: FORMAT=MATRIX INPUT (node, freedom, node, freedom, entry), of nodes
     that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry). Raises MatrixFileError.
     """
     lines = list(_lines(path))

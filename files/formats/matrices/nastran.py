@@ -25,7 +25,7 @@ def read_op4(path: str) -> dict[str, Any]:
 
 
 def read_op2(path: str) -> dict[str, Any]:
-    """Return the matrices of an OUTPUT2 file by name: its own, or those of its DMIG entries."""
+    """Return the matrices of an OUTPUT2 file by name: its own, or from its DMIG entries."""
     nastran = _nastran(path)
     with nastran.op2.OP2(path) as file:
         found = dict(file.rdop2mats())

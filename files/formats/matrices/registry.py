@@ -25,10 +25,10 @@ from vanedamp.files.sparse_indices import within_shape
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
 
-    That of .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
+    That in .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
     entries (.pch, .dmig), of which all have the same rows, by grid point and component, and .mtx of Abaqus, of whose
     substructures the names are stiffness, mass and damping. Entries of a file that are no numbers are left out. Raises
-    MatrixFileError for a missing, damaged or unknown file, and for those of Nastran without the package pyyeti.
+    MatrixFileError for a missing, damaged or unknown file, and for Nastran files without the package pyyeti.
     """
     file = Path(path)
     if file.suffix.lower() not in _READERS:

@@ -1,6 +1,6 @@
 """Decks of Abaqus and CalculiX (.inp): nodes in global coordinates, elements and sets.
 
-Every keyword that gives or moves nodes and elements is followed or refused. Others say nothing about the mesh: their
+Every keyword that gives or moves nodes and elements is followed or rejected. Others say nothing about the mesh: their
 meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
 is said in the case, in global axes.
 
@@ -119,7 +119,7 @@ class _Deck:
             raise card.head.error(f"is not closed by *END {card.keyword}: the file is cut short; write it again")
 
     def _check_scope(self, card: _Card) -> None:
-        """Refuse a second part: labels are unique within one part only."""
+        """Reject a second part: labels are unique within one part only."""
         scope = self.opened[-1].keyword if self.opened else ""
         if self.meshed not in (None, scope):
             raise card.head.error("of a second part, or of the assembly; write one part with all of the mesh")
@@ -329,7 +329,7 @@ def _cards(path: Path) -> Iterator[_Card]:
 
 
 def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
-    """Yield the lines that say something, keywords in one line, those of named files in their place.
+    """Yield the lines with content, keywords in one line, named files' lines in their place.
 
     including: the files that include this one. Raises MeshError with file and line.
     """

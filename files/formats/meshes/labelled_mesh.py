@@ -108,7 +108,7 @@ class LabelledMesh:
 
 
 def deck_lines(path: Path) -> list[DeckLine]:
-    """Return the lines of a text file in UTF-8, or else in Latin-1. Raises MeshError for what is no text."""
+    """Return the lines of a text file in UTF-8, or else in Latin-1. Raises MeshError for other files."""
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What the sections of a gmsh file say without its mesh: names of groups, number of nodes. Needs no gmsh."""
+"""Header of a gmsh file without its mesh: names of groups, number of nodes. Needs no gmsh."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class MeshHeader(NamedTuple):
 
 
 def read_header(path: str | Path) -> MeshHeader:
-    """Return the header of a gmsh file (.msh, version 2 or 4). Raises InputError for a file that is none."""
+    """Return the header of a gmsh file (.msh, version 2 or 4). Raises InputError for any other file."""
     groups: dict[int, list[str]] = {dimension: [] for dimension in range(4)}
     try:
         with open(path, "rb") as lines:

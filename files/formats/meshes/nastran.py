@@ -113,7 +113,7 @@ def _take_element(mesh: LabelledMesh, card: _Card) -> None:
     missing = [node for node in nodes if node not in mesh.nodes]
     if missing:
         raise card.line.error(f"there is no grid point {missing[0]}")
-    if len(nodes) == 20:  # the nodes of the upright edges come before those of the upper face
+    if len(nodes) == 20:  # the nodes of the upright edges come before the upper face's
         nodes = nodes[:12] + nodes[16:] + nodes[12:16]
     mesh.add_element(card.line, label, kinds[len(nodes)], nodes)
     mesh.element_sets.setdefault(str(reference or label), []).append(label)
@@ -284,7 +284,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
 
 
 def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
-    """Yield the lines that say something, those of included files in their place. Raises MeshError."""
+    """Yield the lines with content, included files' lines in their place. Raises MeshError."""
     including = (*including, path.resolve())
     for line in deck_lines(path):
         text = line.text.split("$")[0].expandtabs(8).rstrip()

@@ -25,7 +25,7 @@ def read(path: Path) -> LabelledMesh:
         mesh = apart(path, MeshError, lambda: _read(meshlane, path))
     except MeshError:
         raise
-    except Exception as error:  # its readers raise what they stumble over
+    except Exception as error:  # its readers raise errors of any type
         why = " ".join(str(error).split()) or type(error).__name__
         raise MeshError(
             f"{path}: cannot be read as {path.suffix or 'a mesh without an ending'}: damaged, or of another format "
@@ -52,7 +52,7 @@ def read(path: Path) -> LabelledMesh:
 
 
 def _read(meshlane: Any, path: Path) -> Any:
-    """Return the mesh as meshlane reads it. Raises ValueError with what it prints: it may end the program."""
+    """Return the mesh as meshlane reads it. Raises ValueError with its output: it may end the program."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):

@@ -1,6 +1,6 @@
 """Universal files (.unv) of I-deas, Salome and gmsh: nodes, elements and permanent groups.
 
-Read are the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), and those of groups. Sources: SDRC, I-deas
+Reads the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), and of groups. Sources: SDRC, I-deas
 universal file datasets; Salome's SMESH, UNV drivers (groups of one pair or of two quadruples of numbers).
 
 Why not pyuff, which reads measurements: version 2.5.8 gives no members of groups (dataset 2477) and fails at the

@@ -1,6 +1,6 @@
-"""The cost of a command, estimated before the work: what nobody would wait for, or has memory for, is rejected.
+"""The cost of a command, estimated before the work: rejected if it takes too long or too much memory.
 
-Known costs are those of one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
+Known costs refer to one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
 generous: whoever meets one has most likely slipped by some powers of ten.
 """
 

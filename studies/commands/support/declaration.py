@@ -1,4 +1,4 @@
-"""A command as it is declared: what it takes, reads and writes, and the function that does it, which is loaded last.
+"""Declaration of a command: arguments, inputs, outputs, and its function, which is loaded last.
 
 So whatever a user gets wrong is said before the work's packages are imported, and `--help` loads none of them.
 """

@@ -17,7 +17,7 @@ def write_result(
     warnings: Iterable[str] = (),
     **files: Callable[[str], object],
 ) -> None:
-    """Write what a command has found. All files appear together, or none.
+    """Write the results of a command. All files appear together, or none.
 
     result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
     lines: for people, on standard output

@@ -50,7 +50,7 @@ def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkp
 def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
     """Reject files that could not be written, before the work. Raises InputError.
 
-    The files are those of `--output`, of `--json` (standard output becomes `-` and is none), of the options that
+    The files come from `--output`, from `--json` (standard output becomes `-` and is none), of the options that
     suffixes names with the endings that they may have, and one that the user did not name (beside).
     """
     if _is_stdout(getattr(arguments, "json", None) or "-"):

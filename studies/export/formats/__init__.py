@@ -2,12 +2,12 @@
 
 A format is a module with
 
-    SUMMARY   what it is and who reads it, in a line
+    SUMMARY   its kind and its readers, in one line
     ENDINGS   of files, such as (".mat",)
     WRITERS   by the kind of a result (the attribute `kind` of its file; ANY: every kind) a function
               write(record, path, **options) that writes a file, from a studies.export.record.Record, by
-              files.store.replacing. It may return warnings: what the file does not hold
+              files.store.replacing. It may return warnings: data that the file does not hold
     OPTIONS   the keyword arguments of its writers, as studies.export.export.Option
 
-Import what is heavy inside the writers: `vanedamp export --help` loads all formats.
+Import heavy modules inside the writers: `vanedamp export --help` loads all formats.
 """

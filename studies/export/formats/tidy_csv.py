@@ -1,4 +1,4 @@
-"""Tidy tables: one row a point of a sweep, a sample, a period or an event; units stand in the header."""
+"""Tidy tables: one row per point of a sweep, sample, period or event; units stand in the header."""
 
 from __future__ import annotations
 

@@ -120,8 +120,8 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
 def sweep(record: Record, path: Path) -> tuple[str, ...]:
     """Write the amplitude curves of a sweep over its frequencies, m, upwards, one for each of its other points.
 
-    Points without a figure are left out, since the format has no mark for them; nor has it one for a status. Raises
-    InputError for a sweep that is not over the frequency.
+    Points without a value are left out, since the format has no mark for them; nor has it one for a status. Raises
+    InputError for a sweep over anything but frequency.
     """
     axes: list[str] = record.attributes["axes"]
     swept = "excitation.frequency"
@@ -153,7 +153,7 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
 
 
 def response(record: Record, path: Path) -> tuple[str, ...]:
-    """Write the samples of a run: displacement and those of the bodies in their cavities, m, over time.
+    """Write the samples of a run: displacements of the response and of the bodies in their cavities, m, over time.
 
     Raises InputError for a response without samples.
     """

@@ -81,7 +81,7 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     """Write the displacements of a reduced model, m, relative to the base, at the samples of the last periods.
 
     Raises InputError for a response without samples of a reduced model's coordinates, a model without its recovery, or
-    another model or mesh than those of the run.
+    another model or mesh than the run's.
     """
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.scene.structures import Rom
@@ -132,7 +132,7 @@ WRITERS = {"modes": modes, "response": response}
 
 
 def shapes_of(record: Record) -> tuple[np.ndarray, list[np.ndarray], str]:
-    """Return frequencies (m,), Hz, shapes (n, 3) of the modes in a record, and what they are called.
+    """Return frequencies (m,), Hz, shapes (n, 3) of the modes in a record, and their names.
 
     The shapes are complex where the record has those with the gyroscopic coupling.
     """

@@ -142,7 +142,7 @@ def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit:
 
 
 def _response_table(record: Mapping[str, Any], unit: str) -> Table:
-    """Return a row per frequency line; what is not fitted is nan."""
+    """Return a row per frequency line; nan where not fitted."""
     parts = {
         "response_real": "measured real", "response_imaginary": "measured imaginary",
         "fitted_real": "fitted real", "fitted_imaginary": "fitted imaginary",

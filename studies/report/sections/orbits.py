@@ -166,7 +166,7 @@ def branch_name(number: int, branch: Branch) -> str:
 
 
 def _drawn(own: np.ndarray) -> np.ndarray:
-    """Return own points and those just after them: lines of one kind go on to the first point of the other."""
+    """Return own points and those just after them: lines of one kind continue to the first point of the other."""
     return own | np.concatenate([[False], own[:-1]])
 
 

@@ -24,7 +24,7 @@ KIND = "ramp"
 _STATIONARY = "#0f172a"
 #: points of a curve that are drawn; of more periods, the largest of equally many each
 _MOST_POINTS = 2000
-#: rates of Lewis' curve, and how far it goes beyond those of the runs
+#: rates of Lewis' curve, and how far it extends beyond the runs'
 _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
@@ -70,7 +70,7 @@ def run_name(ramp: Ramp, run: RampRun) -> str:
 
 
 def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = MappingProxyType({})) -> go.Figure:
-    """Draw amplitudes over the frequency, those of the linear structure, and the points of sweeps by their names."""
+    """Draw amplitudes versus frequency, of runs and the linear structure, and the points of sweeps by their names."""
     figure, x = go.Figure(), along(ramp)
     rates = list(dict.fromkeys(abs(run.rate) for run in ramp.runs))
     for name, title, dash in (

@@ -1,4 +1,4 @@
-"""Runs: figures and energies, the time history and the motion in the plane where the run kept samples, impacts."""
+"""Runs: results and energies, the time history and the motion in the plane where the run kept samples, impacts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the figures of every run, its charts and its motion if it was sampled, its impacts if it kept events."""
+    """Return the results of every run, its charts and its motion if it was sampled, its impacts if it kept events."""
     return [_history(file, result.record, page) for file, result in results.items()]
 
 
@@ -60,7 +60,7 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
 
 
 def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
-    """Draw impacts per period, mean normal and tangential impulse, and energy taken a period, a bar a contact."""
+    """Draw impacts per period, mean normal and tangential impulse, and energy taken per period, one bar per contact."""
     known = bool(np.isfinite([each.loss for each in impacts]).all())
     figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
     for body in dict.fromkeys(each.body for each in impacts):

@@ -1,4 +1,4 @@
-"""Ring-downs: envelope, frequency and damping over the amplitude of a natural mode that is let go."""
+"""Ring-downs: envelope, frequency and damping over the amplitude of a natural mode that is released."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return figures and charts of every ring-down."""
+    """Return results and charts of every ring-down."""
     return [_shown(file, result.record, page) for file, result in results.items()]
 
 
@@ -59,7 +59,7 @@ def _shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
 
 
 def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
-    """Yield a line a half cycle, and beside it the window of cycles that begins with it."""
+    """Yield a line per half cycle, with the window of cycles that begins with it."""
     half, whole = record.half_cycles, record.cycles
     first = zip(
         half.time.tolist(), half.amplitude.tolist(), half.frequency.tolist(), record.impacts.tolist(), strict=True

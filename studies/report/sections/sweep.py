@@ -66,7 +66,7 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
-    """Return groups of responses that share an axis, maps, where runs end, and what is to be said about the bodies."""
+    """Return groups of responses that share an axis, maps, where runs end, and remarks about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
         "groups": [_group(group, sweeps, page) for group in _by_axis(_responses(sweeps, page))],
@@ -90,7 +90,7 @@ def _scene(sweep: Sweep) -> dict[str, Any]:
 
 
 def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
-    """Return the curves of sweeps; those of a study are named after their files, others after their models."""
+    """Return the curves of sweeps; curves of a study are named after their files, others after their models."""
     # a sweep of starts only has no response along an axis
     sweeps = {
         file: sweep for file, sweep in sweeps.items() if not (basin_axes(sweep) and all(map(is_start, sweep.axes)))
@@ -108,13 +108,13 @@ def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
 
 
 def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
-    """Group the responses that share a chart: those along the same axis."""
+    """Group the responses of a common chart: along the same axis."""
     axes = dict.fromkeys(response.axis for response in responses)
     return [[response for response in responses if response.axis == axis] for axis in axes]
 
 
 def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], page: Page) -> dict[str, Any]:
-    """Return charts and table of the responses along one axis, best first; those of a study keep their order."""
+    """Return charts and table of the responses along one axis, best first; a study's keep their order."""
     every = len(responses)
     places = {response.name: place for place, response in enumerate(responses)}
     if page.study is None:

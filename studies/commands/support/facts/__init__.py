@@ -9,7 +9,7 @@ from vanedamp.files.reference import FileKind, key_in, options, table_at
 
 
 class Fact(NamedTuple):
-    """A value under a key of the results for machines, with its unit and what it is."""
+    """A value under a key of the results for machines, with its unit and meaning."""
 
     key: str
     value: Any

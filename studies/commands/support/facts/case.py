@@ -1,4 +1,4 @@
-"""What a case means: its mesh and groups, wave speeds of its materials, what is held, and what is computed."""
+"""Facts of a case: mesh and groups, wave speeds of its materials, supports, and planned results."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _IN_A_WAVE = 6
 
 
 def facts(path: str | Path) -> list[Fact]:
-    """Return what the case in a file means. Raises InputError, as its commands do."""
+    """Return the facts of the case in a file. Raises InputError, as its commands do."""
     case, warnings = Case.load(path), []
-    case.response_label  # noqa: B018  # an open choice is refused
+    case.response_label  # noqa: B018  # an open choice is rejected
     if not (case.support.clamped or case.support.elastic):
         warnings.append("support: nothing holds the structure, which has six rigid motions and no first bending then")
     commands = ["modal", *(["reduce"] if case.interface else []), *(["calibrate"] if case.calibration else [])]

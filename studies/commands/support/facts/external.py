@@ -1,4 +1,4 @@
-"""What the description of another code's model means: its files, coordinates, frequencies and checks."""
+"""Facts of the description of another code's model: files, coordinates, frequencies and checks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vanedamp.studies.commands.support.facts import Fact
 
 
 def facts(path: str | Path) -> list[Fact]:
-    """Return what the model that a file describes means. Raises what `vanedamp import` raises."""
+    """Return the facts of the model that a file describes. Raises as `vanedamp import`."""
     external = External.read(path)
     model, findings, warnings = external.model(path)
     return [

@@ -1,4 +1,4 @@
-"""What a pipeline means: its stages and files, and which of them would run now."""
+"""Facts of a pipeline: its stages and files, and which of them would run now."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vanedamp.studies.pipeline.tables import PipelineFile
 
 
 def facts(path: str | Path) -> list[Fact]:
-    """Return what the pipeline in a file means. Raises InputError, as `vanedamp pipeline` does."""
+    """Return the facts of the pipeline in a file. Raises InputError, as `vanedamp pipeline` does."""
     table = PipelineFile.load(path)
     plan = pipeline(path, dry_run=True).stages
     return [

@@ -1,4 +1,4 @@
-"""What a scene means: natural frequencies, amplitudes without bodies, onsets of slips and impacts, expected cost."""
+"""Facts of a scene: natural frequencies, amplitudes without bodies, onsets of slips and impacts, expected cost."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 
 
 def facts(path: str | Path) -> list[Fact]:
-    """Return what the scene in a file means. Raises InputError, as its commands do."""
+    """Return the facts of the scene in a file. Raises InputError, as its commands do."""
     scene = load_scene(path)
     if scene.sweep:
         check_sweep(scene, available_cores())
@@ -49,7 +49,7 @@ def facts(path: str | Path) -> list[Fact]:
 
 
 def facts_of(scene: Scene) -> list[Fact]:
-    """Return what a scene means, warnings last. Raises InputError for one that cannot run."""
+    """Return the facts of a scene, warnings last. Raises InputError for one that cannot run."""
     warnings: list[str] = []
     whole = scene
     if scene.sweep and not leaves_open(scene):
@@ -118,7 +118,7 @@ def _resonance(scene: Scene) -> Resonance | None:
         return None
     try:
         return chosen_resonance(scene)
-    except InputError:  # that of a structure without damping has no height
+    except InputError:  # a resonance without damping has no height
         return None
 
 

@@ -1,4 +1,4 @@
-"""What a study means: its scene, the amplitude that it compares with, and how many designs and scenes it runs."""
+"""Facts of a study: its scene, the amplitude that it compares with, and how many designs and scenes it runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vanedamp.studies.workers import available_cores
 
 
 def facts(path: str | Path) -> list[Fact]:
-    """Return what the study in a file means. Raises InputError, as `vanedamp optimise` does."""
+    """Return the facts of the study in a file. Raises InputError, as `vanedamp optimise` does."""
     study, cores = Study.load(path), available_cores()
     check_optimise(study, cores)
     band = study.frequencies
