@@ -263,7 +263,7 @@ def test_two_tetrahedra_pass(folder, name, text, capfd):
             "have the same nodes; remove one of them",
         ),
         ("m.msh", MESH, "$MeshFormat", "$MESHFORMAT", "not a gmsh mesh (a .msh file starts with $MeshFormat)"),
-        ("m.inp", DECK, "2,2,3,4,5", "1,2,3,4,5", "line 9: *ELEMENT 1: the element is given twice"),
+        ("m.inp", DECK, "2,2,3,4,5", "1,2,3,4,5", "line 9: *ELEMENT element 1 is given twice"),
         ("m.inp", DECK, "2,2,3,4,5", "2,2,3,4,5\n3,5,4,3,2", "volume elements 2 and 3 have the same nodes"),
         ("m.bdf", BULK, "GRID,5,,.1", "GRID,5,,nan", "the coordinates of node 5 are not finite"),
         ("m.bdf", BULK, "CTETRA,2", "CTETRA,1", "line 8: CTETRA: element 1 is given twice"),

@@ -9,7 +9,7 @@ import pytest
 from tests.coupling.engine.line.test_traps import cluster
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response import records as recs
-from vanedamp.coupling.response.evaluation import evaluate, residual
+from vanedamp.coupling.response.evaluation import Ended, evaluate, residual
 from vanedamp.coupling.response.response import Status
 
 
@@ -37,7 +37,7 @@ def test_a_ledger_that_does_not_close_ends_a_run(missing):
     run = run_of(scene)
     assert run.advance_to(20) is Status.OK
     run.records.ledger[-1, recs.VISCOUS] += missing * np.abs(run.records.ledger).max()
-    response = evaluate(scene, run.outcome(), Status.OK, 0, time.perf_counter())
+    response = evaluate(scene, run.outcome(), Ended(Status.OK, 0), time.perf_counter())
     assert response.status == (Status.ENERGY if missing else Status.OK)
 
 
@@ -50,7 +50,7 @@ def test_every_method_is_judged(solver, bound):
         assert run.advance_to(5) is Status.OK
         ledger = run.outcome().records.ledger
         ledger[5, recs.VISCOUS] += missing * np.abs(ledger).max()
-        assert evaluate(scene, run.outcome(), Status.OK, 0, time.perf_counter()).status == status
+        assert evaluate(scene, run.outcome(), Ended(Status.OK, 0), time.perf_counter()).status == status
 
 
 def test_a_run_that_has_ended_otherwise_keeps_its_status():
@@ -59,4 +59,4 @@ def test_a_run_that_has_ended_otherwise_keeps_its_status():
     run.advance_to(5)
     outcome = replace(run.outcome(), open_ledger=0.0)
     for status in (Status.EVENT_BUDGET, Status.ACCURACY_LOST, Status.ILL_CONDITIONED):
-        assert evaluate(scene, outcome, status, 0, time.perf_counter()).status == status
+        assert evaluate(scene, outcome, Ended(status, 0), time.perf_counter()).status == status

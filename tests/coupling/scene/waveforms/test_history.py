@@ -203,5 +203,5 @@ def test_wrong_files(tmp_path, text, message):
 
 def test_a_file_that_is_no_text(tmp_path):
     (tmp_path / "h.csv").write_bytes(b"\xff\xfe\x00\x01time")
-    with pytest.raises(InputError, match=r"h\.csv: cannot be read"):
+    with pytest.raises(InputError, match=r"h\.csv: not a CSV table: damaged, or of another format"):
         simulate(scene(str(tmp_path / "h.csv")))
