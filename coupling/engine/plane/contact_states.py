@@ -97,7 +97,8 @@ def _hold_sliders(system, st, scratch, slow):
         if at_bound and way * speed >= -slow:
             st.state[r] = way
             scratch.resting[r] = _AT_BOUND if way * speed <= slow else 0
-    move_sliders(system, st.state, st.q, st.v)
+    if len(system.tangential) > 0:
+        move_sliders(system, st.state, st.q, st.v)
 
 
 @kernel
@@ -187,7 +188,8 @@ def decide(system, st, scratch, scale):
     scale: the speeds in the scene, m/s, whose round-off counts as rest.
     """
     sliders, slow = len(system.tangential), AT_REST * scale
-    _hold_sliders(system, st, scratch, slow)
+    if len(system.tangential) > 0:
+        _hold_sliders(system, st, scratch, slow)
     count = ZERO
     for r in range(len(system.rest) - sliders):
         if _is_undecided(system, st, scratch, r, slow):
@@ -200,14 +202,16 @@ def decide(system, st, scratch, scale):
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL):
         return False
     doubts = _close_or_open(system, scratch, count, DOUBTFUL * terms)
-    doubts += _draw_sliders(system, st, scratch, DOUBTFUL * terms)
+    if len(system.tangential) > 0:
+        doubts += _draw_sliders(system, st, scratch, DOUBTFUL * terms)
     for p in range(count):
         doubts += scratch.doubtful[p]
     if doubts > 0:
         if not _decide_later(system, st, scratch, count):
             return False
         _stick_in_doubt(system, scratch, count)
-    move_sliders(system, st.state, st.q, st.v)
+    if len(system.tangential) > 0:
+        move_sliders(system, st.state, st.q, st.v)
     _take_decisions(system, st, scratch, count, doubts > 0)
     return True
 
@@ -369,7 +373,8 @@ def _decide_later(system, st, scratch, count):
         total = scratch.ahead[1, i]
         scratch.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
         scratch.ahead[1, i] = st.v[i] + moment * total
-    move_sliders(system, st.state, scratch.ahead[0], scratch.ahead[1])
+    if len(system.tangential) > 0:
+        move_sliders(system, st.state, scratch.ahead[0], scratch.ahead[1])
     for p in range(count):
         scratch.first[p], scratch.doubt[p] = scratch.verdict[p], scratch.doubtful[p]
     terms = loaded_acceleration(system, st, scratch, scratch.ahead[0], scratch.ahead[1], st.time[0] + moment)
@@ -384,7 +389,8 @@ def _decide_later(system, st, scratch, count):
         if sure and not (carriers and (scratch.verdict[p] == TOUCHING or scratch.attempt[0] > 0)):
             scratch.verdict[p], scratch.doubtful[p] = scratch.first[p], scratch.doubt[p]
     _close_or_open(system, scratch, count, DOUBTFUL_LATER * terms)
-    _draw_sliders(system, st, scratch, DOUBTFUL_LATER * terms)
+    if len(system.tangential) > 0:
+        _draw_sliders(system, st, scratch, DOUBTFUL_LATER * terms)
     return True
 
 

@@ -134,8 +134,9 @@ def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grow
             g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
         elif order == POSITION:
             g = flows.rows[s, r, j]
-            k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
-            g *= on_normal + on_slip * rate
+            if what != CLOSES:  # which is the gap alone
+                k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
+                g *= on_normal + on_slip * rate
         else:
             g = on_slip * flows.rows[s, u + r, j] * rate
         g *= st.amplitude[j]

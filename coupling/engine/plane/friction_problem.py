@@ -75,26 +75,35 @@ def _set_up(system, scratch, count, right, bound, scale, size):
         normal = 1.0 / math.sqrt(system.delassus[r, r]) if contact else 0.0
         slip = 1.0 / math.sqrt(system.delassus[u + r, u + r]) if at_rest else 0.0
         first = i + 1 if contact else i  # the unknown of the friction to the right
+        if contact:
+            problem.q[i] = _loaded(system, scratch, count, right, bound, r) * normal / scale
         if at_rest:
-            problem.matrix[first, first + 1], problem.matrix[first + 1, first] = 1.0, -1.0
+            problem.q[first] = _loaded(system, scratch, count, right, bound, u + r) * slip / scale
+            problem.matrix[first, first + 1] += 1.0
+            problem.matrix[first + 1, first] -= 1.0
             problem.q[first + 1] = 2.0 * bound[r] / (slip * scale)
             if contact:
-                problem.matrix[first + 1, i] = 2.0 * system.friction[r] * normal / slip
-        for row, at, own in ((r, i, normal), (u + r, first, slip)):
-            if own == 0.0:
-                continue
-            problem.q[at] = _loaded(system, scratch, count, right, bound, row) * own / scale
-            for o in range(count):
-                c, j = scratch.listed[o], scratch.place[o]
-                free = scratch.way[o] == 0 and has_friction(system, c)
-                if is_rigid(system, c):
-                    drag = -system.friction[c] * (1.0 if free else float(scratch.way[o]))
-                    part = system.delassus[row, c] + drag * system.delassus[row, u + c]
-                    problem.matrix[at, j] = own * (1.0 / math.sqrt(system.delassus[c, c])) * part
-                    j += 1
-                if free:
-                    weight = 1.0 / math.sqrt(system.delassus[u + c, u + c])
-                    problem.matrix[at, j] = own * weight * system.delassus[row, u + c]
+                problem.matrix[first + 1, i] += 2.0 * system.friction[r] * normal / slip
+        for o in range(count):
+            c, j = scratch.listed[o], scratch.place[o]
+            other = is_rigid(system, c)
+            free = scratch.way[o] == 0 and has_friction(system, c)
+            if other:
+                weight = 1.0 / math.sqrt(system.delassus[c, c])
+                drag = -system.friction[c] * (1.0 if free else float(scratch.way[o]))
+                if contact:
+                    part = system.delassus[r, c] + drag * system.delassus[r, u + c]
+                    problem.matrix[i, j] += normal * weight * part
+                if at_rest:
+                    part = system.delassus[u + r, c] + drag * system.delassus[u + r, u + c]
+                    problem.matrix[first, j] += slip * weight * part
+            if free:
+                k = j + 1 if other else j
+                weight = 1.0 / math.sqrt(system.delassus[u + c, u + c])
+                if contact:
+                    problem.matrix[i, k] += normal * weight * system.delassus[r, u + c]
+                if at_rest:
+                    problem.matrix[first, k] += slip * weight * system.delassus[u + r, u + c]
 
 
 @kernel
