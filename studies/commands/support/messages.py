@@ -34,8 +34,7 @@ def write_result(
             write_json(target, finite(result))
     if target == "-":
         print(json_text(finite(result)), end="")
-    for warning in warnings:
-        print_note(arguments.input, f"warning: {warning}")
+    print_warnings(arguments.input, warnings)
     if target != "-":
         for line in lines:
             print(line)
