@@ -12,8 +12,8 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, Executor, Future, InvalidStateError, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.context import BaseContext
 from typing import Any
@@ -37,11 +37,13 @@ class WorkerPool(Executor):
         """Run a call in a worker. Calls lost by a broken pool are not run again."""
         with uninterrupted():  # submit starts them
             try:
-                return self._pool.submit(function, *arguments, **options)
+                future = self._pool.submit(function, *arguments, **options)
             except BrokenExecutor:
                 self._pool.shutdown(wait=False)
                 self._pool = self._new()
-                return self._pool.submit(function, *arguments, **options)
+                future = self._pool.submit(function, *arguments, **options)
+        future.__class__ = _Call
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the workers once they have done their work."""
@@ -60,6 +62,15 @@ class WorkerPool(Executor):
             return ProcessPoolExecutor(
                 self._max_workers, mp_context=_context(), initializer=_begin, initargs=(self._niceness,)
             )
+
+
+class _Call(Future[Any]):
+    """Future of a call. Until CPython 3.12 the thread of a broken pool ends in an error at a cancelled future."""
+
+    def set_exception(self, exception: BaseException | None) -> None:
+        """Take the call's error, unless it is cancelled."""
+        with suppress(InvalidStateError):
+            super().set_exception(exception)
 
 
 def _context() -> BaseContext:

@@ -34,7 +34,8 @@ def write_result(
             write_json(target, finite(result))
     if target == "-":
         print(json_text(finite(result)), end="")
-    print_warnings(arguments.input, warnings)
+    for warning in warnings:  # a command without an input file has none
+        print_warnings(arguments.input, [warning])
     if target != "-":
         for line in lines:
             print(line)

@@ -6,8 +6,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
@@ -106,6 +107,19 @@ def test_workers_that_end_as_they_begin_end_a_sweep(monkeypatch):
         sweep(scene(), pool)
     with pytest.raises(SweepError, match=r"^the workers end as they begin"), workers(2):
         pass
+
+
+def test_a_cancelled_call_is_none_of_a_broken_pools(monkeypatch):
+    """The thread that ends a broken pool goes on at a call that is cancelled, and ends all others."""
+    errors = []
+    monkeypatch.setattr(threading, "excepthook", errors.append)
+    with WorkerPool(1) as pool:
+        calls = [pool.submit(time.sleep, 60.0)] + [pool.submit(end_at_once) for _ in range(20)]
+        assert calls[-2].cancel()  # of a standard pool, it stops the thread before the last one
+        next(iter(pool._pool._processes.values())).kill()
+        with pytest.raises(BrokenExecutor):
+            calls[-1].result(30.0)
+    assert not errors
 
 
 @pytest.mark.slow
