@@ -115,6 +115,7 @@ class System:
         base = (excitation.base_acceleration or 0.0) / unit
         given = {1: (1.0, 0.0)} | {part.order: (part.amplitude, part.phase) for part in excitation.harmonic}
         self.orders = np.array(list(given), float)
+        self._orders = self.orders.tolist()
         sizes, phases = np.array(list(given.values())).T
         self.shares = self.base_shares = sizes * np.exp(1j * np.radians(phases))
         if excitation.resonance_amplitude is not None:
@@ -199,6 +200,11 @@ class System:
         """The state of shape (..., ) with sines, cosines and 1 below it."""
         turn = np.multiply.outer(self.orders, np.asarray(t, float))
         return np.concatenate([y, np.sin(turn), np.cos(turn), np.ones((1, *turn.shape[1:]))])
+
+    def harmonics(self, t: float) -> list[float]:
+        """Sines, cosines and 1 at one time."""
+        turns = [order * t for order in self._orders]
+        return [*map(math.sin, turns), *map(math.cos, turns), 1.0]
 
     def wave(self, shares: np.ndarray, t: np.ndarray | float) -> np.ndarray:
         """Im sum_k shares_k exp(i orders_k t) at times of any shape."""
