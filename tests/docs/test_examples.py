@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import tomli_w
 
+from benchmarks import BENCHMARKS
 from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
@@ -262,13 +263,18 @@ def test_modules_in_pages_run():
         assert path.with_suffix(".py").exists() or (path / "__main__.py").exists(), name
 
 
-def test_readme_describes_every_command(capsys):
-    text = (ROOT / "README.md").read_text()
+def test_page_of_commands_describes_every_one(capsys):
+    text = (DOCS / "reference" / "commands.md").read_text()
     described = {line.split("`")[1].split()[1] for line in text.splitlines() if line.startswith("| `vanedamp ")}
     with pytest.raises(SystemExit):
         main(["--help"])
     usage = capsys.readouterr().out
     assert described == {line.split()[0] for line in usage.splitlines() if line.startswith("    ") and line[4] != " "}
+
+
+def test_page_of_benchmarks_describes_every_one():
+    text = (DOCS / "benchmarks.md").read_text()
+    assert set(re.findall(r"^\| `vanedamp bench ([\w-]+)` \|", text, re.MULTILINE)) == set(BENCHMARKS.all())
 
 
 # links
