@@ -34,12 +34,11 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         """Return the same as the table that a notebook shows."""
-        rows = [(name, text, self.UNITS.get(name, "")) for name, text in self._lines().items()]
-        return html_table(("", type(self).__name__, ""), rows)
+        return html_table((type(self).__name__, ""), self._lines().items())
 
     def _lines(self) -> dict[str, str]:
         shown = {name: _shown(value) for name, value in self.shown().items()}
-        return {name: text for name, text in shown.items() if text is not None}
+        return {name: f"{text} {self.UNITS.get(name, '')}".rstrip() for name, text in shown.items() if text is not None}
 
 
 class Plotted(Displayed):

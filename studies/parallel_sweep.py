@@ -26,9 +26,11 @@ def sweep(
 ) -> Sweep:
     """Run every point of the scene's [sweep] table, or of that in a TOML file.
 
-    workers: processes of this machine, 0: one per core; or an `executor` of concurrent.futures; progress: True shows a
-    bar, a function is called with the number of points done and their total; checkpoint: a file that keeps finished
-    points, from which a sweep that was killed resumes; provenance: data that the result keeps (JSON-able).
+    workers: processes of this machine, 0: one per core; or an `executor` of concurrent.futures. Processes import the
+    main module: in a script, call this under `if __name__ == "__main__":`.
+    progress: True shows a bar, a function is called with the number of points done and their total; checkpoint: a file
+    that keeps finished points, from which a sweep that was killed resumes; provenance: data that the result keeps
+    (JSON-able).
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the workers are lost for good.
