@@ -1,11 +1,12 @@
-"""How a record prints: a line a field, arrays by their shape and range, as scipy's results print."""
+"""How a record prints: a line per field, arrays by their shape and range, as scipy's results print."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import Any
+from html import escape
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,15 +15,52 @@ _ENTRIES, _WIDTH = 6, 88
 
 
 class Displayed:
-    """Base of records, dataclasses with repr=False, that print so that a notebook can show them."""
+    """Base of records, dataclasses with repr=False, that print so that a notebook can show them.
+
+    UNITS: units of the fields that have one
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {}
+
+    def shown(self) -> dict[str, Any]:
+        """Return the values that are printed, by name."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
 
     def __repr__(self) -> str:
         """Return the record's name and a line for each of its fields that has a value."""
-        names = [item.name for item in fields(self)]  # type: ignore[arg-type]
-        shown = {name: _shown(getattr(self, name)) for name in names}
-        width = max(map(len, names))
-        lines = [f"{name:>{width + 2}}: {text}" for name, text in shown.items() if text is not None]
-        return "\n".join([type(self).__name__, *lines])
+        lines = self._lines()
+        width = max(map(len, lines))
+        return "\n".join([type(self).__name__, *(f"{name:>{width + 2}}: {text}" for name, text in lines.items())])
+
+    def _repr_html_(self) -> str:
+        """Return the same as the table that a notebook shows."""
+        return html_table((type(self).__name__, ""), self._lines().items())
+
+    def _lines(self) -> dict[str, str]:
+        shown = {name: _shown(value) for name, value in self.shown().items()}
+        return {name: f"{text} {self.UNITS.get(name, '')}".rstrip() for name, text in shown.items() if text is not None}
+
+
+class Plotted(Displayed):
+    """Base of results that have a figure."""
+
+    def plot(self, scene: Any = None) -> Any:
+        """Return the interactive figure (plotly) of `vanedamp.plot`. scene: that of a response, for its walls."""
+        import vanedamp
+
+        return vanedamp.plot(self, scene)
+
+
+def html_table(heading: Iterable[str], rows: Iterable[Iterable[str]], note: str = "") -> str:
+    """Return a table of texts in HTML, with a note below it."""
+    head = _row("th", heading)
+    body = "".join(_row("td", row) for row in rows)
+    return f"<table><thead>{head}</thead><tbody>{body}</tbody></table>" + (f"<p>{escape(note)}</p>" if note else "")
+
+
+def _row(tag: str, texts: Iterable[str]) -> str:
+    cells = "".join(f'<{tag} style="text-align: left">{escape(text)}</{tag}>' for text in texts)
+    return f"<tr>{cells}</tr>"
 
 
 def _shown(value: Any) -> str | None:

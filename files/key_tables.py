@@ -8,10 +8,15 @@ from __future__ import annotations
 import inspect
 import re
 import textwrap
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator
+from dataclasses import MISSING, fields
 from typing import Any, NamedTuple, TypeVar
 
+from pydantic import ValidationError
+from pydantic_core import ArgsKwargs
+
 from vanedamp.files.reference import constants, making_schema, options, schema
+from vanedamp.files.toml_input import validate
 
 Record = TypeVar("Record")
 Schema = dict[str, Any]
@@ -171,9 +176,41 @@ def _toml(value: Any) -> str:
 
 
 def documented(record: type[Record]) -> type[Record]:
-    """Let `help` of a record that is read from a file list the tables and keys of the file; decorates the class."""
+    """Let `help` of a record that is read from a file list the tables and keys of the file; decorates the class.
+
+    Editors complete its keys, and its constructor raises the InputError that a file with the same keys would.
+    """
+
+    def __init__(self: Any, /, **keys: Any) -> None:
+        try:
+            self.__pydantic_validator__.validate_python(ArgsKwargs((), keys), self_instance=self)
+        except ValidationError:
+            validate(record, keys, record.__name__.lower())
+            raise
+        finally:
+            if record.__init__ is not __init__:  # pydantic puts its own in place as it builds the class on first use
+                _begin_with(record, __init__)
+
     record.__doc__ = KeyedDocstring(record)  # type: ignore[assignment]
+    _begin_with(record, __init__)
     return record
+
+
+def _begin_with(record: Any, init: Callable[..., None]) -> None:
+    """Give a record its constructor, with a signature of its keys; ... stands for a default that is made."""
+    keys = [
+        inspect.Parameter(
+            key.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=(inspect.Parameter.empty if key.default_factory is MISSING else ...)
+            if key.default is MISSING
+            else key.default,
+            annotation=key.type,
+        )
+        for key in fields(record)
+        if key.name != "added"
+    ]
+    record.__init__, record.__signature__ = init, inspect.Signature(keys)
 
 
 class KeyedDocstring:

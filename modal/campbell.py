@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files import store
+from vanedamp.files.display import Plotted
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.mode_tracking import Approach, Tracks
 from vanedamp.modal.rotating import RotatingMatrices
@@ -49,8 +50,8 @@ class Crossing:
         return self.speed * RPM
 
 
-@dataclass(frozen=True, eq=False)
-class Campbell:
+@dataclass(frozen=True, eq=False, repr=False)
+class Campbell(Plotted):
     """Natural frequencies over the speed.
 
     speeds          (s,) rad/s, ascending: those asked for and those that following the modes took

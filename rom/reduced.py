@@ -27,6 +27,8 @@ __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 #: suffixes to the label of a displacement along a cavity: transverse motion, rotation
 NORMAL, ROTATION = ".normal", ".rotation"
 
+#: natural frequencies that a model prints
+_SHOWN = 6
 _KIND = "reduced-model"
 # dimensions and units of the arrays, here and in the record
 _ARRAYS = {
@@ -126,7 +128,7 @@ class ReducedModel(Displayed):
         cls,
         mass: np.ndarray,
         stiffness: np.ndarray,
-        interface: Mapping[str, Sequence[float] | np.ndarray],
+        interface: Mapping[str, int | Sequence[float] | np.ndarray],
         *,
         damping: np.ndarray | None = None,
         damping_ratio: float | None = None,
@@ -134,10 +136,16 @@ class ReducedModel(Displayed):
         base_load: np.ndarray | None = None,
         **others: Any,
     ) -> ReducedModel:
-        """Return a model from dense matrices (n, n) and the row (n,) of every interface label.
+        """Return a model from dense matrices (n, n) and interface labels, such as {"tip": 3, "c1": [0.5, 0.5, 0, 0]}.
 
+        A label stands for a coordinate, by its number from 0, or for the displacement row @ q, by its row (n,).
         Damping is either a matrix (n, n) or the ratio of every mode. Raises ReducedModelError.
         """
+        if not isinstance(interface, Mapping):
+            raise ReducedModelError(
+                "interface: expected numbers or rows by label, such as {'tip': 0}; the matrices are "
+                "from_matrices(mass, stiffness, interface, damping=damping)"
+            )
         if (damping is None) == (damping_ratio is None):
             raise ReducedModelError("damping: give either the matrix `damping` or the `damping_ratio` of every mode")
         size = len(np.atleast_1d(mass))
@@ -157,13 +165,19 @@ class ReducedModel(Displayed):
             stiffness=stiffness,
             interface=tuple(interface),
             selection=np.reshape(
-                [shaped(f"row of {label!r}", row, (size,)) for label, row in interface.items()], (-1, size)
+                [shaped(f"row of {label!r}", _row(label, row, size), (size,)) for label, row in interface.items()],
+                (-1, size),
             ),
             directions=np.array([known.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
             base_load=np.zeros((size, 3)) if base_load is None else base_load,
             damping_ratio=damping_ratio,
             **others,
         )
+
+    def shown(self) -> dict[str, Any]:
+        """Return what a model prints: the frequencies first."""
+        first = ", ".join(f"{frequency:.6g}" for frequency in self.natural_frequencies_hz[:_SHOWN])
+        return {"frequencies_hz": first + ", ..." * (self.size > _SHOWN)} | super().shown()
 
     @property
     def size(self) -> int:
@@ -360,6 +374,15 @@ class ReducedModel(Displayed):
         if label not in self.interface:
             raise ReducedModelError(f"no interface coordinate {label!r}; there are: {', '.join(self.interface)}")
         return self.interface.index(label)
+
+
+def _row(label: str, given: Any, size: int) -> Any:
+    """Return the row (size,) of a coordinate's number; a row as it is."""
+    if not isinstance(given, int | np.integer):
+        return given
+    if not 0 <= given < size:
+        raise ReducedModelError(f"interface: {label!r}: expected the number of a coordinate, 0 to {size - 1}")
+    return np.eye(size)[given]
 
 
 def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.ndarray | None) -> np.ndarray:

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.resonance import chosen_resonance
+from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.rom.reduced import NORMAL, ReducedModel
+from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
 
 #: mass of the body over the structure's, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
+#: frequency of a body on its contact over the resonance's, at least and at most
+_STIFFNESS = (10.0, 30.0)
 #: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
@@ -27,6 +29,13 @@ Which body reduces a resonance most? `vanedamp optimise {file}` varies mass, gap
 _CASE_NOTE = """\
 The parametric vane cluster. `vanedamp modal {file}` computes its modes, `vanedamp reduce {file}` a model for scenes,
 `vanedamp check {file}` says what it means. SI units; every key: `vanedamp schema case`."""
+_LEVEL_NOTE = """\
+resonance_amplitude: {level}."""
+_AT_STRENGTH = "at this amplitude the stress reaches {share:.0%} of the case's fatigue strength"
+_NO_STRENGTH = "that of the shipped cluster; the model's case has no fatigue strength, set your own"
+_CONTACT_NOTE = """\
+The stiffness is that of the model's wall under a static force, without the resonance's share, and keeps a body on it
+at 10 to 30 times the frequency of the resonance. Replace it by one that is measured or computed for the pair."""
 _STRUCTURE_NOTE = """\
 In place of these keys a reduced model: model = "rom" and file = "rom.h5", with interface labels at excitation.at and
 cavity.floor (`vanedamp new scene --rom rom.h5` writes such a scene)."""
@@ -55,10 +64,9 @@ def template(kind: str, file: Path, rom: Path | None = None) -> Template:
         if rom is not None:
             raise InputError("--rom: is for a scene or a study; a case is what a reduced model is made from")
         return _case(file)
-    data = _scene(file, rom)
+    data = _scene(file, rom, blocks=kind == "scene")
     if kind == "scene":
-        notes = {"": _SCENE_NOTE.format(file=file.name)} | ({"structure": _STRUCTURE_NOTE} if rom is None else {})
-        return data, notes
+        return data, {"": _SCENE_NOTE.format(file=file.name)} | _notes(rom)
     del data["sweep"]
     low, high = (_rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
     data["time"] = {"periods": 500, "transient": 400}
@@ -68,6 +76,15 @@ def template(kind: str, file: Path, rom: Path | None = None) -> Template:
         "tolerances": {"gap": 0.1, "excitation": 0.2}, "map": {"mass_ratio": 4, "gap_ratio": 5},
     }  # fmt: skip
     return data, {"": _STUDY_NOTE.format(file=file.name)}
+
+
+def _notes(rom: Path | None) -> dict[str, str]:
+    """Return the comments on tables of a scene, of the shipped rigid model or of a reduced model."""
+    if rom is None:
+        return {"structure": _STRUCTURE_NOTE}
+    level = ReducedModel.load(rom).provenance.get("fatigue")
+    told = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level)
+    return {"excitation": _LEVEL_NOTE.format(level=told), "contact": _CONTACT_NOTE}
 
 
 def _case(file: Path) -> Template:
@@ -91,8 +108,11 @@ def _case(file: Path) -> Template:
     return data, notes | {"interface.c1_floor": _CAVITY_NOTE}
 
 
-def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
-    """Return a scene with gap and mass of a good damper, by the resonance of its structure."""
+def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
+    """Return a scene with gap and mass of a good damper, by the resonance of its structure.
+
+    blocks: bodies are blocks where a reduced model has the motion and the size of their cavity; they take longer.
+    """
     shipped = Structure.shipped()
     amplitude = _rounded(shipped.amplitude, 2)
     if rom is None:
@@ -103,7 +123,11 @@ def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
         place: dict[str, Any] = {}
         cavities, near = [{"name": "c1"}], [shipped.frequency] * 2
     else:
-        structure, place, cavities, near = _on_model(rom)
+        model = ReducedModel.load(rom)
+        structure, place, cavities, near = _on_model(model, rom)
+        if (level := model.provenance.get("fatigue")) is not None:
+            place["at"], near = level["at"], [level["frequency_hz"]] * 2
+            amplitude = _rounded(level["amplitude"], 2)
     excitation = place | {"frequency": near[0], "resonance_amplitude": amplitude}
     moving: dict[str, Any] = {"structure": structure, "excitation": excitation | {"resonance_near": near}}
     moving["cavity"] = [cavity | {"gap": amplitude} for cavity in cavities]
@@ -112,13 +136,21 @@ def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
         structure["file"] = _beside(rom, file.parent)
     mass, gap = _rounded(_MASS_RATIO * resonance.mass / len(cavities)), _rounded(_GAP_RATIO * amplitude)
     frequencies = [_rounded(share * resonance.frequency) for share in (_RUN, *_SWEEP)]
+    bodies = [{"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities]
+    contact: dict[str, Any] = {}
+    if rom is not None:
+        contact = {"contact": {"law": "compliant", "stiffness": _contact_stiffness(model, cavities, resonance, mass)}}
+        for cavity, body in zip(cavities, bodies, strict=True):
+            if blocks and (size := _pocket(model, cavity["floor"])) is not None:
+                cavity["play"] = gap
+                length, height = (_rounded(extent - gap) for extent in size)
+                body |= {"shape": "block", "length": length, "height": height}
     return {
         "structure": structure,
         "excitation": excitation | {"frequency": frequencies[0]},
         "cavity": [cavity | {"gap": gap} for cavity in cavities],
-        "damper": [
-            {"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities
-        ],
+        "damper": bodies,
+        **contact,
         "gravity": {"acceleration": 9.81, "orientation_deg": 0.0},
         "time": {"periods": 1500, "transient": 1000},
         "sweep": {
@@ -128,13 +160,14 @@ def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
     }
 
 
-def _on_model(rom: Path) -> tuple[dict[str, Any], dict[str, Any], list[dict[str, Any]], list[float]]:
+def _on_model(
+    model: ReducedModel, rom: Path
+) -> tuple[dict[str, Any], dict[str, Any], list[dict[str, Any]], list[float]]:
     """Return structure, place of the force, cavities and range of the natural frequencies (Hz) of a reduced model.
 
     The force is at the label "shroud" or the first one; a cavity is where labels NAME_floor, NAME_left and NAME_right
     are, or a label NAME with its motion across, or else at the force.
     """
-    model = ReducedModel.load(rom)
     arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
     labels = [label for label, arm in zip(model.interface, arms, strict=True) if not arm and not label.endswith(NORMAL)]
     if not labels:
@@ -152,6 +185,42 @@ def _on_model(rom: Path) -> tuple[dict[str, Any], dict[str, Any], list[dict[str,
         raise InputError(f"{rom}: has rigid motions only; there is no resonance to reduce")
     structure = {"model": "rom", "file": str(rom.resolve())}
     return structure, {"at": at}, cavities, [float(frequencies[0]), float(frequencies[-1])]
+
+
+def _contact_stiffness(model: ReducedModel, cavities: list[dict[str, Any]], resonance: Resonance, mass: float) -> float:
+    """Return the stiffness of a contact, N/m: that of the softest wall under a static force, without the resonance.
+
+    Body and contact alone vibrate at _STIFFNESS times the resonance's frequency at least and at most: softer contacts
+    overlap by much of the gap, harder ones only take longer.
+    """
+    labels = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
+    rows = [model.interface.index(label) for label in labels]
+    squares, shapes = model.natural
+    elastic = np.arange(model.size) >= model.rigid_modes
+    resonant = np.argmin(np.where(elastic, abs(model.natural_frequencies_hz - resonance.frequency), np.inf))
+    elastic[resonant] = False
+    flexible = ((model.selection[rows] @ shapes[:, elastic]) ** 2 / squares[elastic]).sum(axis=1)
+    if model.residual_flexibility is not None:
+        flexible += np.diag(model.residual_flexibility)[rows]
+    low, high = (mass * (2 * np.pi * ratio * resonance.frequency) ** 2 for ratio in _STIFFNESS)
+    return _rounded(1.0 / min(max(flexible.max(), 1.0 / high), 1.0 / low), 2)
+
+
+def _pocket(model: ReducedModel, label: str) -> tuple[float, float] | None:
+    """Return length and height (m) of a rectangular cavity whose surfaces one rigid motion describes, or None.
+
+    The rotation is that about the surfaces' centroid, half of the height above the floor; its arm is their radius of
+    gyration.
+    """
+    turn, across = label + ROTATION, label + NORMAL
+    if not {turn, across} <= set(model.interface) or model.positions is None or model.arms is None:
+        return None
+    floor, centre = (model.interface.index(name) for name in (label, turn))
+    height = 2.0 * float(np.linalg.norm(model.positions[centre] - model.positions[floor]))
+    square = model.arms[centre] ** 2
+    # of a rectangle a x h: 12 (a + h) r^2 = a^3 + 3 a h^2 + h^3 + 3 h a^2 = (a + h)^3
+    length = float(np.sqrt(12.0 * square)) - height
+    return (length, height) if min(length, height) > 0.1 * max(length, height) else None
 
 
 def _beside(file: Path, folder: Path) -> str:

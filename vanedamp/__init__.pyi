@@ -20,7 +20,6 @@ from vanedamp.coupling.scene.waveform import Waveform as Waveform
 from vanedamp.coupling.simulation import simulate as simulate
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states
-from vanedamp.coupling.sweep.sweep import sweep as sweep
 from vanedamp.coupling.transients.ramp import ramp as ramp
 from vanedamp.coupling.transients.ramp_record import Ramp as Ramp
 from vanedamp.coupling.transients.ring_down import ring_down as ring_down
@@ -44,5 +43,6 @@ from vanedamp.studies.case.tables import Case as Case
 from vanedamp.studies.export.export import export as export
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study
+from vanedamp.studies.parallel_sweep import sweep as sweep
 from vanedamp.studies.pipeline.pipeline import pipeline as pipeline
 from vanedamp.studies.report.plot import plot as plot

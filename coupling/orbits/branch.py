@@ -12,7 +12,7 @@ from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.files.display import Displayed
+from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, frozen
 
 #: measures of an orbit and their units, each an array over the points of a branch
@@ -126,7 +126,7 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches(SceneRecord, Displayed):
+class Branches(SceneRecord, Plotted):
     """Branches of periodic orbits of a scene over one of its numbers.
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.files.display import Displayed
+from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, dataset, save
 
 #: results of each planar body
@@ -127,8 +127,10 @@ UNITS = {
 
 
 @dataclass(frozen=True, repr=False)
-class Response(Displayed):
+class Response(Plotted):
     """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods."""
+
+    UNITS: ClassVar[dict[str, str]] = UNITS
 
     status: Status
     """how the run ended"""

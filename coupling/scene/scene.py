@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from functools import partial
 from pathlib import Path
+from shutil import copyfile
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -405,11 +406,21 @@ class Scene(OpenRecord, Displayed):
         return validate(cls, data, str(path))
 
     def save(self, path: str | Path) -> None:
-        """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
-        from vanedamp.files.toml_output import toml
+        """Write the TOML file that `load` reads; files in its folder, such as a reduced model's, are relative to it.
 
+        A reduced model in memory is written to the same folder, as NAME_rom.h5.
+        """
+        from vanedamp.files.toml_output import toml
+        from vanedamp.rom import in_memory
+
+        data = self.to_dict()
+        if isinstance(self.structure, Rom) and in_memory.is_temporary(self.structure.file):
+            own = Path(path).with_name(f"{Path(path).stem}_rom.h5")
+            with replacing(own) as temporary:
+                copyfile(self.structure.file, temporary)
+            data["structure"]["file"] = str(own)
         with replacing(path) as temporary:
-            temporary.write_text(toml(relative(self.to_dict(), path)), encoding="utf-8")
+            temporary.write_text(toml(relative(data, path)), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
@@ -62,13 +63,28 @@ class Rigid:
         return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness_at(speed))
 
 
+def _file(model: Any) -> Any:
+    """Return the file of a reduced model in memory; anything else as it is."""
+    if isinstance(model, str | Mapping):
+        return model
+    from vanedamp.rom.in_memory import ReducedModel, file_of
+
+    return file_of(model) if isinstance(model, ReducedModel) else model
+
+
+def _structure(structure: Any) -> Any:
+    """Return the table of a reduced model in memory; anything else as it is."""
+    file = _file(structure)
+    return structure if file is structure else {"model": "rom", "file": file}
+
+
 @dataclass(frozen=True, config=STRICT)
 class Rom:
-    """A reduced model from a file."""
+    """A reduced model from a file, or in Python a `ReducedModel`."""
 
     model: Literal["rom"]
     """"rom": a reduced model"""
-    file: str
+    file: Annotated[str, BeforeValidator(_file)]
     """file of the reduced model (`vanedamp reduce`, `vanedamp import`), relative to the scene's"""
     modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
     """number of modes, the first ones (default: all); "auto": as many natural modes as the tolerance needs"""
@@ -85,7 +101,7 @@ class Rom:
             raise ValueError("attached: attachment modes go with natural = true and a number of modes")
 
 
-Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]
+Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model"), BeforeValidator(_structure)]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -13,7 +14,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
-from vanedamp.files.display import Displayed
+from vanedamp.files.display import Plotted, html_table
 from vanedamp.files.store import Variable, frozen
 
 #: peaks of the linear curves over the swept frequencies and their units, each an array over the other axes
@@ -21,10 +22,13 @@ PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
+#: columns of the table in a notebook, beside the axes, and its rows
+_SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
+_MOST_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(SceneRecord, Displayed):
+class Sweep(SceneRecord, Plotted):
     """Responses over the product of the axes; every array has the shape of the grid, in the axes' order.
 
     scene                 the scene of the sweep, with its [sweep] table
@@ -75,6 +79,19 @@ class Sweep(SceneRecord, Displayed):
     def shape(self) -> tuple[int, ...]:
         """Shape of the grid."""
         return self.status.shape
+
+    def _repr_html_(self) -> str:
+        """Return the table of points that a notebook shows, at most _MOST_ROWS of them."""
+        units = self.units() | {name: MEASURES.get(name, "") for name in _SHOWN}
+        points = itertools.product(*self.axes.values())
+        measures = zip(*(getattr(self, name).ravel() for name in _SHOWN), strict=True)
+        rows = ([*map(_text, point), *map(_text, values)] for point, values in zip(points, measures, strict=True))
+        rest = self.status.size - _MOST_ROWS
+        return html_table(
+            (f"{name} [{unit}]" if unit not in ("", "1") else name for name, unit in units.items()),
+            itertools.islice(rows, _MOST_ROWS),
+            f"and {rest} further points" if rest > 0 else "",
+        )
 
     def units(self) -> dict[str, str]:
         """Return the unit of every axis by its path."""
@@ -131,6 +148,10 @@ class Sweep(SceneRecord, Displayed):
             peaks={name: frozen(values[name]) for name in PEAKS if name in values},
             **given,
         )
+
+
+def _text(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _dimension(path: str) -> str:

@@ -13,6 +13,7 @@ from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, frozen
 
 if TYPE_CHECKING:
@@ -81,8 +82,8 @@ class RampRun:
         return float(getattr(self, name)[self.top]) if len(self.amplitude) else np.nan
 
 
-@dataclass(frozen=True, eq=False)
-class Ramp(SceneRecord):
+@dataclass(frozen=True, eq=False, repr=False)
+class Ramp(SceneRecord, Plotted):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the

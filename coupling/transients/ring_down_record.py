@@ -15,6 +15,7 @@ from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
+from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, frozen
 
 #: energies of a ring-down: at its start, lost, and at its end
@@ -35,8 +36,8 @@ class LinearMode:
     fixed_damping_ratio: float
 
 
-@dataclass(frozen=True, eq=False)
-class RingDown(SceneRecord):
+@dataclass(frozen=True, eq=False, repr=False)
+class RingDown(SceneRecord, Plotted):
     """The free motion of one natural mode, by its k turning points.
 
     scene: with its [ring_down] table; linear: the mode without bodies

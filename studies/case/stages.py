@@ -291,17 +291,12 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
     lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
     warnings += unit_doubts(structure, lowest)
-    table = case.calibration or CalibrationTable()
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
         inertia = base_inertia(case, matrices, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio, inertia)
         cavities = _cavities(case, matrices, modes.shapes[bending], functional)
-        strengths = case.strengths(structure.solid.domain.volumes)
-        if strengths:
-            spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
-            amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
-            fatigue = Fatigue(table.share, amplitude, spot)
+        fatigue = _fatigue(structure, modes, bending, functional)
     gyroscopic = None
     if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
         gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
@@ -309,6 +304,17 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, fatigue, warnings,
         time.perf_counter() - started, gyroscopic,
     )  # fmt: skip
+
+
+def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> Fatigue | None:
+    """Return the fatigue level of a mode; None without a fatigue strength."""
+    case = structure.case
+    table, strengths = case.calibration or CalibrationTable(), case.strengths(structure.solid.domain.volumes)
+    if not strengths:
+        return None
+    spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
+    amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
+    return Fatigue(table.share, amplitude, spot)
 
 
 def _cavities(
@@ -440,15 +446,16 @@ def reduction(
     spots: places of its first mode whose stresses are outputs; keep_recovery: keep the basis, by which responses are
     shown on the mesh.
 
-    The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
-    max_frequency, by default 1.5 times the first bending (of most effective mass along the case's direction; of a free
-    structure its first elastic mode). Craig-Bampton models have a block of quasi-static modes. A rotating structure is
-    reduced for all speeds up to the maximum of its case, and the number of modes suits standstill and that speed.
-    Raises LadderError when no model of up to _MOST modes meets the tolerance, and InputError for a structure that
-    rotates with another basis, or up to no speed.
+    The amplitude at the case's fatigue strength is in the model's provenance, and so is the estimate of its error. This
+    covers receptances of the whole interface up to max_frequency, by default 1.5 times the first bending (of most
+    effective mass along the case's direction; of a free structure its first elastic mode). Craig-Bampton models have a
+    block of quasi-static modes. A rotating structure is reduced for all speeds up to the maximum of its case, and the
+    number of modes suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the
+    tolerance, and InputError for a structure that rotates with another basis, or up to no speed.
     """
     rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
-    recovery = keep_recovery or bool(spots)
+    levelled = structure.case.response_label is not None and bool(structure.case.fatigue_strength)
+    recovery = keep_recovery or bool(spots) or levelled
     found = basis_named(basis)
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
@@ -479,9 +486,25 @@ def reduction(
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
     model = replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+    if levelled:
+        model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})
     if spots:
         model = with_hot_spots(structure, model, spots)
     return model if keep_recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
+
+
+def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, Any] | None:
+    """Return the fatigue level of a model's mode of interest with its frequency, for scenes; needs its recovery."""
+    assert model.recovery is not None
+    case = structure.case
+    model = model if case.rotation is None else model.at_speed(case.rotation.omega)
+    mode = _mode_of_interest(model, case)
+    frequency = model.natural_frequencies_hz[[mode]]
+    shapes = (model.recovery @ model.natural[1][:, [mode]]).T
+    level = _fatigue(structure, Modes(frequency, shapes, np.zeros(1)), 0, _functional(case, structure.matrices, at))
+    if level is None:
+        return None
+    return {"at": at, "frequency_hz": float(frequency[0]), "share": level.share, "amplitude": level.amplitude}
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vanedamp as vd
+from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.schemas import faults
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.rom.reduced import ReducedModel
@@ -75,7 +77,8 @@ def model(labels, damping_ratio=0.01):
         (["a_floor", "b_floor"], "a_floor", [{"name": "a", "floor": "a_floor"}, {"name": "b", "floor": "b_floor"}]),
     ],
 )  # fmt: skip
-def test_a_new_scene_of_a_reduced_model(folder, labels, at, cavities):
+def test_a_new_scene_of_a_reduced_model(folder, labels, at, cavities, capfd):
+    walls = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
     model(labels)
     (folder / "deep").mkdir()
     assert main(["new", "scene", "--rom", "rom.h5"]) == 0
@@ -85,10 +88,53 @@ def test_a_new_scene_of_a_reduced_model(folder, labels, at, cavities):
     # the mode that responds most, not the first
     assert scene.excitation.frequency == pytest.approx(0.988 * np.sqrt(2e8) / (2 * np.pi), rel=2e-3)
     assert sum(body.mass for body in scene.damper) == pytest.approx(0.02, rel=1e-3)
-    assert main(["check", "scene.toml"]) == 0
+    assert warnings_of_check(capfd) == []
+    # all modes but the one that responds most are the wall's flexibility, within the bounds of the contact's frequency
+    softest = max((0.2**2 / 1e8 + (0.1 * labels.index(side)) ** 2 / 9e8) for side in walls)
+    low, high = (scene.damper[0].mass * 2e8 * ratio**2 for ratio in (10, 30))
+    assert scene.contact.stiffness == pytest.approx(min(max(1 / softest, low), high), rel=0.05)
     assert tomllib.loads(Path("scene.toml").read_text())["structure"]["file"] == "rom.h5"
     assert main(["new", "scene", "--rom", "rom.h5", "-o", "deep/scene.toml"]) == 0
     assert Scene.load("deep/scene.toml").structure.file == str(folder / "rom.h5")
+
+
+def warnings_of_check(capfd):
+    """The warnings of `vanedamp check scene.toml`."""
+    capfd.readouterr()
+    assert main(["check", "scene.toml", "--json", "-"]) == 0
+    return json.loads(capfd.readouterr().out)["warnings"]
+
+
+def test_a_new_scene_takes_the_level_of_the_model_and_blocks_of_its_cavity(folder, capfd):
+    """A rectangle of 14 by 5 mm: its perimeter has the radius of gyration (14 + 5) / sqrt(12) mm."""
+    rows = {"shroud": [1.0, 0.3, 0.0], "c1": [0.9, 0.1, 0.4], "c1.normal": [0.0, 0.2, 0.1], "c1.rotation": [5, 3, 80]}
+    level = {"at": "c1", "frequency_hz": 1e4 / (2 * np.pi), "share": 0.7, "amplitude": 31.4e-6}
+    vd.ReducedModel.from_matrices(
+        np.eye(3), np.diag([1e8, 2e9, 9e9]), rows, damping_ratio=0.01, arms=[0, 0, 0, 19e-3 / np.sqrt(12)],
+        positions=[[0, 0, 0.2], [0, 0, 0.23], [0, 0, 0.23], [0, 0, 0.2325]], provenance={"fatigue": level},
+    ).save("rom.h5")  # fmt: skip
+    assert main(["new", "scene", "--rom", "rom.h5"]) == 0
+    scene = Scene.load("scene.toml")
+    assert (scene.excitation.at, scene.excitation.resonance_amplitude) == ("c1", 31e-6)
+    (cavity,), (body,) = scene.cavity, scene.damper
+    assert (body.shape, cavity.floor, cavity.play) == ("block", "c1", cavity.gap)
+    assert body.length + cavity.gap == pytest.approx(14e-3, rel=1e-3)
+    assert body.height + cavity.play == pytest.approx(5e-3, rel=1e-3)
+    assert warnings_of_check(capfd) == []
+    assert "70% of the case's fatigue strength" in Path("scene.toml").read_text().replace("\n# ", " ")
+    assert main(["new", "study", "--rom", "rom.h5"]) == 0
+    assert Study.load("study.toml").scene.damper[0].shape == "slider"
+
+
+def test_a_reduced_model_has_the_fatigue_level_of_its_modes(folder):
+    pytest.importorskip("dolfinx", reason="needs dolfinx")
+    Path("case.toml").write_text(DAMPED_BLOCK)
+    assert main(["modal", "case.toml", "--json", "modes.json"]) == 0
+    assert main(["reduce", "case.toml", "--modes", "4", "-o", "rom.h5"]) == 0
+    level, modal = ReducedModel.load("rom.h5").provenance["fatigue"], json.loads(Path("modes.json").read_text())
+    assert (level["at"], level["share"]) == ("tip", modal["fatigue"]["share"])
+    assert level["amplitude"] == pytest.approx(modal["fatigue"]["amplitude"], rel=1e-3)
+    assert level["frequency_hz"] == pytest.approx(modal["rigid"]["frequency_hz"], rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,12 @@ def test_matrices_of_another_code_become_a_reduced_model(tmp_path):
     assert "ReducedModel" in printed and (tmp_path / "rom.h5").is_file()
 
 
+def test_matrices_in_python_become_a_scene(tmp_path):
+    printed = run(program("other_matrices.md", "np.diag"), tmp_path)
+    assert "frequencies_hz: " in printed
+    assert Scene.load(tmp_path / "scene.toml").structure.file == str(tmp_path / "scene_rom.h5")
+
+
 def test_results_open_in_xarray(swept):
     pytest.importorskip("h5netcdf", reason="needs h5netcdf")
     printed = run(program("read_results.md", "import xarray"), swept)
