@@ -15,7 +15,7 @@ from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 45
+ORDER = 40
 KIND = "campbell"
 _ORDER, _MARK = "#64748b", "#111827"
 #: of modes beyond the colours

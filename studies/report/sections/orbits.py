@@ -26,7 +26,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
-ORDER = 15
+ORDER = 80
 KIND = "orbits"
 #: orbits of a file that are drawn
 _MOST_ORBITS = 6

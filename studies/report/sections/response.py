@@ -17,7 +17,7 @@ from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_orde
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.time_history import History, history_figure
 
-ORDER = 20
+ORDER = 60
 KIND = "response"
 HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
