@@ -126,6 +126,11 @@ def format_value(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
+def format_margin(margin: float) -> str:
+    """Return the margin of a crossing to the speeds of operation in words."""
+    return f"{margin:+.1%}" if margin else "within"
+
+
 def headline(
     x: np.ndarray,
     damped_mean: np.ndarray,

@@ -27,6 +27,8 @@ from vanedamp.studies.report.summary import summary
 _FOLDER = Path(__file__).parent
 #: scenes that a table can have side by side; more stand below each other
 _MOST_COLUMNS = 4
+#: scripts of the page by the kind of chart that needs them
+_SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response"}
 _SLIDERS = (
     'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
     "length and height tells whether that is enough."
@@ -120,8 +122,7 @@ def _html(results: Results, title: str | None) -> str:
         summary=beginning,
         contents=contents,
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
-        curves=(_FOLDER / "curves.js").read_text(encoding="utf-8") if page.charts["response"] else None,
-        player=(_FOLDER / "motion.js").read_text(encoding="utf-8") if page.charts["motion"] else None,
+        scripts=[(_FOLDER / name).read_text(encoding="utf-8") for name, kind in _SCRIPTS.items() if page.charts[kind]],
         blocks=blocks,
         provenance=_provenance(results),
         scenes=scenes,

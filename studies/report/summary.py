@@ -103,14 +103,14 @@ def _bodies(scene: Scene, mass: float) -> Iterator[str]:
 
 def _answer(best: ForcedResponse, curves: int) -> list[str]:
     """Return two sentences on the best response of some curves."""
-    found, which = best.headline, best.name if curves == 1 else f"The best of {curves} curves ({best.name})"
+    found, which = best.headline, f"The best of {curves} curves" if curves > 1 else "The curve"
     unit = "" if best.units == "1" else f" {best.units}"
     if not math.isfinite(found.peak_ratio):
         return [f"{best.sentence}."]
     at = f"{format_value(found.damped_peak_at)}{unit}"
     first = (
-        f"{which}: with the bodies the highest mean amplitude is {1e6 * found.damped_peak:.4g} µm at {at}, without them "
-        f"{1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
+        f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * found.damped_peak:.4g} µm "
+        f"at {at}, without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
         f"{found.peak_ratio:.1%} is left."
     )
     onset = "The bodies hit no wall" if found.onset is None else f"Impacts begin at {format_value(found.onset)}{unit}"
@@ -124,7 +124,7 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
 def _of_run(measures: Any) -> str:
     """Return a sentence on a run."""
     return (
-        f"At {measures['frequency']:.6g} Hz the mean of the periods' peaks is {1e6 * measures['amplitude_mean']:.4g} µm, "
-        f"with {measures['impacts_per_period']:.3g} impacts per period ({measures['classification']}, status "
+        f"At {measures['frequency']:.6g} Hz the mean of the periods' peaks is {1e6 * measures['amplitude_mean']:.4g} "
+        f"µm, with {measures['impacts_per_period']:.3g} impacts per period ({measures['classification']}, status "
         f"{measures['status']})."
     )
