@@ -15,7 +15,7 @@ from vanedamp.files.display import Displayed
 from vanedamp.files.store import Variable, dataset, save
 
 #: results of each planar body
-_OF_BODIES = ("tilt_max", "lift_share", "linearisation")
+_OF_BODIES = ("tilt_max", "lift_share", "linearisation", "wall_impacts")
 
 
 class Status(StrEnum):
@@ -205,6 +205,9 @@ class Response(Displayed):
     """fraction of the time that each body is off its floor [-]"""
     linearisation: tuple[float | None, ...] | None = None
     """what small tilts neglect over the smallest play, for each body [-]"""
+    wall_impacts: tuple[float, ...] | None = None
+    """mean number of impacts on its walls in a period, for each body of a scene in the plane; the others hit floors,
+    ceilings and each other [-]"""
     in_plane: PlanarSamples | None = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None

@@ -130,8 +130,9 @@ class _Trial:
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
         known, (undamped, fixed, peaks) = self.study.reference * damped, self.study.linear(design, self.sample[0])
-        attached = np.full(len(known), np.nan)
-        return headline(self.study.frequencies, known, known, attached, undamped, fixed, peaks, along_frequency=True)
+        none = np.full(len(known), np.nan)
+        curves = (known, known, none, none, none, undamped, fixed)
+        return headline(self.study.frequencies, *curves, peaks, along_frequency=True)
 
     def search(self, robust: bool, first: np.ndarray | None) -> Design:
         """Return the best design by differential evolution, from a first generation or from a Latin hypercube.

@@ -147,6 +147,10 @@ def response_along(
     undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
     swept, hertz = resonance_axis(sweep.scene, sweep.axes)
     tops = peaks_of(sweep, point) if axis == swept else {}
+    in_plane = {key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()}
+    impacts = cut["impacts_per_period"]
+    known = in_plane.get("wall_impacts")  # sliders hit walls, and each other
+    walls = impacts if known is None or np.isnan(known[ok]).any() else known.sum(axis=1)
     return ForcedResponse(
         name=name,
         axis=axis,
@@ -156,12 +160,10 @@ def response_along(
         undamped=undamped,
         fixed=fixed,
         energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
-        in_plane={
-            key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()
-        },
+        in_plane=in_plane,
         headline=headline(
-            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
-            axis == swept,
+            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], walls, impacts, undamped, fixed,
+            tops, axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
         settings=settings,

@@ -1,4 +1,6 @@
 // Mode shapes that swing: a button below the menu moves the visible mode between its two ends.
+const numbers = given => given.bdata ? new Float32Array(Uint8Array.from(atob(given.bdata), c => c.charCodeAt(0)).buffer) : given;
+
 for (const chart of document.querySelectorAll(".plot:has(+ .swing) .js-plotly-plot")) {
   const button = chart.closest(".plot").nextElementSibling.querySelector("button");
   const rest = chart.layout.meta;
@@ -9,7 +11,7 @@ for (const chart of document.querySelectorAll(".plot:has(+ .swing) .js-plotly-pl
     const mode = chart.data.findIndex(trace => trace.type === "mesh3d" && trace.visible);
     if (moved === null || moved.mode !== mode) {
       settle();
-      const ends = ["x", "y", "z"].map(axis => Float64Array.from(chart.data[mode][axis]));
+      const ends = ["x", "y", "z"].map(axis => numbers(chart.data[mode][axis]));
       moved = {mode, ends};
     }
     const swing = Math.cos((now - begun) / 320);

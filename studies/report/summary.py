@@ -113,7 +113,12 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
         f"at {at}, without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
         f"{found.peak_ratio:.1%} is left."
     )
-    onset = "The bodies hit no wall" if found.onset is None else f"Impacts begin at {format_value(found.onset)}{unit}"
+    onset = "The bodies hit no wall"
+    if found.onset is not None:
+        first_point = " or below, the first point" if found.onset == best.x[0] else ""
+        onset = f"Impacts on walls begin at {format_value(found.onset)}{unit}{first_point}"
+    if found.touched_below is not None:
+        onset += f"; below, from {format_value(found.touched_below)}{unit} on, a body hits its floor or ceiling"
     second = (
         f"{onset}; with the bodies fixed the maximum would be {1e6 * found.fixed_peak:.4g} µm at "
         f"{format_value(found.fixed_peak_at)}{unit}."
