@@ -15,6 +15,9 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
+#: fraction of the numbers around it below which a result is round-off
+_ROUND_OFF = 1e-12
+
 
 class _Top(NamedTuple):
     """Highest value of a curve, m, its place on the axis, and whether that is an edge of a range of frequencies."""
@@ -123,6 +126,11 @@ class Headline:
 def format_value(value: Any) -> str:
     """Return a value of an axis in a few digits; text as it is."""
     return str(value) if isinstance(value, str) else f"{value:.6g}"
+
+
+def without_round_off(value: float, scale: float) -> float:
+    """Return a value, or 0 where it is round-off of numbers of a scale."""
+    return 0.0 if abs(value) <= _ROUND_OFF * scale else value
 
 
 def format_margin(margin: float) -> str:

@@ -156,7 +156,8 @@ class Response(Displayed):
     impacts_per_period: float
     """mean number of impacts in a period"""
     events: int
-    """events of the whole run"""
+    """changes of the motion in the whole run, of which `solver.max_events` are allowed; `event_list` has another
+    length: an entry for each contact that hits, sticks, slips, detaches or comes to rest"""
     classification: str
     """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
     energy: dict[str, float]
