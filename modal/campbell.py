@@ -49,6 +49,11 @@ class Crossing:
         """Speed, 1/min."""
         return self.speed * RPM
 
+    def margin(self, operating: tuple[float, float]) -> float:
+        """Return how far the speed lies beyond a range of speeds, rad/s, over the nearest end; 0 within it."""
+        low, high = operating
+        return (self.speed - min(max(self.speed, low), high)) / (low if self.speed < low else high or 1.0)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Campbell(Plotted):
@@ -65,6 +70,7 @@ class Campbell(Plotted):
     crossings       with the engine orders, by speed
     approaches      of two modes: veerings and crossings
     gyroscopic      whether the modes have the gyroscopic coupling
+    operating       lowest and highest speed of operation, rad/s, to which crossings have a margin; None: not known
     warnings        where modes could not be followed, or are not among those computed
     """
 
@@ -78,6 +84,7 @@ class Campbell(Plotted):
     crossings: tuple[Crossing, ...]
     approaches: tuple[Approach, ...]
     gyroscopic: bool = False
+    operating: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -110,7 +117,11 @@ class Campbell(Plotted):
             "mode": self.modes.tolist(),
             "frequency_hz": self.frequencies_hz.tolist(),
             "orders": list(self.orders),
-            "crossings": [asdict(crossing) | {"rpm": crossing.rpm} for crossing in self.crossings],
+            "crossings": [
+                asdict(crossing) | {"rpm": crossing.rpm, "margin": self.operating and crossing.margin(self.operating)}
+                for crossing in self.crossings
+            ],
+            "operating": self.operating,
             "approaches": [asdict(approach) | {"rpm": approach.rpm} for approach in self.approaches],
             "error": self.error,
             "solved": self.solved.tolist(),
@@ -133,6 +144,8 @@ class Campbell(Plotted):
         attributes = {
             "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance)
         }  # fmt: skip
+        if self.operating is not None:
+            attributes["operating"] = list(self.operating)
         store.save(path, _KIND, variables, attributes)
 
     @classmethod
@@ -150,6 +163,7 @@ class Campbell(Plotted):
             crossings=crossings,
             approaches=approaches,
             gyroscopic=bool(attributes["gyroscopic"]),
+            operating=tuple(attributes["operating"]) if "operating" in attributes else None,
             warnings=tuple(json.loads(attributes["warnings"])),
             provenance=json.loads(attributes["provenance"]),
         )

@@ -28,6 +28,8 @@ from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.truncation import massless, with_attachment_modes
 
+#: error of the rigid model from which the sentence says why
+_NOT_RIGID = 0.5
 _WITHOUT_RESIDUAL: dict[str, Any] = {
     "residual_flexibility": None, "residual_recovery": None, "output_residual": None,
 }  # fmt: skip
@@ -199,7 +201,9 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
         extra = chosen.size - chosen.modes
         what += f" and {extra} attachment mode{'s' * (extra > 1)}"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
-    if rigid <= chosen.receptance:
+    if rigid > _NOT_RIGID:
+        sentence += " (its coordinates move alike, in one mode; here they do not, or higher modes answer as strongly)"
+    elif rigid <= chosen.receptance:
         sentence += " (one natural mode answers forces as well here; more are for higher frequencies and for impacts)"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"

@@ -15,8 +15,8 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: a damped response within this fraction of the one without bodies has not been touched by the bodies
-UNTOUCHED = 0.01
+#: fraction of the numbers around it below which a result is round-off
+_ROUND_OFF = 1e-12
 
 
 class _Top(NamedTuple):
@@ -35,7 +35,8 @@ class Headline:
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
-    onset                        first place where the bodies change the mean by more than 1 %
+    onset                        first place with impacts on walls
+    touched_below                first place below it where a body hits its floor or ceiling only, or another body
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
                                  resonances, and width of the undamped one
@@ -51,6 +52,7 @@ class Headline:
     fixed_peak_at: Any
     attached_mass_fraction: float
     onset: Any
+    touched_below: Any
     peak_at_edge: bool
     undamped_at_edge: bool
     fixed_at_edge: bool
@@ -126,11 +128,23 @@ def format_value(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
+def without_round_off(value: float, scale: float) -> float:
+    """Return a value, or 0 where it is round-off of numbers of a scale."""
+    return 0.0 if abs(value) <= _ROUND_OFF * scale else value
+
+
+def format_margin(margin: float) -> str:
+    """Return the margin of a crossing to the speeds of operation in words."""
+    return f"{margin:+.1%}" if margin else "within"
+
+
 def headline(
     x: np.ndarray,
     damped_mean: np.ndarray,
     damped_max: np.ndarray,
     attached: np.ndarray,
+    walls: np.ndarray,
+    impacts: np.ndarray,
     undamped: np.ndarray,
     fixed: np.ndarray,
     peaks: Mapping[str, float],
@@ -138,14 +152,15 @@ def headline(
 ) -> Headline:
     """Return the headline of damped curves (n,) over ascending x (n,), nan at points that are not ok.
 
-    undamped, fixed: linear curves (n,) at the points; peaks: of them between the points, by the names of
-    coupling.sweep.sweep.PEAKS, where they are known.
+    walls, impacts: impacts per period (n,) on walls, and of every kind; undamped, fixed: linear curves (n,) at the
+    points; peaks: of them between the points, by the names of coupling.sweep.sweep.PEAKS, where they are known.
     """
     ok = np.isfinite(damped_mean)
     free = _linear_top("undamped", x, undamped, peaks, along_frequency)
     held = _linear_top("fixed", x, fixed, peaks, along_frequency)
     top = _top(x[ok], damped_mean[ok], along_frequency)
-    touched = np.flatnonzero(np.abs(damped_mean - undamped) > UNTOUCHED * undamped)
+    onset = int(np.argmax(np.append(walls > 0.0, True)))
+    below = np.flatnonzero(impacts[:onset] > 0.0)
     resonances = [item.at for item in (free, held, top) if along_frequency and ok.any() and not item.at_edge]
     return Headline(
         damped_peak=top.height,
@@ -156,7 +171,8 @@ def headline(
         fixed_peak=held.height,
         fixed_peak_at=held.at,
         attached_mass_fraction=float(attached[ok][np.argmax(damped_mean[ok])]) if ok.any() else math.nan,
-        onset=plain(x[touched[0]]) if touched.size else None,
+        onset=plain(x[onset]) if onset < len(x) else None,
+        touched_below=plain(x[below[0]]) if below.size else None,
         peak_at_edge=top.at_edge,
         undamped_at_edge=free.at_edge,
         fixed_at_edge=held.at_edge,

@@ -66,7 +66,8 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; samples: in the plane, from the response's samples.
+    ok; samples: in the plane, from the response's samples; walls: (periods, b) impacts on walls, None where the method
+    does not count them.
     """
 
     tilt: np.ndarray
@@ -74,6 +75,7 @@ class Plane(NamedTuple):
     neglected: np.ndarray
     bound: float
     samples: Callable[[np.ndarray], PlanarSamples]
+    walls: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -241,10 +243,12 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
     neglected = plane.neglected * tilt**2
     parts = {"tilt_max": tilt, "lift_share": plane.lifted[window].sum(axis=0) / span, "linearisation": neglected}
     slider = np.isnan(plane.neglected)
-    figures = {
+    figures: dict[str, Any] = {
         name: tuple(None if slider[body] else float(value) for body, value in enumerate(values))
         for name, values in parts.items()
     }
+    if plane.walls is not None:
+        figures["wall_impacts"] = tuple(plane.walls[window].mean(axis=0).tolist())
     return figures, bool(np.any(neglected[~slider] > plane.bound))
 
 

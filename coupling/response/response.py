@@ -15,7 +15,7 @@ from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, dataset, save
 
 #: results of each planar body
-_OF_BODIES = ("tilt_max", "lift_share", "linearisation")
+_OF_BODIES = ("tilt_max", "lift_share", "linearisation", "wall_impacts")
 
 
 class Status(StrEnum):
@@ -158,7 +158,8 @@ class Response(Plotted):
     impacts_per_period: float
     """mean number of impacts in a period"""
     events: int
-    """events of the whole run"""
+    """changes of the motion in the whole run, of which `solver.max_events` are allowed; `event_list` has another
+    length: an entry for each contact that hits, sticks, slips, detaches or comes to rest"""
     classification: str
     """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
     energy: dict[str, float]
@@ -207,6 +208,9 @@ class Response(Plotted):
     """fraction of the time that each body is off its floor [-]"""
     linearisation: tuple[float | None, ...] | None = None
     """what small tilts neglect over the smallest play, for each body [-]"""
+    wall_impacts: tuple[float, ...] | None = None
+    """mean number of impacts on its walls in a period, for each body of a scene in the plane; the others hit floors,
+    ceilings and each other [-]"""
     in_plane: PlanarSamples | None = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None

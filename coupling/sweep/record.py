@@ -42,8 +42,8 @@ class Sweep(SceneRecord, Plotted):
     energy_share          (*grid, 4) fraction of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
     in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
-                          floor, what small tilts neglect over the smallest play; nan for sliders; empty for a scene
-                          of sliders
+                          floor, what small tilts neglect over the smallest play, nan for sliders; impacts on walls per
+                          period; empty for a scene of sliders
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;

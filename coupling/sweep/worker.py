@@ -28,7 +28,7 @@ MEASURES = {
     "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
 #: measures of each body in the plane and their units, each an array over the grid and the bodies
-IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1"}
+IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1", "wall_impacts": "1"}
 #: losses of energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")

@@ -85,8 +85,12 @@ class CampbellTable:
     """excitation frequencies over the frequency of rotation [-]"""
     modes: Annotated[Whole, Field(ge=1)] = 6
     """number of modes that are followed"""
+    operating: tuple[NonNegative, NonNegative] | None = None
+    """lowest and highest speed of operation, to which crossings have a margin, in the unit of the speeds"""
 
     def __post_init__(self) -> None:
+        if self.operating is not None and self.operating[0] > self.operating[1]:
+            raise ValueError("operating: expected the lowest speed, then the highest")
         if (self.speed is None) == (self.rpm is None):
             raise ValueError("give one of speed (rad/s) and rpm, a list or a range {start = 0, stop = 6000, num = 31}")
         key, given = ("rpm", self.rpm) if self.speed is None else ("speed", self.speed)
@@ -102,8 +106,16 @@ class CampbellTable:
     @property
     def speeds(self) -> np.ndarray:
         """Speeds (s,), rad/s."""
-        given, unit = (self.rpm, _RPM) if self.speed is None else (self.speed, 1.0)
-        return unit * np.array(axis_values(given or ()))
+        return self._unit * np.array(axis_values((self.rpm if self.speed is None else self.speed) or ()))
+
+    @property
+    def operation(self) -> tuple[float, float] | None:
+        """Lowest and highest speed of operation, rad/s."""
+        return None if self.operating is None else (self._unit * self.operating[0], self._unit * self.operating[1])
+
+    @property
+    def _unit(self) -> float:
+        return _RPM if self.speed is None else 1.0
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -397,7 +397,8 @@ def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | 
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
     diagram = campbell(rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report)
-    return replace(diagram, provenance={"matrices": dict(diagram.provenance), "versions": versions()})
+    provenance = {"matrices": dict(diagram.provenance), "versions": versions()}
+    return replace(diagram, operating=table.operation, provenance=provenance)
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) -> ReducedModel:

@@ -11,6 +11,7 @@ from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.headline import format_margin
 from vanedamp.studies.terminal import progress
 
 #: columns (modes) and rows (speeds) that are printed at most
@@ -46,11 +47,13 @@ def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:
         values = "".join(f"  {frequency:9.2f}" for frequency in diagram.frequencies_hz[: len(shown), row])
         yield f"{diagram.rpm[row]:10.1f}{diagram.speeds[row]:10.2f}{values}"
     if diagram.orders:
-        yield "crossings with engine orders\n  mode  order         rpm       rad/s          Hz"
+        margin = "" if diagram.operating is None else "  margin to operation"
+        yield f"crossings with engine orders\n  mode  order         rpm       rad/s          Hz{margin}"
     for crossing in diagram.crossings:
         yield (
             f"{crossing.mode + 1:6}{crossing.order:7g}{crossing.rpm:12.3f}{crossing.speed:12.4f}"
             f"{crossing.frequency_hz:12.4f}"
+            + ("" if diagram.operating is None else f"  {format_margin(crossing.margin(diagram.operating)):>19}")
         )
     if diagram.orders and not diagram.crossings:
         yield "  none"

@@ -180,6 +180,7 @@ COMMANDS = (
                 "inputs", nargs="+", metavar="DIR|FILE",
                 help="results (.h5), claims of studies (.claims.json), or folders",
             ),
+            argument("--title", help="title of the page"),
         ),
         writes={"output": (".html", ".htm")},
     ),

@@ -12,5 +12,5 @@ def run(arguments: Namespace) -> None:
     """Read the results and write the page."""
     results = collect(arguments.inputs)
     arguments.outputs.keep(results.files)
-    write_report(results, arguments.output)
+    write_report(results, arguments.output, arguments.title)
     print(f"{arguments.output}: report")

@@ -12,6 +12,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
+from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.terminal import progress
 
 
@@ -24,7 +25,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
     lines = [
-        f"{name:26} {_format(value)} {UNITS.get(name, '')}".rstrip()
+        f"{name:26} {_format(value, response.amplitude_max if UNITS.get(name) == 'm' else 1.0)} "
+        f"{UNITS.get(name, '')}".rstrip()
         for name, value in result.items()
         if not isinstance(value, dict | list)
     ]
@@ -35,5 +37,5 @@ def run(arguments: Namespace, scene: Scene) -> None:
     write_result(arguments, result, lines, output=save)
 
 
-def _format(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _format(value: Any, scale: float) -> str:
+    return f"{without_round_off(value, scale):.6g}" if isinstance(value, float) else str(value)

@@ -79,7 +79,7 @@ def fig10(curves: Curves) -> list[Claim]:
     peaks = {name: curves[name][0].peak() for name in kinds}
     figures = {f"reduction_{name}": value for name, value in reductions.items()}
     figures |= {f"peak_{name}": peak.height for name, peak in peaks.items()}
-    text = ", ".join(f"{name} {value:.1%}" for name, value in reductions.items())
+    text = ", ".join(f"{name} {value:.1%} gained" for name, value in reductions.items())
     like_single = reductions["separate"] >= reductions["single"] - _SLACK
     return [
         claim(

@@ -8,11 +8,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.studies.headline import UNTOUCHED
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
+#: a damped response within this fraction of the one without bodies has not been touched by the bodies
+_UNTOUCHED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ class Curve:
 
     @property
     def _changed(self) -> np.ndarray:
-        return np.abs(self.mean - self.undamped) > UNTOUCHED * self.undamped
+        return np.abs(self.mean - self.undamped) > _UNTOUCHED * self.undamped
 
     @property
     def scatter(self) -> dict[str, float]:

@@ -11,6 +11,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
+from vanedamp.studies import sweep_steps
 from vanedamp.studies.demo import claims
 from vanedamp.studies.demo.figure_file import FOLDER, Effort, Structure
 from vanedamp.studies.demo.figure_study import MODES, FigureStudy, Read, Session, prepare, print_claims, study
@@ -35,6 +36,8 @@ FIGURES = {
 }
 #: those that need no reduced model
 RIGID_FIGURES = ("fig9", "fig10")
+#: the sweep whose peak runs once more, for the motion of its body
+MOTION = "fig10_single"
 #: the file that makes the sweeps again
 PIPELINE = "pipeline.toml"
 EFFORT = Effort(points=61, periods=1500, transient=700)
@@ -89,6 +92,11 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
             print_claims(figure, time.perf_counter() - begun)
             sources += figure.sources
             results += [*(folder / source for source in figure.sources), folder / f"{name}{CLAIMS}"]
+    with _stage("the motion at a peak"):
+        motion = folder / f"{MOTION}_peak.h5"
+        result = Sweep.load(folder / f"{MOTION}.h5")
+        sweep_steps.run_peak(sweep_steps.prepare(result.scene, None), result, motion, print)
+        results += [motion] if motion.exists() else []
     _write_pipeline(folder, sources, rigid)
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect

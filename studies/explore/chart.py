@@ -86,7 +86,7 @@ def key_figures(response: ForcedResponse) -> list[Figure]:
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),
         Figure("most reduced in the band", _most_reduced(response)),
-        Figure("onset of the bodies", "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"),
+        Figure("onset of impacts", "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"),
         Figure("attached mass fraction", _ratio(headline.attached_mass_fraction)),
     ]
 

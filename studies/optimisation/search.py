@@ -130,8 +130,9 @@ class _Trial:
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
         known, (undamped, fixed, peaks) = self.study.reference * damped, self.study.linear(design, self.sample[0])
-        attached = np.full(len(known), np.nan)
-        return headline(self.study.frequencies, known, known, attached, undamped, fixed, peaks, along_frequency=True)
+        none = np.full(len(known), np.nan)
+        curves = (known, known, none, none, none, undamped, fixed)
+        return headline(self.study.frequencies, *curves, peaks, along_frequency=True)
 
     def search(self, robust: bool, first: np.ndarray | None) -> Design:
         """Return the best design by differential evolution, from a first generation or from a Latin hypercube.
@@ -238,12 +239,13 @@ def _sentence(
         of = f"the highest amplitude without bodies in the band, {study.reference:.3g} m"
     else:
         of = "the maximum without bodies (worst in the band)"
-    text = f"{_format_design(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
+    left = f"{1 - nominal.reduction:.0%} left"
+    text = f"{_format_design(nominal.design, study)} gains {nominal.reduction:.0%} of {of} ({left})"
     if asdict(table.tolerances) != _NONE:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
-            f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "
-            f"{_format_design(robust.design, study)} takes {robust.reduction:.0%}, "
+            f"; it gains {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "
+            f"{_format_design(robust.design, study)} gains {robust.reduction:.0%}, "
             f"{robust.reduction_tolerances:.0%} {kind}"
         )
     remarks = dict.fromkeys(remark for headline in headlines.values() for remark in headline.remarks)

@@ -308,6 +308,7 @@ class Report(Stage):
     """From all results to the page."""
 
     results: tuple[Path, ...]
+    title: str | None = None
 
     def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
         """Return the results that are not the pipeline's."""
@@ -315,7 +316,7 @@ class Report(Stage):
 
     def inputs(self) -> dict[str, Any]:
         """Return all results."""
-        return _digests([*self.takes, *self.results], self.file.parent) | _software()
+        return _digests([*self.takes, *self.results], self.file.parent) | {"title": self.title} | _software()
 
     def work(self, tools: Tools) -> str:
         """Write the page."""
@@ -323,7 +324,7 @@ class Report(Stage):
         from vanedamp.studies.report.results import collect
 
         files = [path for path in (*self.takes, *self.results) if path.exists()]
-        write_report(collect(files), self.outputs[0])
+        write_report(collect(files), self.outputs[0], self.title)
         return f"{len(files)} results on {self.outputs[0].name}"
 
 
@@ -353,7 +354,8 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         made += stage.outputs
     if pipeline.report is not None:
         further = tuple(base / name for name in pipeline.report.results)
-        yield Report("report", folder / pipeline.report.file, (folder / pipeline.report.file,), tuple(made), further)
+        page = folder / pipeline.report.file
+        yield Report("report", page, (page,), tuple(made), further, pipeline.report.title)
 
 
 def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path], pipeline: PipelineFile) -> Sweep:

@@ -73,6 +73,8 @@ class ReportStage:
 
     file: Annotated[str, Field(pattern=r"\.html?$")] = "report.html"
     """page, in the folder of the results"""
+    title: str | None = None
+    """title of the page"""
     results: tuple[str, ...] = ()
     """further result files to show, relative to the pipeline's"""
 

@@ -44,6 +44,7 @@ class ForcedResponse:
     undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks, from the static
                        deflection under the bodies' loads, which linear amplitudes leave out, too
+    confidence         half width of the 95 % confidence interval of that mean, nan where it is not known
     energy_share       (n, 4) of viscous, friction, impact and contact loss
     in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
                        bodies in the plane
@@ -62,6 +63,7 @@ class ForcedResponse:
     fixed: np.ndarray
     damped_max: np.ndarray
     damped_mean: np.ndarray
+    confidence: np.ndarray
     attached_mass_fraction: np.ndarray
     impacts_per_period: np.ndarray
     energy_share: np.ndarray
@@ -137,6 +139,7 @@ def response_along(
     ok = sweep.status[point] == "ok"
     damped = {
         "damped_max": sweep.amplitude_max_dynamic, "damped_mean": sweep.amplitude_mean_dynamic,
+        "confidence": sweep.amplitude_mean_confidence,
         "impacts_per_period": sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
     }  # fmt: skip
     cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
@@ -144,6 +147,10 @@ def response_along(
     undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
     swept, hertz = resonance_axis(sweep.scene, sweep.axes)
     tops = peaks_of(sweep, point) if axis == swept else {}
+    in_plane = {key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()}
+    impacts = cut["impacts_per_period"]
+    known = in_plane.get("wall_impacts")  # sliders hit walls, and each other
+    walls = impacts if known is None or np.isnan(known[ok]).any() else known.sum(axis=1)
     return ForcedResponse(
         name=name,
         axis=axis,
@@ -153,12 +160,10 @@ def response_along(
         undamped=undamped,
         fixed=fixed,
         energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
-        in_plane={
-            key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()
-        },
+        in_plane=in_plane,
         headline=headline(
-            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
-            axis == swept,
+            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], walls, impacts, undamped, fixed,
+            tops, axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
         settings=settings,

@@ -22,6 +22,8 @@ _IN_PLANE = (
     ("tilt_max", 1e3, "%{y:.4g} mrad"), ("lift_share", 1.0, "%{y:.3f}"), ("linearisation", 100.0, "%{y:.2g} %"),
 )  # fmt: skip
 _TITLE_WIDTH = 110  # characters of titles side by side
+#: smallest jump over the reference, and over the steps of the curve around it
+_JUMP, _ABRUPT = 0.03, 4.0
 #: title of an axis of amplitudes over the reference of a response
 RELATIVE = "amplitude / maximum without bodies"
 
@@ -46,11 +48,11 @@ def responses_figure(
                 figure, owners, shown, group, response, trace(curve, curves.x, getattr(curves, curve), colour)
             )
     for response, colour in zip(responses, colours, strict=True):
-        for drawn in (
-            trace("damped_max", response.x, response.damped_max, colour, mode="lines+markers", marker={"size": 4}),
-            trace("damped_mean", response.x, response.damped_mean, colour, marker={"size": 4}),
-        ):
-            _add_amplitude(figure, [response.name], shown, response.name, response, drawn)
+        gaps = jumps(response.damped_mean, response.confidence, response.reference)
+        _add_band(figure, shown, response, colour, gaps)
+        for curve in ("damped_max", "damped_mean"):
+            drawn = trace(curve, response.x, getattr(response, curve), colour, mode="lines+markers", marker={"size": 4})
+            _add_amplitude(figure, [response.name], shown, response.name, response, _parted(drawn, gaps))
     figure.update_yaxes(title_text=RELATIVE, rangemode="tozero")
     return _finish(figure, responses, height=560)
 
@@ -64,6 +66,43 @@ def _add_amplitude(
     values, hover = drawn["y"], f"{group}, {drawn['name']}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>"
     look = {**drawn, "y": values / response.reference, "customdata": values * 1e6, "hovertemplate": hover}
     _add(figure, owners, shown, **legend, **look)
+
+
+def jumps(mean: np.ndarray, confidence: np.ndarray, reference: float) -> np.ndarray:
+    """Return the places (k,) of the points before which a curve of means (n,) jumps: another motion begins there.
+
+    A jump is larger than the confidence of its ends, than a small fraction of the reference, and than what the curve
+    changes by around it.
+    """
+    steps = np.abs(np.diff(mean))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, 2, mode="edge"), 5)[:, [0, 1, 3, 4]]
+    sure = np.nan_to_num(confidence[1:]) + np.nan_to_num(confidence[:-1])
+    large = steps > np.maximum.reduce([_JUMP * reference * np.ones(len(steps)), sure, _ABRUPT * np.median(around, 1)])
+    return np.flatnonzero(large) + 1
+
+
+def _parted(drawn: Mapping[str, Any], gaps: np.ndarray) -> dict[str, Any]:
+    """Return a trace whose line ends before some of its points and begins again at them."""
+    x, y = drawn["x"], drawn["y"]
+    return {**drawn, "x": np.insert(x, gaps, x[gaps - 1]), "y": np.insert(y, gaps, np.nan)} if len(gaps) else {**drawn}
+
+
+def _add_band(
+    figure: go.Figure, shown: Collection[str] | None, response: ForcedResponse, colour: str, gaps: np.ndarray
+) -> None:
+    """Draw the 95 % confidence of the means as a band, in a piece between two jumps each."""
+    sure = np.isfinite(response.confidence) & np.isfinite(response.damped_mean)
+    for piece in np.split(np.arange(len(response.x)), gaps):
+        kept = piece[sure[piece]]
+        if not (response.confidence[kept] > 0.0).any():
+            continue
+        mean, half = response.damped_mean[kept] / response.reference, response.confidence[kept] / response.reference
+        _add(
+            figure, [response.name], shown, x=np.concatenate([response.x[kept], response.x[kept][::-1]]),
+            y=np.concatenate([mean + half, (mean - half)[::-1]]), fill="toself", fillcolor=colour, opacity=0.25,
+            mode="lines", line={"width": 0, "color": colour}, name="95 % confidence of the mean", hoverinfo="skip",
+            legendgroup=response.name, showlegend=False,
+        )  # fmt: skip
 
 
 def _distinct(

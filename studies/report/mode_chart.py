@@ -109,9 +109,12 @@ def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
 
 
 def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
-    """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
+    """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`; in mm.
+
+    The layout's `meta` has the nodes at rest, from which `modes.js` animates them.
+    """
     nodes, triangles = of
-    points = values["coordinates"][nodes]
+    points = 1e3 * values["coordinates"][nodes]
     chosen = range(min(len(values["frequency"]), max(_MOST_MODES, mode + 1)))
     shapes = [values["shape"][index].reshape(-1, 3)[nodes] for index in chosen]
     figure = go.Figure([_at_rest(points, triangles)])
@@ -126,11 +129,11 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
     axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
     figure.update_layout(
         height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
-        legend={"x": 0.0, "y": 0.0}, uirevision="kept",
+        legend={"x": 0.0, "y": 0.0}, uirevision="kept", meta=points.T.astype(np.float32).round(4).tolist(),
         updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
         scene={
-            "aspectmode": "data", "xaxis": axis | {"title": "x, m"}, "yaxis": axis | {"title": "y, m"},
-            "zaxis": axis | {"title": "z, m"}, "camera": {"eye": eye},
+            "aspectmode": "data", "xaxis": axis | {"title": "x, mm"}, "yaxis": axis | {"title": "y, mm"},
+            "zaxis": axis | {"title": "z, mm"}, "camera": {"eye": eye},
         },
     )  # fmt: skip
     return figure

@@ -40,7 +40,7 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
 
 def _format_optimum(optimum: Optimum) -> str:
     return (
-        f"{_bodies(optimum.design.bodies)}, {optimum.reduction:.0%}, within the tolerances "
+        f"{_bodies(optimum.design.bodies)}, {optimum.reduction:.0%} gained, within the tolerances "
         f"{optimum.reduction_tolerances:.0%}"
     )
 

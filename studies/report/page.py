@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,17 +13,22 @@ from typing import Any
 import jinja2
 import plotly.graph_objects as go
 import plotly.offline
+from markupsafe import Markup
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
 from vanedamp.studies.report.charts import Chart, chart
+from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.motion_page import environment
 from vanedamp.studies.report.results import Results, Section, sections
+from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
 #: scenes that a table can have side by side; more stand below each other
 _MOST_COLUMNS = 4
+#: scripts of the page by the kind of chart that needs them
+_SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response"}
 _SLIDERS = (
     'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
     "length and height tells whether that is enough."
@@ -36,16 +41,18 @@ class Page:
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
-    study   the study within which the results stand; None where they stand on their own
+    study   the study that the results belong to; None for results of their own
     charts  charts made so far, by the first part of their name
+    later   pieces that templates move to the energies, by the call `later`
     """
 
     results: Results
     known: Mapping[str, Section]
     names: Mapping[str, str]
     environment: jinja2.Environment
-    study: str | None = None
+    study: Study | None = None
     charts: Counter[str] = field(default_factory=Counter)
+    later: list[str] = field(default_factory=list)
 
     def chart(
         self, kind: str, figure: go.Figure, header: Sequence[str], rows: Iterable[Iterable[Any]], files: Iterable[str]
@@ -62,46 +69,77 @@ class Page:
         html = self.environment.get_template("motion.html").render(name=name, data=motion.to_json())
         return Chart(name, html, csv_text(motion.header(), motion.rows()), tuple(files))
 
-    def parts(self, file: str, study: str) -> str:
-        """Return the sections of the results that stand within the section of a file, as HTML."""
-        return replace(self, study=study).blocks(self.results.parts(file))
-
-    def blocks(self, files: Collection[str]) -> str:
-        """Return the sections of some results, as HTML."""
+    def blocks(self) -> str:
+        """Return the sections of all results, as HTML; those of a study have its title."""
+        studies: list[tuple[Study | None, set[str]]] = [
+            (result.record, set(self.results.parts(file))) for file, result in self.results.kinds[CLAIMS].items()
+        ]
+        own = set(self.results.by_file).difference(*(files for _, files in studies))
         blocks = []
         for kind, section in self.known.items():
-            results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
-            if results:
-                template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
-                shows = section.section(results, self)
-                blocks.append(self.environment.from_string(template).render(section=shows, study=self.study))
-        return "".join(blocks)
+            if kind == CLAIMS:
+                blocks.append(self._energies())
+            template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
+            for study, files in [(None, own), *studies]:
+                results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
+                if results:
+                    shows = section.section(results, replace(self, study=study))
+                    of = {"section": shows, "study": study, "later": self._put_off}
+                    blocks.append(self.environment.from_string(template).render(of))
+        return "".join([*blocks, self._energies()])
+
+    def _put_off(self, caller: Callable[[], str]) -> str:
+        """Keep a piece of a template for the section of the energies."""
+        self.later.append(caller())
+        return ""
+
+    def _energies(self) -> str:
+        """Return the pieces that were put off, below their heading; none are left."""
+        pieces = "".join(self.later)
+        self.later.clear()
+        return f"<h2>Where the energy goes</h2>{pieces}" if pieces else ""
 
 
-def write_report(results: Results, path: str | Path) -> None:
+def write_report(results: Results, path: str | Path, title: str | None = None) -> None:
     """Write the page. A picture that cannot be rendered is left out, and the page says so. Raises StoreError."""
     with decoding(*results.records):
-        html = _html(results)
+        html = _html(results, title)
     with replacing(path) as temporary:
         temporary.write_text(html, encoding="utf-8")
 
 
-def _html(results: Results) -> str:
+def _html(results: Results, title: str | None) -> str:
     """Return the text of the page."""
     names, by_file = results.names, results.by_file
     page = Page(results, sections(), names, _environment(names))
-    within = {part for file in by_file for part in results.parts(file)}
-    blocks = page.blocks([file for file in by_file if file not in within])
+    beginning = summary(results, page)
+    blocks, contents = _with_contents(page.blocks())
     scenes = {names[file]: _flat(result.scene) for file, result in by_file.items() if result.scene is not None}
+    bodies = any(result.scene["damper"] for result in by_file.values() if result.scene is not None)
     return page.environment.get_template("report.html").render(
+        title=title or ("Forced response with loose damper bodies" if bodies else "Vibration of the structure"),
+        bodies=bodies,
+        summary=beginning,
+        contents=contents,
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
-        curves=(_FOLDER / "curves.js").read_text(encoding="utf-8") if page.charts["response"] else None,
-        player=(_FOLDER / "motion.js").read_text(encoding="utf-8") if page.charts["motion"] else None,
+        scripts=[(_FOLDER / name).read_text(encoding="utf-8") for name, kind in _SCRIPTS.items() if page.charts[kind]],
         blocks=blocks,
         provenance=_provenance(results),
         scenes=scenes,
         **_compared(scenes),
     )
+
+
+def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
+    """Return sections with an anchor at every heading, and the headings by their anchors."""
+    contents: dict[str, Markup] = {}
+
+    def anchored(heading: re.Match[str]) -> str:
+        anchor = f"section-{len(contents)}"
+        contents[anchor] = Markup(heading[1])
+        return f'<h2 id="{anchor}">{heading[1]}</h2>'
+
+    return re.sub("<h2>(.*?)</h2>", anchored, blocks, flags=re.DOTALL), contents
 
 
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
@@ -119,9 +157,14 @@ def _anchor(name: str) -> str:
 
 
 def _provenance(results: Results) -> dict[str, dict[str, str]]:
-    """Return the known facts of every file, by its path; of the page itself under ""."""
-    return {"": versions()} | {
-        file: _flat(result.provenance) | {"sha256": digest(file)}
+    """Return the known facts of every file, by its path; of the page itself under "", which are not repeated."""
+    mine = versions()
+    return {"": mine} | {
+        file: {
+            key: value
+            for key, value in (_flat(result.provenance) | {"sha256": digest(file)}).items()
+            if mine.get(key.removeprefix("versions.")) != value
+        }
         for file, result in results.by_file.items()
         if result.provenance is not None
     }

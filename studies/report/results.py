@@ -25,7 +25,7 @@ class Result:
     record      content of its section
     provenance  how it was made, as nested data; None if the page has no table of that
     scene       what was run, as nested data, for the page's comparison of scenes
-    parts       names of files in its folder whose results stand within its section
+    parts       names of files in its folder whose results belong to it, a study
     """
 
     record: Any
@@ -79,7 +79,7 @@ class Results:
         return short_names(file for file, result in self.by_file.items() if result.provenance is not None)
 
     def parts(self, file: str) -> list[str]:
-        """Return the files whose results stand within the section of a file."""
+        """Return the files whose results belong to the study in a file."""
         results = self.by_file
         paths = [str(Path(file).with_name(name)) for name in results[file].parts]
         return [path for path in paths if path in results and not results[path].parts]

@@ -15,14 +15,23 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.response.response import PlanarSamples, Response
 from vanedamp.coupling.scene.registration import meets_body
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 from vanedamp.studies.report.motion import Motion, motion_of
-from vanedamp.studies.report.plane_history import ImpactsAtPlace, hits_in, impacts_by_place, samples_in_plane
+from vanedamp.studies.report.plane_history import (
+    ImpactsAtPlace,
+    hits_in,
+    impacts_by_place,
+    samples_in_plane,
+    slider_samples,
+)
 
 _MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
+#: distance of lines of impacts below the displacement, over its range
+_TICKS = 0.07
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +130,18 @@ class History:
         yield from np.column_stack([self.time, self.displacement, self.bodies, *plane]).tolist()
 
     def motion(self) -> Motion | None:
-        """Return the data for the player of the page; None without samples in the plane."""
-        if self.plane is None or self.scene is None:
+        """Return the data for the player of the page; None without bodies, or where a reduced model has moved."""
+        if self.scene is None or not self.bodies.shape[1]:
             return None
-        return motion_of(self.scene, self.time, self.displacement, self.bodies, self.plane, self.hits)
+        plane = self.plane
+        if plane is None:
+            if any(damper.form.planar for damper in self.scene.damper):  # a file of a version that kept no samples
+                return None
+            try:
+                plane = slider_samples(self.scene, self.displacement, self.bodies)
+            except (VanedampError, OSError):
+                return None
+        return motion_of(self.scene, self.time, self.displacement, self.bodies, plane, self.hits)
 
 
 def history_figure(history: History) -> go.Figure:
@@ -138,22 +155,24 @@ def history_figure(history: History) -> go.Figure:
         hovertemplate="%{y:.4g} µm", row=1, col=1,
     )  # fmt: skip
     impacts, struck = history.impacts, history.struck
-    at = np.interp(impacts, history.time, history.displacement)
+    lowest, reach = 1e6 * history.displacement.min(), 1e6 * np.ptp(history.displacement)
 
-    def add_impacts(mine: np.ndarray, name: str, colour: str) -> None:
+    def add_impacts(mine: np.ndarray, name: str, colour: str, line: int) -> None:
+        """Mark impacts by ticks below the displacement, in a line for each body."""
         figure.add_scatter(
-            x=1e3 * impacts[mine], y=1e6 * at[mine], name=name, mode="markers",
-            marker={"color": colour, "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
+            x=1e3 * impacts[mine], y=np.full(np.count_nonzero(mine), lowest - _TICKS * (line + 1) * reach), name=name,
+            mode="markers", marker={"color": colour, "size": 8, "symbol": "line-ns-open"}, hovertemplate="%{x:.6g} ms",
+            row=1, col=1,
         )  # fmt: skip
 
     if (struck < 0).any():
-        add_impacts(struck < 0, "impacts on stops", "#7f1d1d")
+        add_impacts(struck < 0, "impacts on stops", "#7f1d1d", history.bodies.shape[1])
     for stop in _stops(history.scene):
         figure.add_hline(y=1e6 * stop, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     for body in range(history.bodies.shape[1]):
         colour = COLOURS[body % len(COLOURS)]
         line = {"color": colour, "width": 1.2, "dash": DASHES[body % len(DASHES)]}
-        add_impacts(struck == body, f"impacts of body {body + 1}", colour)
+        add_impacts(struck == body, f"impacts of body {body + 1}", colour, body)
         figure.add_scatter(
             x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
             line=line, hovertemplate="%{y:.4g} µm", row=2, col=1,

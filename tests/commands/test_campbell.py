@@ -8,6 +8,7 @@ import pytest
 import vanedamp as vd
 from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.campbell import Campbell
+from vanedamp.studies.case.operation_tables import CampbellTable
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.report.campbell_picture import campbell_picture
@@ -77,6 +78,23 @@ def test_json_and_summary(folder, diagram, capsys):
         assert f"{crossing.rpm:.3f}" in printed and f"{crossing.frequency_hz:.4f}" in printed
 
 
+def test_crossings_have_a_margin_to_the_speeds_of_operation(folder, diagram, tmp_path, capsys):
+    first, last = diagram.crossings[0].rpm, diagram.crossings[-1].rpm
+    operating = f"operating = [{0.5 * first}, {0.8 * last}]"
+    (tmp_path / "case.toml").write_text(BLOCK + ROTATION + DIAGRAM + operating)
+    assert main(["campbell", str(tmp_path / "case.toml"), "-o", str(tmp_path / "c.h5")]) == 0
+    printed = capsys.readouterr().out
+    assert "+25.0%" in printed and "within" in printed
+    found = Campbell.load(tmp_path / "c.h5")
+    margins = [crossing["margin"] for crossing in found.to_json()["crossings"]]
+    assert (margins[0], margins[-1]) == (0.0, pytest.approx(0.25, rel=1e-6))
+    assert diagram.to_json()["crossings"][0]["margin"] is None
+    (band,) = campbell_figure(found).layout.shapes
+    assert (band.x0, band.x1) == (pytest.approx(0.5 * first), pytest.approx(0.8 * last))
+    with pytest.raises(ValueError, match="operating: expected the lowest speed"):
+        CampbellTable(rpm=(0.0, 1.0), operating=(2.0, 1.0))
+
+
 def test_gyroscopic_coupling_moves_the_modes(folder, diagram, tmp_path):
     """It is of second order in the speed for modes of unlike frequencies: none at standstill, and it counts later."""
     (tmp_path / "case.toml").write_text(BLOCK + ROTATION + "gyroscopic = true\n" + DIAGRAM)
@@ -106,7 +124,7 @@ def test_square_shaft_splits_its_pairs(tmp_path):
 
 def test_report_shows_chart_and_tables(folder, diagram):
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "<h2>Campbell diagram</h2>" in page and 'id="campbell-0"' in page
+    assert ">Campbell diagram</h2>" in page and 'id="campbell-0"' in page
     for crossing in diagram.crossings:
         assert f"{crossing.rpm:.3f}" in page and f"{crossing.speed:.4f}" in page
 

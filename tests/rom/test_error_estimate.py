@@ -76,6 +76,7 @@ def test_choice_is_the_smallest_that_stays_within():
     choice = ladder.choose(rungs, 0.05, rigid=0.06)
     assert choice.chosen.modes == 4
     assert choice.sentence == "4 modes: estimated error 4 %, rigid model 6 %"
+    assert "rigid model 140 % (its coordinates move alike" in ladder.choose(rungs, 0.05, rigid=1.4).sentence
     assert choice.met
     assert choice.to_json()["rigid"] == 0.06
     # where a rigid model is no worse, the sentence says what the modes are for

@@ -11,7 +11,7 @@ from vanedamp.coupling.engine.plane.automaton import advance, begin
 from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.engine.run import EventDrivenRun
-from vanedamp.coupling.numerics.codes import BOUNDED, DONE, FLOW, PERIOD, REDUCED, ROOT, UNDECIDED
+from vanedamp.coupling.numerics.codes import BOUNDED, DONE, FLOW, LOGGED, PERIOD, REDUCED, ROOT, UNDECIDED
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
 from vanedamp.coupling.response.recorder import plane_of
@@ -20,7 +20,7 @@ from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
 from vanedamp.coupling.system.assembly import Motion
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import LEFT, RIGHT, System
 
 
 class PlanarRun(EventDrivenRun):
@@ -37,6 +37,7 @@ class PlanarRun(EventDrivenRun):
         self.system, self.linearisation, self.flows = system, linearisation, empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.watched = new_state(system, modes, initial), new_event_functions(system, modes)
+        self.walls = np.zeros((len(records.impacts), system.bodies), np.int64)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
 
     def reuse(self, earlier: PlanarRun) -> None:
@@ -51,9 +52,11 @@ class PlanarRun(EventDrivenRun):
         return DONE if begin(self.system, self.state, self.records, self.log, self.scratch) else UNDECIDED
 
     def _advance(self, periods: int, max_events: int) -> int:
-        return int(advance(
+        code = int(advance(
             self.system, self.flows, self.state, self.watched, self.records, self.log, self.scratch, periods, max_events
         ))  # fmt: skip
+        self._count_walls(self.log[: self.counters[LOGGED]])
+        return code
 
     def _add_flow(self) -> None:
         self.flows = add_flow(self.flows, self.system, self.state.state)
@@ -96,5 +99,13 @@ class PlanarRun(EventDrivenRun):
     def _left(self) -> RestartState:
         return state_at(self.system, Motion(self.state.q, self.state.v))
 
+    def _count_walls(self, entries: np.ndarray) -> None:
+        """Count the impacts of each body on its walls, by periods."""
+        hits = entries[entries[:, 1] == IMPACT]
+        units = hits[:, 2].astype(int)
+        walls = np.isin(self.system.surface[units], (LEFT, RIGHT))
+        periods = np.minimum(hits[walls, 0] / self.system.period, len(self.walls) - 1).astype(int)
+        np.add.at(self.walls, (periods, self.system.body[units[walls]]), 1)
+
     def _plane(self) -> Plane:
-        return plane_of(self.system, self.records, self.linearisation)
+        return plane_of(self.system, self.records, self.linearisation)._replace(walls=self.walls)

@@ -17,7 +17,7 @@ from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 40
+ORDER = 20
 KIND = "calibration"
 _BEFORE, _AFTER, _MEASURED = "#64748b", COLOURS[0], COLOURS[1]
 _STEM = "#cbd5e1"

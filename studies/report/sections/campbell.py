@@ -11,11 +11,12 @@ import plotly.graph_objects as go
 
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.speed_range import RPM
+from vanedamp.studies.headline import format_margin
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 45
+ORDER = 40
 KIND = "campbell"
 _ORDER, _MARK = "#64748b", "#111827"
 #: of modes beyond the colours
@@ -36,7 +37,8 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 def _diagram(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
     chart = page.chart("campbell", campbell_figure(diagram), *campbell_table(diagram), [file])
     solved = ", ".join(f"{speed * RPM:.6g}" for speed in diagram.solved)
-    return {"file": file, "chart": chart, "record": diagram, "solved": solved}
+    margins = [diagram.operating and format_margin(each.margin(diagram.operating)) for each in diagram.crossings]
+    return {"file": file, "chart": chart, "record": diagram, "solved": solved, "margins": margins}
 
 
 def campbell_figure(diagram: Campbell) -> go.Figure:
@@ -53,6 +55,12 @@ def campbell_figure(diagram: Campbell) -> go.Figure:
         )  # fmt: skip
     _add_veerings(figure, diagram)
     _add_crossings(figure, diagram)
+    if diagram.operating is not None:
+        first, last = (speed * RPM for speed in diagram.operating)
+        figure.add_vrect(
+            first, last, fillcolor="#94a3b8", opacity=0.18, line_width=0, annotation_text="operation",
+            annotation_position="bottom left",
+        )  # fmt: skip
     dressed(figure, height=620)
     low, high = diagram.rpm[[0, -1]]
     figure.update_xaxes(title_text="speed, rpm", range=[low, high], domain=[0.0, 0.96], tickformat=",d")

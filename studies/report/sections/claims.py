@@ -1,18 +1,17 @@
-"""Studies: their claims with a verdict each, and the results that they rest on."""
+"""Studies: their claims with a verdict each."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 30
+ORDER = 90
 KIND = CLAIMS
 
 
@@ -28,8 +27,6 @@ def load(path: Path) -> Result:
     return Result(study, parts=tuple(study.sources))
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every study, and the sections of its results."""
-    return [
-        {"study": result.record, "parts": page.parts(file, result.record.study)} for file, result in results.items()
-    ]
+def section(results: Mapping[str, Result], page: Page) -> list[Study]:
+    """Return every study."""
+    return [result.record for result in results.values()]

@@ -14,7 +14,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.pictures import mode_picture
 from vanedamp.studies.report.results import Result
 
-ORDER = 50
+ORDER = 10
 KIND = "modes"
 
 

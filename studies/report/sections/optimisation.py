@@ -12,7 +12,7 @@ from vanedamp.studies.report.optimum_chart import optimisation_figure
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 40
+ORDER = 55
 KIND = "optimisation"
 
 

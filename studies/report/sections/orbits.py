@@ -26,7 +26,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
-ORDER = 15
+ORDER = 80
 KIND = "orbits"
 #: orbits of a file that are drawn
 _MOST_ORBITS = 6
@@ -41,8 +41,8 @@ _SYMBOLS = {
     "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
 }  # fmt: skip
 _POINT = "#9ca3af"  # of a sweep
-#: sizes of multipliers that the charts show at first
-_MODULI = (1e-3, 10.0)
+#: modulus as which smaller ones are drawn
+_SMALLEST = 1e-3
 
 
 def load(path: Path) -> Result:
@@ -210,7 +210,10 @@ def _branches_table(branches: Branches) -> Table:
 
 
 def _multipliers_figure(branches: Branches) -> go.Figure:
-    """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter."""
+    """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter.
+
+    Beyond the unit circle, the distance from it is the decimal logarithm of the modulus, so that all are seen.
+    """
     figure = make_subplots(rows=1, cols=2, column_widths=[0.46, 0.54], horizontal_spacing=0.14)
     wide, units = for_people(unit_of(branches.parameter))
     angle = np.linspace(0.0, 2 * np.pi, 181)
@@ -223,26 +226,43 @@ def _multipliers_figure(branches: Branches) -> go.Figure:
         name, look = branch_name(number, branch), {"color": _COLOURS[number % len(_COLOURS)]}
         parameter = np.repeat(wide * branch.parameter, branch.multipliers.shape[1])
         values = branch.multipliers.ravel()
+        size = np.maximum(np.abs(values), _SMALLEST)
+        drawn = values / np.maximum(size, 1.0) * (1.0 + np.log10(np.maximum(size, 1.0)))
         shared: dict[str, Any] = {"mode": "markers", "name": name, "legendgroup": name}
-        shared["visible"] = True if number == 0 else "legendonly"
         figure.add_scatter(
-            x=values.real, y=values.imag, customdata=parameter, row=1, col=1, showlegend=False,
+            x=drawn.real, y=drawn.imag, customdata=np.column_stack([parameter, values.real, values.imag]), row=1, col=1,
+            showlegend=False,
             marker={"size": 5, "color": parameter, "coloraxis": "coloraxis", "symbol": number}, **shared,
-            hovertemplate=f"{name}, %{{customdata:.8g}}: %{{x:.5g}} + %{{y:.5g}} i<extra></extra>",
+            hovertemplate=f"{name}, %{{customdata[0]:.8g}}: "
+            "%{customdata[1]:.5g} + %{customdata[2]:.5g} i<extra></extra>",
         )  # fmt: skip
         figure.add_scatter(
-            x=parameter, y=np.maximum(np.abs(values), 1e-16), row=1, col=2, marker=look | {"size": 4}, **shared,
-            hovertemplate=f"{name}, %{{x:.8g}}: %{{y:.6g}}<extra></extra>",
+            x=parameter, y=size, customdata=np.abs(values), row=1, col=2, marker=look | {"size": 4}, **shared,
+            hovertemplate=f"{name}, %{{x:.8g}}: %{{customdata:.6g}}<extra></extra>",
         )  # fmt: skip
-    figure.update_xaxes(title_text="real part", range=[-1.6, 1.6], row=1, col=1)
-    figure.update_yaxes(title_text="imaginary part", scaleanchor="x", range=[-1.6, 1.6], row=1, col=1)
+    decades = int(np.ceil(_beyond(np.concatenate([branch.multipliers.ravel() for branch in branches.branches]))))
+    for decade in range(1, decades + 1):
+        figure.add_scatter(
+            x=(1 + decade) * np.cos(angle), y=(1 + decade) * np.sin(angle), mode="lines", hoverinfo="skip",
+            line={"color": "#94a3b8", "width": 1, "dash": "dot"}, showlegend=False, row=1, col=1,
+        )  # fmt: skip
+        figure.add_annotation(x=0, y=1 + decade, text=f"{10**decade:g}", showarrow=False, row=1, col=1)
+    reach = 1.2 + decades
+    ticks = {"tickvals": [-1, 0, 1], "range": [-reach, reach]}
+    figure.update_xaxes(title_text="real part", row=1, col=1, **ticks)
+    figure.update_yaxes(title_text="imaginary part", scaleanchor="x", row=1, col=1, **ticks)
     figure.update_xaxes(title_text=axis_title(branches.parameter, units), row=1, col=2)
-    figure.update_yaxes(title_text="modulus", type="log", range=np.log10(_MODULI).tolist(), row=1, col=2)
+    figure.update_yaxes(title_text="modulus", type="log", range=[np.log10(_SMALLEST), max(decades, 1)], row=1, col=2)
     bar = {"title": {"text": axis_title(branches.parameter, units), "side": "top"}, "orientation": "h", "y": -0.2}
     figure.update_layout(
         coloraxis={"colorscale": "Viridis", "colorbar": bar | {"x": 0.2, "len": 0.4, "yanchor": "top"}}
     )
     return dressed(figure, height=560)
+
+
+def _beyond(values: np.ndarray) -> float:
+    """Return the decades by which the largest multiplier lies beyond the unit circle."""
+    return float(np.log10(np.abs(values[np.isfinite(values)]).max(initial=1.0)))
 
 
 def _multipliers_table(branches: Branches) -> Table:

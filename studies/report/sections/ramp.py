@@ -19,7 +19,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sweep_beside import sweeps_beside
 
-ORDER = 17
+ORDER = 70
 KIND = "ramp"
 _STATIONARY = "#0f172a"
 #: points of a curve that are drawn; of more periods, the largest of equally many each

@@ -10,7 +10,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 60
+ORDER = 30
 KIND = "reduced-model"
 
 

@@ -11,13 +11,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.time_history import History, history_figure
 
-ORDER = 20
+ORDER = 60
 KIND = "response"
 HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
@@ -34,7 +35,11 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 
 def _history(file: str, history: History, page: Page) -> dict[str, Any]:
+    energies = history.measures["energy"]
+    largest = max(map(abs, energies.values()), default=0.0)
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
+    shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
+    shown["hits"] = bool(history.hits)
     shown |= dict.fromkeys(("chart", "motion", "player", "impacts"))
     if len(history.time):
         late = history.late()

@@ -17,7 +17,7 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
-ORDER = 25
+ORDER = 75
 KIND = "ring_down"
 #: how the free motion begins
 _BEGUN = {

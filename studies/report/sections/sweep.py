@@ -45,7 +45,7 @@ from vanedamp.studies.report.map_chart import (
 from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
 
-ORDER = 10
+ORDER = 50
 KIND = "sweep"
 #: curves of a page, of more the best; drawn at first, of which the reader picks others; panels of the energy
 _MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
@@ -100,7 +100,7 @@ def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
     for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
         stem = page.names[file].removesuffix(".h5")
         if page.study is not None:
-            name = stem.removeprefix(page.study).strip("_").replace("_", " ") or model
+            name = stem.removeprefix(page.study.study).strip("_").replace("_", " ") or model
         else:
             name = model if models.count(model) == 1 else f"{model} ({stem})"
         responses += [replace(response, source=file) for response in forced_responses(sweep, name)]

@@ -362,7 +362,7 @@ def test_key_figures_are_those_of_the_sweep():
     # 1/sqrt(1 - 2 zeta^2) = 1.0001 below the natural frequency, where the level is reached
     assert shown["maximum without bodies X"].startswith("1000 µm at 15.91")
     assert shown["damped peak / X"] == f"{headline.peak_ratio:.3f}"
-    assert shown["onset of the bodies"] == f"{headline.onset:.6g} Hz"
+    assert shown["onset of impacts"] == f"{headline.onset:.6g} Hz"
 
 
 def test_linear_curves_hide_no_maximum():

@@ -140,7 +140,12 @@ def test_report_shows_branches_over_the_points_of_sweeps(hitting, followed, tmp_
     low, high = sorted(1e6 * branch.amplitude_mean[[special.index, special.index + 1]])
     assert low < mark["y"][0] < high
     plane = next(trace for trace in found["multipliers-0"] if trace.get("legendgroup") == "branch 0")
-    np.testing.assert_allclose(plane["x"] + 1j * np.asarray(plane["y"]), branch.multipliers.ravel())
+    values = branch.multipliers.ravel()
+    drawn = plane["x"] + 1j * np.asarray(plane["y"])
+    np.testing.assert_allclose(np.angle(drawn), np.angle(values), atol=1e-12)
+    np.testing.assert_allclose(
+        np.abs(drawn), np.where(np.abs(values) > 1, 1 + np.log10(np.abs(values)), np.abs(values))
+    )
     orbit = found["orbits-0"][0]
     assert max(orbit["y"]) == pytest.approx(1e6 * branch.amplitude_mean[branch.stable].max(), rel=1e-3)
     assert "pitchfork" in page

@@ -39,7 +39,9 @@ def made(axes, **curves):
 def test_curve_along_the_frequency():
     frequencies = [1.0, 2.0, 3.0, 4.0]
     undamped, mean = np.array([0.2, 0.8, 2.0, 0.5]), np.array([0.2, 0.805, 1.0, 0.6])
-    sweep = made({"excitation.frequency": frequencies}, amplitude_undamped=undamped, amplitude_mean_dynamic=mean)
+    impacts = np.array([0.0, 0.0, 2.0, 1.0])
+    curves = {"amplitude_undamped": undamped, "amplitude_mean_dynamic": mean, "impacts_per_period": impacts}
+    sweep = made({"excitation.frequency": frequencies}, **curves)
     (response,) = forced_responses(sweep)
     assert response.name == "rigid model"
     assert response.units == "Hz"
@@ -47,7 +49,7 @@ def test_curve_along_the_frequency():
     found = response.headline
     assert (found.undamped_peak_at, found.undamped_peak) == (3.0, 2.0)
     assert (found.damped_peak_at, found.peak_ratio) == (3.0, 0.5)
-    assert found.onset == 3.0
+    assert (found.onset, found.touched_below) == (3.0, None)
     assert found.points_left_out == 0
 
 
@@ -55,6 +57,15 @@ def test_onset_is_none_when_the_bodies_do_nothing():
     curve = np.array([1.0, 2.0])
     sweep = made({"excitation.frequency": [1.0, 2.0]}, amplitude_undamped=curve, amplitude_mean_dynamic=1.005 * curve)
     assert forced_responses(sweep)[0].headline.onset is None
+
+
+def test_onset_is_where_walls_are_hit():
+    """A block that hits its floor from the second point on, and a wall from the third."""
+    curve, walls = np.ones(3), np.array([[0.0], [0.0], [1.0]])
+    curves = {"amplitude_undamped": curve, "amplitude_mean_dynamic": curve, "impacts_per_period": np.arange(3.0)}
+    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, in_plane={"wall_impacts": walls}, **curves)
+    found = forced_responses(sweep)[0].headline
+    assert (found.onset, found.touched_below) == (3.0, 2.0)
 
 
 def test_points_are_put_in_order():

@@ -23,6 +23,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves
+from vanedamp.studies.report.forced_response_charts import jumps
 from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
@@ -90,7 +91,8 @@ def decoded(value):
 def test_curves_are_in_the_page(page, results):
     found = charts(page)
     kinds = ("response", "mistuning", "energy")
-    expected = {f"{kind}-{group}" for kind in kinds for group in (0, 1)} | {"history-0", "map-0", "mode-0"}
+    expected = {f"{kind}-{group}" for kind in kinds for group in (0, 1)}
+    expected |= {"summary-0", "history-0", "map-0", "mode-0"}
     assert set(found) == expected
     one, two = (Sweep.load(results / f"sweep_{name}.h5") for name in ("one", "two"))
     expected = {
@@ -143,7 +145,9 @@ def test_map_is_in_order_of_its_axes(page, results):
 
 
 def test_study_has_its_claims_and_its_sweeps(page):
-    assert "<h2>Four gaps</h2>" in page
+    assert re.search('<h2 id="[^"]+">Forced response: Four gaps</h2>', page)
+    energies, claims = page.index("Where the energy goes</h2>"), page.index("Claims of the studies</h2>")
+    assert page.index("Forced response: Four gaps") < energies < claims < page.rindex("Four gaps</h3>")
     assert "Half is &lt; enough" in page
     for verdict in ("shown", "not shown"):
         assert re.search(rf'class="verdict \w+">{verdict}<', page)
@@ -153,7 +157,7 @@ def test_study_has_its_claims_and_its_sweeps(page):
 
 def test_every_chart_has_its_data_and_their_provenance(page, results):
     links = dict(re.findall(r'download="([\w-]+)\.csv" href="data:text/csv;charset=utf-8;base64,([^"]+)"', page))
-    assert set(links) == set(charts(page))
+    assert set(links) == set(charts(page)) | {"motion-0"}
     table = list(csv.DictReader(io.StringIO(base64.b64decode(links["response-0"]).decode())))
     record = Sweep.load(results / "sweep_one.h5")
     mine = [row for row in table if row["response"] == "rigid model (sweep_one)"]
@@ -194,6 +198,35 @@ def test_browser_shows_the_page_without_a_complaint(page, results):
     assert told == []
 
 
+def test_page_begins_with_contents_and_the_answer(results, tmp_path):
+    """Every heading is in the contents, and the summary has the best curve of the sweeps."""
+    write_report(collect([results]), tmp_path / "titled.html", "Stage 3 <shroud>")
+    text = (tmp_path / "titled.html").read_text(encoding="utf-8")
+    assert "<title>Stage 3 &lt;shroud&gt;</title>" in text
+    assert "<h1>Stage 3 &lt;shroud&gt;</h1>" in text
+    headings = dict(re.findall('<h2 id="([^"]+)">(.*?)</h2>', text, flags=re.DOTALL))
+    assert dict(re.findall('<li><a href="#([^"]+)">(.*?)</a>', text, flags=re.DOTALL)) == headings
+    ratios = [
+        (record.amplitude_mean_dynamic.max(axis=-1) / record.peaks["undamped_peak"]).min()
+        for record in (Sweep.load(results / f"{name}.h5") for name in ("sweep_one", "sweep_two", "fig9_gaps"))
+    ]
+    assert f"{min(ratios):.1%} is left" in text
+    assert f"{1e3 * validate(Scene, OSCILLATOR, 'x').damper[0].mass:.4g} g" in text
+    (shape,) = charts(text)["mode-0"][1:2]
+    assert np.ptp(shape["x"]) == pytest.approx(100.0, rel=0.1)  # mm
+
+
+def test_lines_end_where_the_response_jumps():
+    x = np.linspace(0.0, 1.0, 41)
+    smooth = 0.2 + 0.5 * np.exp(-(((x - 0.5) / 0.2) ** 2))
+    sure = np.zeros(len(x))
+    assert len(jumps(smooth, sure, 1.0)) == 0
+    jumped = smooth - 0.2 * (np.arange(len(x)) >= 24)
+    assert jumps(jumped, sure, 1.0).tolist() == [24]
+    assert len(jumps(jumped, sure + 0.2, 1.0)) == 0  # the step may be chance
+    assert len(jumps(smooth[:1], sure[:1], 1.0)) == 0
+
+
 def test_page_fetches_nothing(page):
     markup = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"""(?:src|href|url)\s*[=(]\s*["']?(?:https?:)?//""", markup)
@@ -217,7 +250,7 @@ def test_files_of_other_kinds_are_passed_over_in_folders_only(results):
 def test_sweeps_alone_make_a_page(results, tmp_path):
     write_report(collect([results / "sweep_one.h5"]), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert set(charts(text)) == {"response-0", "mistuning-0", "energy-0"}
+    assert set(charts(text)) == {"summary-0", "response-0", "mistuning-0", "energy-0"}
     assert "<h2>Modes</h2>" not in text
 
 

@@ -1,0 +1,135 @@
+"""The summary at the beginning of a report: the structure, the bodies, and the answer with its chart."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rigid
+from vanedamp.coupling.sweep.grid import base_scene
+from vanedamp.studies.headline import format_value
+from vanedamp.studies.report.forced_response import (
+    ForcedResponse,
+    best_first,
+    forced_responses,
+    linear_curves,
+    model_name,
+)
+from vanedamp.studies.report.forced_response_charts import responses_figure
+from vanedamp.studies.report.pictures import mode_picture
+from vanedamp.studies.report.results import Results
+
+_COLUMNS = ("undamped", "fixed", "damped_max", "damped_mean", "confidence")
+
+
+def summary(results: Results, page: Any) -> dict[str, Any]:
+    """Return picture and facts of the structure, the bodies, and the answer; page: a studies.report.page.Page."""
+    answer: list[str] = []
+    scene, chart = None, None
+    found = [
+        replace(response, source=file)
+        for file, result in results.kinds["sweep"].items()
+        for response in forced_responses(result.record)
+    ]
+    if found:
+        best = best_first(found)[0]
+        sweep = results.kinds["sweep"][best.source].record
+        scene = base_scene(sweep.scene).replace(best.settings)
+        answer += _answer(best, len(found))
+        rows = zip(best.x.tolist(), *(getattr(best, name).tolist() for name in _COLUMNS), strict=True)
+        figure = responses_figure([best], [linear_curves(sweep, best)])
+        chart = page.chart("summary", figure, (best.axis, *_COLUMNS), rows, [best.source])
+    elif results.kinds["response"]:
+        history = next(iter(results.kinds["response"].values())).record
+        scene = history.scene
+        answer.append(_of_run(history.measures))
+    answer += [result.record.sentence for result in results.kinds["optimisation"].values()]
+    picture, facts, mass = _structure(results, scene)
+    bodies = [] if scene is None else list(_bodies(scene, mass))
+    return {"picture": picture, "facts": facts, "bodies": bodies, "answer": answer, "chart": chart}
+
+
+def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[str, str], float]:
+    """Return the picture of the first bending, facts by their names, and the mass that moves in it, kg."""
+    for file, result in results.kinds["modes"].items():
+        values, attributes = result.record
+        if "first_bending" in attributes:
+            mode = int(attributes["first_bending"])
+            png = mode_picture(file, mode)
+            facts = {"first bending": f"{values['frequency'][mode]:.2f} Hz, mode {mode + 1}"}
+            facts["mass that can move"] = f"{values['movable_mass'].max():.4g} kg"
+            mass = math.nan
+            if "rigid" in attributes:
+                rigid = json.loads(attributes["rigid"])
+                mass = rigid["mass"]
+                facts["mass of the rigid model"] = f"{mass:.4g} kg at {rigid['at']}"
+                facts["damping ratio"] = f"{rigid['damping_ratio']:.4g}"
+            if "fatigue" in attributes:
+                limit = json.loads(attributes["fatigue"])
+                name = f"amplitude at {limit['share']:.0%} of the fatigue strength"
+                facts[name] = f"{1e6 * limit['amplitude']:.4g} µm"
+            return None if png is None else base64.b64encode(png).decode(), facts, mass
+    if scene is None:
+        return None, {}, math.nan
+    facts, structure = {"structure": model_name(scene)}, scene.structure
+    if isinstance(structure, Rigid):
+        frequency = math.sqrt(structure.stiffness / structure.mass) / (2.0 * math.pi)
+        facts |= {"natural frequency": f"{frequency:.2f} Hz", "mass": f"{structure.mass:.4g} kg"}
+        return None, facts, structure.mass
+    if isinstance(structure, Prescribed):
+        facts["amplitude"] = f"{1e6 * structure.displacement_amplitude:.4g} µm"
+    return None, facts, math.nan
+
+
+def _bodies(scene: Scene, mass: float) -> Iterator[str]:
+    """Yield a line per cavity with bodies; mass: that they are compared with, kg, nan where it is not known."""
+    for cavity in scene.cavity:
+        inside = [damper for damper in scene.damper if damper.cavity == cavity.name]
+        play = "" if cavity.play is None else f", play {1e6 * cavity.play:.4g} µm"
+        words = []
+        for damper in inside:
+            sizes = [f"{key} {1e3 * (damper.measure(key) or 0.0):.4g} mm" for key in damper.form.measures]
+            of = f" ({damper.mass / mass:.2%} of the structure's)" if mass > 0.0 else ""
+            laws = [f"friction {damper.friction:.4g}", f"restitution {damper.restitution:.4g}"]
+            words.append(", ".join([f"{damper.shape} of {1e3 * damper.mass:.4g} g{of}", *sizes, *laws]))
+        if words:
+            yield f"Cavity {cavity.name}, gap {1e6 * cavity.gap:.4g} µm{play}: {'; '.join(words)}."
+
+
+def _answer(best: ForcedResponse, curves: int) -> list[str]:
+    """Return two sentences on the best response of some curves."""
+    found, which = best.headline, f"The best of {curves} curves" if curves > 1 else "The curve"
+    unit = "" if best.units == "1" else f" {best.units}"
+    if not math.isfinite(found.peak_ratio):
+        return [f"{best.sentence}."]
+    at = f"{format_value(found.damped_peak_at)}{unit}"
+    first = (
+        f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * found.damped_peak:.4g} µm "
+        f"at {at}, without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
+        f"{found.peak_ratio:.1%} is left."
+    )
+    onset = "The bodies hit no wall"
+    if found.onset is not None:
+        first_point = " or below, the first point" if found.onset == best.x[0] else ""
+        onset = f"Impacts on walls begin at {format_value(found.onset)}{unit}{first_point}"
+    if found.touched_below is not None:
+        onset += f"; below, from {format_value(found.touched_below)}{unit} on, a body hits its floor or ceiling"
+    second = (
+        f"{onset}; with the bodies fixed the maximum would be {1e6 * found.fixed_peak:.4g} µm at "
+        f"{format_value(found.fixed_peak_at)}{unit}."
+    )
+    return [first, "; ".join([second.removesuffix("."), *found.remarks_in(best.units)]) + "."]
+
+
+def _of_run(measures: Any) -> str:
+    """Return a sentence on a run."""
+    return (
+        f"At {measures['frequency']:.6g} Hz the mean of the periods' peaks is {1e6 * measures['amplitude_mean']:.4g} "
+        f"µm, with {measures['impacts_per_period']:.3g} impacts per period ({measures['classification']}, status "
+        f"{measures['status']})."
+    )
