@@ -5,20 +5,31 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.scene.rotation import SPEEDS
-from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import run_tasks
-from vanedamp.coupling.sweep.worker import COLUMNS, IN_PLANE, LOSSES, MEASURES, TEXTS, SweepTable, width_of
+from vanedamp.coupling.sweep.worker import (
+    COLUMNS,
+    IN_PLANE,
+    LOSSES,
+    MEASURES,
+    OF_A_POINT,
+    TEXTS,
+    SweepTable,
+    width_of,
+)
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
@@ -115,9 +126,16 @@ def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
     return dict(zip(PEAKS, values, strict=True))
 
 
-def warm_up() -> None:
-    """Compile the engine, or load it from the disk cache: once, before many processes would do it side by side."""
-    simulate(validate(Scene, _SMALLEST, "warm-up"))
+def warm_up(scene: Scene | None = None) -> None:
+    """Compile the engine, or load it from the disk cache: once, before many processes would do it side by side.
+
+    scene: without open choices, whose engine it is; None: a slider's. A scene that cannot run says so in its own run.
+    """
+    if scene is None:
+        simulate(validate(Scene, _SMALLEST, "warm-up"))
+        return
+    with suppress(*OF_A_POINT):
+        simulate(replace(scene, sweep={}, time=Time(periods=1, transient=0)))
 
 
 _SMALLEST = {
