@@ -247,7 +247,7 @@ def _sentence(
     else:
         of = "the maximum without bodies (worst in the band)"
     text = f"{_format_design(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
-    if asdict(table.tolerances) != _NONE:
+    if asdict(table.tolerances) != NO_DEVIATION:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
             f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "

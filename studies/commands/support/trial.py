@@ -22,7 +22,7 @@ from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import stage
 
 #: scenes of a set that are tried, and the time for all of them, s
-_SCENES, _SECONDS = 12, 3.0
+_SCENES, _SECONDS = 12, 4.0
 
 
 def mean_cost(scenes: Sequence[Scene]) -> float:
@@ -53,7 +53,7 @@ def _cost(scene: Scene, seconds: float) -> float:
     """Return the processor time of a run, s, from a trial of about `seconds`.
 
     Where contacts close in a new combination, the exact engines assemble a subsystem. A second trial, which has them
-    all, tells this cost, which falls with the number of periods, from that of the motion.
+    all, tells this cost, which grows as a power of the periods as combinations return, from that of the motion.
     """
     periods, marks, run, begun = scene.time.simulated, [0, 1], run_of(scene), time.process_time()
     first = [0.0]
@@ -74,8 +74,9 @@ def _cost(scene: Scene, seconds: float) -> float:
     for mark in marks[1:]:
         again.advance_to(mark)
         motion.append(time.process_time() - begun)
-    left, last, half = periods - marks[-1], marks[-1], next(n for n, m in enumerate(marks) if 2 * m >= marks[-1])
-    half = min(half, len(marks) - 2)
+    left, last = periods - marks[-1], marks[-1]
+    half = min(next(number for number, mark in enumerate(marks) if 2 * mark >= last), len(marks) - 2)
     moving = (motion[-1] - motion[half]) / (last - marks[half])
-    assembling = max((first[-1] - first[half]) / (last - marks[half]) - moving, 0.0)
-    return RUN + first[-1] + left * moving + assembling * last * math.log(periods / last)
+    assembled, before = (max(first[number] - motion[number], 1e-9) for number in (-1, half))
+    growth = min(max(math.log(assembled / before) / math.log(last / marks[half]), 0.0), 1.0)
+    return RUN + motion[-1] + left * moving + assembled * (periods / last) ** growth
