@@ -94,7 +94,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
-        peaks=_peaks(grid),
+        peaks=linear_tops(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
@@ -102,7 +102,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     )
 
 
-def _peaks(grid: Grid) -> dict[str, np.ndarray]:
+def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     """Return the peaks of the linear curves over the swept frequencies; nan where there is none."""
     swept = resonance_axis(grid.base, grid.axes)[0]
     if swept is None or len(set(grid.axes[swept])) < 2:

@@ -29,7 +29,7 @@ def run(arguments: Namespace) -> None:
         )
         with progress("optimise") as report:
             optimisation = optimise(study, pool, report, {"versions": versions()})
-    write_result(arguments, optimisation.to_json(), _summary(optimisation), output=optimisation.save)
+    write_result(arguments, optimisation.to_json(), _summary(optimisation), study.doubts, output=optimisation.save)
 
 
 def _summary(optimisation: Optimisation) -> Iterator[str]:

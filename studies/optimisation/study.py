@@ -254,6 +254,17 @@ class Study(NamedTuple):
             raise InputError(f"{path}: optimise.{str(error).removeprefix('sweep: ')}") from None
         return study
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the study may not mean: one body, by default, in place of the scene's several."""
+        count, (low, high) = len(self.scene.damper), self.table.variables.bodies
+        if low <= count <= high:
+            return ()
+        return (
+            f"optimise.variables.bodies: designs have {low if low == high else f'{low} to {high}'}, the scene has {count}; "
+            f"bodies = {count} keeps them",
+        )
+
     def _check_corners(self) -> None:
         """Raise InputError if the tolerances lead to an invalid scene."""
         variables, widths = self.table.variables, asdict(self.table.tolerances)

@@ -26,6 +26,7 @@ from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run, check_sweep
 from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
 from vanedamp.studies.commands.support.trial import mean_cost, tried
 from vanedamp.studies.scene_checks import load_scene
 from vanedamp.studies.workers import available_cores
@@ -63,11 +64,14 @@ def facts_of(scene: Scene) -> list[Fact]:
     if leaves_open(scene):
         warnings.append('modes or shape = "auto" is chosen by the run: figures here are of all modes, and of sliders')
         scene = _closed(scene)
-    else:
-        warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
+    warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
     if scene.excitation.signal is not None:
         warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
     resonance = _resonance(scene)
+    if resonance is not None and scene.excitation.signal is None:
+        warnings += gap_doubts(scene, _top(scene, resonance))
+    if whole.sweep:
+        warnings += sweep_doubts(_closed(whole))
     found = [*_of_structure(scene), *_of_level(scene, resonance), *_of_bodies(scene, resonance)]
     return [*found, *_of_cost(scene, whole), Fact("warnings", warnings)]
 

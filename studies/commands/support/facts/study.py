@@ -24,14 +24,16 @@ def facts(path: str | Path) -> list[Fact]:
     check_optimise(study, cores)
     band = study.frequencies
     scenes = scenes_of(study)
+    *found, warnings = facts_of(study.scene)
     return [
         Fact("commands", ["optimise"]),
-        *facts_of(study.scene),
+        *found,
         Fact("band_hz", [float(band[0]), float(band[-1])], "Hz", f"{len(band)} frequencies"),
         Fact("reference_amplitude", study.reference, "m", "undamped, that damped amplitudes are divided by"),
         Fact("designs", designs_of(study), "", "about"),
         Fact("scenes", scenes, "", "about, with samples of the tolerances"),
         Fact("seconds", scenes * mean_cost(_middle(study)) / cores, "s", f"on {cores} cores, by trials of a design"),
+        Fact("warnings", [*warnings.value, *study.doubts]),
     ]
 
 
