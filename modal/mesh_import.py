@@ -94,15 +94,17 @@ def convert(
 
 def group_names(
     path: str | os.PathLike[str], volumes: Collection[str] = (), facets: Collection[str] = ()
-) -> tuple[dict[int, list[str]], int]:
-    """Return the names that `convert` can make groups of by dimension (3: volumes), and the number of nodes.
+) -> tuple[dict[int, list[str]], int, float]:
+    """Return the names that `convert` can make groups of by dimension (3: volumes), number of nodes, largest extent.
 
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
     source = _source(Path(path), read_mesh(Path(path)))
     _check_disjoint(source.path, _grouped(source, volumes, facets)[1])
     _, groups = _grouped(source, None, None)
-    return {dimension: list(named) for dimension, named in groups.items()}, np.unique(source.cells).size
+    used = np.unique(source.cells)
+    extent = float(np.ptp(source.points[used], axis=0).max())
+    return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent
 
 
 def _grouped(

@@ -50,14 +50,22 @@ def doubts(
         if _outside(speed, SPEEDS):
             slip = f", as when young is in MPa (then {1e6 * young:.3g} Pa)" if young < 1e7 else ""
             found.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
-    if _outside(size, SIZES):
-        slip = "; of a mesh in millimetres, set mesh.scale = 1e-3" if size > SIZES[1] else ""
-        found.append(f"the mesh measures {size:.3g} m{slip}")
+    found += _of_size(size)
     if _outside(mass, MASSES):
         found.append(f"the mass is {mass:.3g} kg")
     if first_hz is not None and _outside(first_hz, FREQUENCIES):
         found.append(f"the first frequency is {first_hz:.4g} Hz")
     return _together(found, "mesh in m, young in Pa, density in kg/m^3")
+
+
+def size_doubts(size: float) -> tuple[str, ...]:
+    """Explain the same of the largest extent of a mesh, m, before it is read as a whole."""
+    return _together(_of_size(size), "mesh in m")
+
+
+def _of_size(size: float) -> list[str]:
+    slip = "; of a mesh in millimetres, set mesh.scale = 1e-3" if size > SIZES[1] else ""
+    return [f"the mesh measures {size:.3g} m{slip}"] if _outside(size, SIZES) else []
 
 
 def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from typing import NoReturn
 from vanedamp.files.errors import VanedampError, shortened
 from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.interrupts import swallowed_interrupts_again
+from vanedamp.studies.terminal import stages_shown
 
 BAD_INPUT = 2
 _INTERRUPTED = 130
@@ -92,7 +93,8 @@ def _run(words: Sequence[str]) -> int:
                 warnings.simplefilter("ignore", RuntimeWarning)
             arguments = _parser(words[0] if words else None).parse_args(words)
             input_file = getattr(arguments, "input", None)
-            arguments.run(arguments)
+            with stages_shown():
+                arguments.run(arguments)
             sys.stdout.flush()
     except BrokenPipeError:  # the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

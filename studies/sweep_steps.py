@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterable
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, Points, grid
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.sweep.sweep import sweep, warm_up
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import clear_leftovers
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.terminal import progress, stage
 
 #: samples per period of the run at the peak
 PEAK_SAMPLES = 200
@@ -59,11 +61,34 @@ def prepare(scene: Scene, checkpoint: Path | None, peak: bool = False) -> Prepar
 
 def run_points(prepared: Prepared, output: str | Path | None, pool: Executor | None, title: str = "sweep") -> Sweep:
     """Run every point that is not done, and write the result. The checkpoint stays until `finish`."""
+    if prepared.resumed < prepared.points.size:
+        compile_engine(ends_of(prepared.points), pool)
     with progress(title) as report:
         result = sweep(prepared.points, pool, report, prepared.checkpoint, prepared.provenance)
     if output:
         result.save(output)
     return result
+
+
+def ends_of(points: Grid) -> list[Scene]:
+    """Return the scenes of the first and the last point, without open choices."""
+    scenes = Points(points.base, points.choices)
+    return [scenes.scene(points.values(index)) for index in {0, points.size - 1}]
+
+
+def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> None:
+    """Compile the engine that scenes need, which a progress that begins afterwards does not count.
+
+    Left out are scenes with open choices, which decide what is compiled.
+    """
+    with stage("compile or load the engine"), suppress(BrokenExecutor):  # a scene that ends its worker does so again
+        for scene in scenes:
+            if leaves_open(scene):
+                continue
+            if pool is None:
+                warm_up(scene)
+            else:
+                pool.submit(warm_up, scene).result()
 
 
 def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable[[str], None]) -> None:

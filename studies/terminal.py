@@ -1,53 +1,145 @@
-"""Progress of long work: a bar on a terminal, a line now and then in a log."""
+"""Progress of long work: a bar on a terminal, a line now and then in a log; and what a command is at meanwhile."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
-#: seconds between two lines in a log
-_PATIENCE = 30.0
+#: seconds between two lines in a log, and those after which a log names a stage that has not ended
+_PATIENCE, _SOON = 30.0, 2.0
 _UNITS = (("days", 86_400.0), ("h", 3600.0), ("min", 60.0))
+#: how stages are shown: by the progress under way, by lines of their own, or (None, outside of commands) not at all
+_DISPLAY: ContextVar[_Lines | _Bar | _Alone | None] = ContextVar("display", default=None)
 
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show progress on standard error, with rate and time left: a bar on a terminal, elsewhere a line every 30 s."""
-    from tqdm import tqdm
+    """Show progress on standard error, with rate and time left: a bar on a terminal, elsewhere a line every 30 s.
 
-    if not sys.stderr.isatty():
-        yield _Lines(title)
-        return
-    with tqdm(desc=title, disable=None, leave=False) as bar:
-
-        def show(done: int, total: int) -> None:
-            if bar.total is None:
-                bar.initial = bar.n = done  # what was done before says nothing of the rate
-            bar.total = total
-            bar.update(done - bar.n)
-
+    The clock starts with the first call: what was done before, or compiled, says nothing of the rate.
+    """
+    show = _Bar(title) if sys.stderr.isatty() else _Lines(title)
+    before = _DISPLAY.set(show)
+    try:
         yield show
+    finally:
+        _DISPLAY.reset(before)
+        show.close()
+
+
+@contextmanager
+def stages_shown() -> Iterator[None]:
+    """Let stages show on standard error: in commands, not in functions that Python calls."""
+    before = _DISPLAY.set(_Alone())
+    try:
+        yield
+    finally:
+        _DISPLAY.reset(before)
+
+
+@contextmanager
+def stage(title: str) -> Iterator[None]:
+    """Name what a command is at: on a terminal at once, in a log if it takes longer than 2 s."""
+    display = _DISPLAY.get()
+    if display is None:
+        yield
+        return
+    before = display.enter(title)
+    try:
+        yield
+    finally:
+        display.enter(before)
+
+
+class _Alone:
+    """Stages of a command that counts nothing, or has not begun to: a line that is rewritten, or one line each."""
+
+    def __init__(self) -> None:
+        self.title = ""
+        self.timer: threading.Timer | None = None
+
+    def enter(self, title: str) -> str:
+        """Show another stage, or none (""). Returns the one before."""
+        before, self.title = self.title, title
+        if self.timer is not None:
+            self.timer.cancel()
+            self.timer = None
+        if sys.stderr.isatty():
+            print("\r\x1b[K" + (f"vanedamp: {title} ..." if title else ""), end="", file=sys.stderr, flush=True)
+        elif title:
+            self.timer = threading.Timer(_SOON, _print, [f"{title} ..."])
+            self.timer.daemon = True
+            self.timer.start()
+        return before
+
+
+class _Bar:
+    """A bar on a terminal."""
+
+    def __init__(self, title: str) -> None:
+        self.title, self.stage = title, ""
+        self.bar: Any = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.bar is None:
+            from tqdm import tqdm
+
+            self.bar = tqdm(desc=self._title(), total=total, initial=done, leave=False)
+        self.bar.total = total
+        self.bar.update(done - self.bar.n)
+
+    def _title(self) -> str:
+        return f"{self.title}: {self.stage}" if self.stage else self.title
+
+    def enter(self, title: str) -> str:
+        """Put a stage into the title. Returns the one before."""
+        before, self.stage = self.stage, title
+        if self.bar is not None:
+            self.bar.set_description(self._title())
+        return before
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self.bar is not None:
+            self.bar.close()
 
 
 class _Lines:
     """Lines in a log: how much is done, at which rate, and the time left. tqdm rewrites a single line."""
 
     def __init__(self, title: str) -> None:
-        self.title, self.started, self.said = title, time.monotonic(), time.monotonic()
+        self.title, self.stage = title, ""
+        self.started = self.said = 0.0
         self.before: int | None = None
 
     def __call__(self, done: int, total: int) -> None:
-        if self.before is None:
-            self.before = done  # what was done before says nothing of the rate
         now = time.monotonic()
+        if self.before is None:
+            self.before, self.started, self.said = done, now, now
         if now - self.said < _PATIENCE or done == total:
             return
         self.said = now
         rate = (done - self.before) / (now - self.started)
         left = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
-        print(f"vanedamp: {self.title}: {done} of {total}{left}", file=sys.stderr, flush=True)
+        stage = f", {self.stage}" if self.stage else ""
+        _print(f"{self.title}{stage}: {done} of {total}{left}")
+
+    def enter(self, title: str) -> str:
+        """Name a stage in the lines that follow. Returns the one before."""
+        before, self.stage = self.stage, title
+        return before
+
+    def close(self) -> None:
+        """End the lines."""
+
+
+def _print(text: str) -> None:
+    print(f"vanedamp: {text}", file=sys.stderr, flush=True)
 
 
 def duration(seconds: float) -> str:

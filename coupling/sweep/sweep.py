@@ -5,20 +5,31 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.scene.rotation import SPEEDS
-from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import run_tasks
-from vanedamp.coupling.sweep.worker import COLUMNS, IN_PLANE, LOSSES, MEASURES, TEXTS, SweepTable, width_of
+from vanedamp.coupling.sweep.worker import (
+    COLUMNS,
+    IN_PLANE,
+    LOSSES,
+    MEASURES,
+    OF_A_POINT,
+    TEXTS,
+    SweepTable,
+    width_of,
+)
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
@@ -83,7 +94,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
-        peaks=_peaks(grid),
+        peaks=linear_tops(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
@@ -91,7 +102,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     )
 
 
-def _peaks(grid: Grid) -> dict[str, np.ndarray]:
+def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     """Return the peaks of the linear curves over the swept frequencies; nan where there is none."""
     swept = resonance_axis(grid.base, grid.axes)[0]
     if swept is None or len(set(grid.axes[swept])) < 2:
@@ -115,9 +126,16 @@ def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
     return dict(zip(PEAKS, values, strict=True))
 
 
-def warm_up() -> None:
-    """Compile the engine, or load it from the disk cache: once, before many processes would do it side by side."""
-    simulate(validate(Scene, _SMALLEST, "warm-up"))
+def warm_up(scene: Scene | None = None) -> None:
+    """Compile the engine, or load it from the disk cache: once, before many processes would do it side by side.
+
+    scene: without open choices, whose engine it is; None: a slider's. A scene that cannot run says so in its own run.
+    """
+    if scene is None:
+        simulate(validate(Scene, _SMALLEST, "warm-up"))
+        return
+    with suppress(*OF_A_POINT):
+        simulate(replace(scene, sweep={}, time=Time(periods=1, transient=0)))
 
 
 _SMALLEST = {

@@ -36,7 +36,7 @@ TEXTS = ("status", "classification")
 COLUMNS = (*MEASURES, *LOSSES)
 #: faults of a point: errors of its parameters; all others, such as of imports, files and memory, would meet the
 #: next point as well
-_OF_A_POINT = (ArithmeticError, LookupError, RuntimeError, ValueError)
+OF_A_POINT = (ArithmeticError, LookupError, RuntimeError, ValueError)
 _LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
 _OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in _LINEAR]
 
@@ -144,7 +144,7 @@ def _run(
         row[_LINEAR] = _linear(chosen.scene)
         response = simulate(chosen.scene, start=start or chosen.start)
     except Exception as error:  # one broken point must not cost the others
-        if isinstance(error, StoreError | CacheError) or not isinstance(error, _OF_A_POINT):
+        if isinstance(error, StoreError | CacheError) or not isinstance(error, OF_A_POINT):
             where = ", ".join(f"{path} = {value}" for path, value in point.items())
             raise SweepError(
                 f"stopped at {where}: {type(error).__name__}: {error}; run the same again to go on from the checkpoint"

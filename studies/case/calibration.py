@@ -21,6 +21,7 @@ from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
+from vanedamp.studies.terminal import stage
 
 # a pole farther from the computed mode than this fraction of its frequency belongs to another one
 _NEAR = 0.1
@@ -233,6 +234,7 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
     return replace(case, material=material, support=replace(case.support, elastic=elastic))
 
 
+@stage("tuning to the measured frequencies")
 def _tuned(structure: Structure, table: TuneTable) -> Tuning:
     """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
     known = parts_by_name(structure.case, structure.solid.domain.volumes)
@@ -249,6 +251,7 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
     return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
 
 
+@stage("damping of the measured response")
 def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, list[str]]:
     """Return the damping of the mode nearest to a computed frequency, Hz, and anything odd about it."""
     frf = read_frf(table.frf, table.quantity, table.columns)

@@ -49,6 +49,7 @@ from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
+from vanedamp.studies.terminal import stage
 
 # a mode so near the first bending, relative, that moves its point with such a fraction of its compliance, is reported
 _NEAR, _NOTABLE = 0.02, 0.01
@@ -71,6 +72,7 @@ class Structure:
     rotating: RotatingMatrices | None = None
 
 
+@stage("mesh and matrices")
 def assemble(case: Case) -> Structure:
     """Return mesh, groups and matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is rejected before the work
@@ -299,7 +301,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         fatigue = _fatigue(structure, modes, bending, functional)
     gyroscopic = None
     if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
-        gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
+        with stage("gyroscopic modes"):
+            gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
     return ModalAnalysis(
         structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, fatigue, warnings,
         time.perf_counter() - started, gyroscopic,
@@ -312,7 +315,8 @@ def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.nd
     table, strengths = case.calibration or CalibrationTable(), case.strengths(structure.solid.domain.volumes)
     if not strengths:
         return None
-    spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
+    with stage("stress of the first bending"):
+        spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
     amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
     return Fatigue(table.share, amplitude, spot)
 
@@ -326,6 +330,7 @@ def _cavities(
     return {label: motion for label, motion in motions.items() if motion is not None}
 
 
+@stage("modes")
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
     """Return the case's modes, multiple ones turned to the response coordinate, or else to the bending's direction."""
     table, size = case.modes, matrices.free.size
@@ -401,6 +406,7 @@ def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | 
     return replace(diagram, operating=table.operation, provenance=provenance)
 
 
+@stage("stresses at hot spots")
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) -> ReducedModel:
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
@@ -463,17 +469,19 @@ def reduction(
     most = min(_MOST, structure.matrices.free.size // 4)
     asked = min(_START, most) if modes is None else modes
     while True:
-        if rotating is None:
-            bases = None
-            rich = [found.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
-        else:
-            assert found.speeds is not None  # as _greatest_speed has checked
-            bases = found.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
-            rich = [bases.model_at(speed) for speed in (0.0, greatest)]
-        grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
-        rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
-        ladder = worst_rungs([basis_ladder(model, basis, grid) for model, grid in zip(rich, grids, strict=True)])
-        choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
+        with stage(f"basis of {asked} modes"):
+            if rotating is None:
+                bases = None
+                rich = [found.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
+            else:
+                assert found.speeds is not None  # as _greatest_speed has checked
+                bases = found.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+                rich = [bases.model_at(speed) for speed in (0.0, greatest)]
+        with stage("estimate of the error"):
+            grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
+            rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
+            ladder = worst_rungs([basis_ladder(model, basis, grid) for model, grid in zip(rich, grids, strict=True)])
+            choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
         if modes is not None or choice.met:
             break
         if asked == most:
@@ -485,7 +493,8 @@ def reduction(
         model = found.cut(rich[0], choice.chosen.modes)
     else:
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
-        model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
+        with stage("speeds of rotation"):
+            model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
     model = replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
     if levelled:
         model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})

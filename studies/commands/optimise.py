@@ -12,6 +12,7 @@ from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
 from vanedamp.studies.optimisation.study import Study
+from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import available_cores, workers
 
@@ -22,9 +23,13 @@ def run(arguments: Namespace) -> None:
     arguments.outputs.keep(study.scene.files)
     check_optimise(study, arguments.workers or available_cores())
     print_resonance(arguments.input, study.scene)
-    with workers(arguments.workers) as pool, progress("optimise") as report:
-        optimisation = optimise(study, pool, report, {"versions": versions()})
-    write_result(arguments, optimisation.to_json(), _summary(optimisation), output=optimisation.save)
+    with workers(arguments.workers) as pool:
+        compile_engine(
+            map(study.with_bodies, range(study.table.variables.bodies[0], study.table.variables.bodies[1] + 1)), pool
+        )
+        with progress("optimise") as report:
+            optimisation = optimise(study, pool, report, {"versions": versions()})
+    write_result(arguments, optimisation.to_json(), _summary(optimisation), study.doubts, output=optimisation.save)
 
 
 def _summary(optimisation: Optimisation) -> Iterator[str]:

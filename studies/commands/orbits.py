@@ -15,6 +15,7 @@ from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
+from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
 
@@ -23,6 +24,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     check_run(scene)
     resonance = print_resonance(arguments.input, scene)
     started = time.perf_counter()
+    compile_engine([scene])
     with progress("orbits") as report:
         result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
     seconds = time.perf_counter() - started

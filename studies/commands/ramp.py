@@ -13,6 +13,7 @@ from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
+from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
 
@@ -20,6 +21,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     """Run the scene up and down."""
     resonance = print_resonance(arguments.input, ramped(scene))
     started = time.perf_counter()
+    compile_engine([ramped(scene)])
     with progress("ramp") as report:
         result = ramp(scene, report, {"versions": versions()})
     seconds = time.perf_counter() - started

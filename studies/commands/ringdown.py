@@ -13,6 +13,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
+from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
 #: rows of the table that is printed
@@ -26,6 +27,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     if table.start == "steady":
         check_run(scene)
     resonance = print_resonance(arguments.input, scene)
+    compile_engine([scene])
     with progress("ringdown") as report:
         result = ring_down(scene, report, {"versions": versions()})
     print_choices(arguments.input, result.estimate, result.advice, result.warnings)

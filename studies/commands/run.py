@@ -13,6 +13,7 @@ from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
 
@@ -20,6 +21,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     """Simulate the scene."""
     check_run(scene, arguments.samples)
 
+    compile_engine([scene])
     with progress("run") as report:
         response = simulate(scene, arguments.events, arguments.samples, progress=report)
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)

@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene, relative
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.checkpoint_file import clear
@@ -27,6 +28,7 @@ from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Stru
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
+from vanedamp.studies.sweep_steps import compile_engine, ends_of
 from vanedamp.studies.terminal import progress
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
@@ -61,8 +63,10 @@ class Session:
         if not self.resume:
             clear(checkpoint)
         write_scene(scene, path.with_suffix(".toml"), f"{figure.title}{f': {curve}' if curve else ''}")
+        points = grid(scene)
+        compile_engine(ends_of(points), self.pool)
         with progress(stem) as report:
-            found = sweep(scene, self.pool, report, checkpoint, provenance(scene))
+            found = sweep(points, self.pool, report, checkpoint, provenance(scene))
         found.save(path)
         clear(checkpoint)
         return found

@@ -25,10 +25,12 @@ from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
 from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.terminal import stage
 
 #: generations of a search, at least
 _GENERATIONS = 5
-_NONE = {"mass": 0.0, "gap": 0.0, "excitation": 0.0, "restitution": 0.0, "friction": 0.0, "orientation_deg": 0.0}
+#: of a design as it is
+NO_DEVIATION = {"mass": 0.0, "gap": 0.0, "excitation": 0.0, "restitution": 0.0, "friction": 0.0, "orientation_deg": 0.0}
 _Deviation = Mapping[str, float]
 
 
@@ -45,8 +47,10 @@ def optimise(
     started = time.perf_counter()
     table = study.table
     trial = _Trial(study, executor, progress, deviations(study))
-    first = trial.search(False, None)
-    second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
+    with stage("search as designed"):
+        first = trial.search(False, None)
+    with stage("search within tolerances"):
+        second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
@@ -55,7 +59,8 @@ def optimise(
     masses = np.linspace(*table.variables.mass_ratio, table.map.mass_ratio)
     gaps = np.linspace(*table.variables.gap_ratio, table.map.gap_ratio)
     designs = [Design(float(mass), float(gap), nominal.design.bodies) for mass in masses for gap in gaps]
-    amplitudes = trial.judge(designs, robust=False).reshape(len(masses), len(gaps))
+    with stage("map"):
+        amplitudes = trial.judge(designs, robust=False).reshape(len(masses), len(gaps))
     tried_designs, tried_amplitudes, tried_robust = zip(*trial.history, strict=True)
     best = {"nominal": nominal.design, "robust": robust.design}
     responses = {name: trial.response(design) for name, design in best.items()}
@@ -92,10 +97,13 @@ def deviations(study: Study) -> list[_Deviation]:
     """Return the sample of the tolerances: the design itself, and a Latin hypercube over those that are not zero."""
     widths = {name: width for name, width in asdict(study.table.tolerances).items() if width > 0}
     if not widths:
-        return [_NONE]
+        return [NO_DEVIATION]
     points = qmc.LatinHypercube(len(widths), seed=study.table.seed).random(study.table.samples)
     names, half = list(widths), np.array(list(widths.values()))
-    return [_NONE, *(_NONE | dict(zip(names, row, strict=True)) for row in ((2 * points - 1) * half).tolist())]
+    return [
+        NO_DEVIATION,
+        *(NO_DEVIATION | dict(zip(names, row, strict=True)) for row in ((2 * points - 1) * half).tolist()),
+    ]
 
 
 class _Trial:
@@ -241,7 +249,7 @@ def _sentence(
         of = "the maximum without bodies (worst in the band)"
     left = f"{1 - nominal.reduction:.0%} left"
     text = f"{_format_design(nominal.design, study)} gains {nominal.reduction:.0%} of {of} ({left})"
-    if asdict(table.tolerances) != _NONE:
+    if asdict(table.tolerances) != NO_DEVIATION:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
             f"; it gains {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -194,7 +194,7 @@ class Study(NamedTuple):
     frequencies: (f,) Hz, of the band.
     resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
     refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
-    damped amplitudes refer.
+    damped amplitudes refer. doubts: what the file may not mean.
     """
 
     scene: Scene
@@ -203,6 +203,7 @@ class Study(NamedTuple):
     resonance: Resonance
     amplitude: float
     reference: float
+    doubts: tuple[str, ...] = ()
 
     @property
     def mass(self) -> float:
@@ -246,8 +247,9 @@ class Study(NamedTuple):
         if force == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
         study = cls(
-            replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, float(reference)
-        )
+            replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, float(reference),
+            tuple(_doubts(scene, given)),
+        )  # fmt: skip
         try:
             study._check_corners()
         except InputError as error:
@@ -306,6 +308,13 @@ class Study(NamedTuple):
                 "gravity.orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
             }
         )
+
+
+def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:
+    """Yield that designs of one body, by default, take the place of the scene's several."""
+    count = len(scene.damper)
+    if count > 1 and "bodies" not in given.get("variables", {}):
+        yield f"optimise.variables.bodies: missing, so that designs have 1 body, the scene {count}: bodies = {count}"
 
 
 def _at(scene: Scene, frequency: float) -> Scene:

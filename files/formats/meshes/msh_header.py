@@ -1,9 +1,13 @@
-"""Header of a gmsh file without its mesh: names of groups, number of nodes. Needs no gmsh."""
+"""Header of a gmsh file without its elements: names of groups, number and extent of the nodes. Needs no gmsh."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from vanedamp.files.toml_input import InputError
 
@@ -11,10 +15,15 @@ _FORMAT, _NAMES, _NODES = b"$MeshFormat", b"$PhysicalNames", b"$Nodes"
 
 
 class MeshHeader(NamedTuple):
-    """Names of groups by their dimension (3: volumes, 2: facets, 1: edges, 0: points); nodes, None where binary."""
+    """Names of groups by their dimension (3: volumes, 2: facets, 1: edges, 0: points).
+
+    nodes: their number; extent: largest along an axis, in the file's unit of length. None where binary, the
+    extent in version 4.0 as well.
+    """
 
     groups: dict[int, list[str]]
     nodes: int | None
+    extent: float | None = None
 
 
 def read_header(path: str | Path) -> MeshHeader:
@@ -31,11 +40,31 @@ def read_header(path: str | Path) -> MeshHeader:
                         dimension, _, name = next(lines).decode().split(maxsplit=2)
                         groups[int(dimension)].append(name.strip().strip('"'))
                 elif line.strip() == _NODES:
-                    counts = next(lines).split() if binary == b"0" else []
-                    place = 1 if version.startswith(b"4") else 0
-                    return MeshHeader(groups, int(counts[place]) if counts else None)
+                    if binary != b"0":
+                        return MeshHeader(groups, None)
+                    counts, in_blocks = next(lines).split(), version.startswith(b"4")
+                    if version.startswith(b"4.0"):
+                        return MeshHeader(groups, int(counts[1]))
+                    points = np.array(list(_in_blocks(lines, int(counts[0])) if in_blocks else _one_by_one(lines)))
+                    return MeshHeader(groups, int(counts[in_blocks]), float(np.ptp(points, axis=0).max()))
     except (OSError, ValueError, StopIteration, KeyError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: cannot be read as a gmsh file ({error or 'it ends early'})") from None
     raise InputError(f"{path}: has no $Nodes; save it as a mesh")
+
+
+def _in_blocks(lines: Iterator[bytes], blocks: int) -> Iterator[list[float]]:
+    """Yield the coordinates of nodes of version 4: in blocks, each with the labels before the places."""
+    for _ in range(blocks):
+        count = int(next(lines).split()[3])
+        for line in islice(lines, count, 2 * count):
+            yield [float(word) for word in line.split()[:3]]
+
+
+def _one_by_one(lines: Iterator[bytes]) -> Iterator[list[float]]:
+    """Yield the coordinates of nodes of version 2: each after its label."""
+    for line in lines:
+        if line.startswith(b"$"):
+            return
+        yield [float(word) for word in line.split()[1:4]]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vanedamp.studies.optimisation.study import Study
 
 #: s of a run, in addition to its periods
-_RUN = 2.5e-3
+RUN = 2.5e-3
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
@@ -91,7 +91,7 @@ def sweep_seconds(scene: Scene, workers: int) -> float:
 
 def run_seconds(scene: Scene) -> float:
     """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
-    return _RUN + scene.time.simulated * scene.solver.seconds_per_period
+    return RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 
 def _check_time(key: str, what: str, seconds: float) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
+from vanedamp.modal.units import size_doubts
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
 
@@ -26,6 +27,7 @@ def facts(path: str | Path) -> list[Fact]:
     commands += ["campbell"] if case.campbell else []
     commands += [] if isinstance(case.mesh, MeshFile) else ["mesh"]
     found = [Fact("commands", commands), *_of_mesh(case), *_of_materials(case), *_of_results(case)]
+    warnings += [f"units: {doubt}" for fact in found if fact.key == "extent" for doubt in size_doubts(fact.value)]
     return [*found, Fact("files", case.files), Fact("warnings", warnings)]
 
 
@@ -35,16 +37,19 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
     if isinstance(mesh, MeshFile):
         yield Fact("mesh", mesh.file, "", f"{Path(mesh.file).stat().st_size / 1e6:.3g} MB")
         if mesh.foreign:
-            groups, nodes = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
+            groups, nodes, extent = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
             kinds = {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]}
             yield Fact("groups", {kind: names for kind, names in kinds.items() if names})
             yield Fact("nodes", nodes, "", "of the mesh; degree 2 adds those between two")
+            yield Fact("extent", mesh.scale * extent, "m", "largest, along an axis")
         else:
             header = read_header(mesh.file)
             case.check_groups(header.groups[2], header.groups[3], {"edge": header.groups[1], "point": header.groups[0]})
             yield Fact("groups", {"volumes": header.groups[3], "facets": header.groups[2]})
             if header.nodes is not None:
                 yield Fact("nodes", header.nodes, "", "of the mesh; degree 2 adds those between two")
+            if header.extent is not None:
+                yield Fact("extent", mesh.scale * header.extent, "m", "largest, along an axis")
     else:
         yield Fact("mesh", f"generator {mesh.generator}")
         if isinstance(mesh, VaneClusterMesh):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +13,10 @@ from scipy.linalg import eigh
 
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.scene.paths import axis_values
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
-from vanedamp.coupling.sweep.grid import grid
+from vanedamp.coupling.sweep.grid import Points, base_scene, grid
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass, linear_amplitudes, linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
@@ -21,8 +24,10 @@ from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.commands.support.budget import check_run, check_sweep, run_seconds, sweep_seconds
+from vanedamp.studies.commands.support.budget import check_run, check_sweep
 from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
+from vanedamp.studies.commands.support.trial import mean_cost, tried
 from vanedamp.studies.scene_checks import load_scene
 from vanedamp.studies.workers import available_cores
 
@@ -59,11 +64,14 @@ def facts_of(scene: Scene) -> list[Fact]:
     if leaves_open(scene):
         warnings.append('modes or shape = "auto" is chosen by the run: figures here are of all modes, and of sliders')
         scene = _closed(scene)
-    else:
-        warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
+    warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
     if scene.excitation.signal is not None:
         warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
     resonance = _resonance(scene)
+    if resonance is not None and scene.excitation.signal is None:
+        warnings += gap_doubts(scene, _top(scene, resonance))
+    if whole.sweep:
+        warnings += sweep_doubts(_closed(whole))
     found = [*_of_structure(scene), *_of_level(scene, resonance), *_of_bodies(scene, resonance)]
     return [*found, *_of_cost(scene, whole), Fact("warnings", warnings)]
 
@@ -157,9 +165,21 @@ def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
     if not lasting.time.steady:
         yield Fact("transient", lasting.time.dropped, "", "of these are not evaluated")
         yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
-    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time at least")
+    told = "of processor time, by a trial of its first periods"
+    yield Fact("run_seconds", mean_cost([lasting]) if scene.moved else None, "s", told)
     if whole.sweep:
-        cores = available_cores()
-        cost = sweep_seconds(replace(whole, time=lasting.time), cores)
-        yield Fact("sweep_points", whole.points)
-        yield Fact("sweep_seconds", cost, "s", f"at least, on {cores} cores")
+        points, cores = whole.points, available_cores()
+        cost = mean_cost(list(_some_points(whole))) * math.ceil(points / cores)
+        yield Fact("sweep_points", points)
+        yield Fact("sweep_seconds", cost, "s", f"on {cores} cores, by trials of {len(tried(points))} points")
+
+
+def _some_points(scene: Scene) -> Iterator[Scene]:
+    """Yield points of a sweep that stand for all, with the lengths of their runs."""
+    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    points = Points(base_scene(scene))
+    for number in tried(scene.points):
+        places = np.unravel_index(number, [len(values) for values in axes.values()])
+        values = {path: axes[path][int(place)] for path, place in zip(axes, places, strict=True)}
+        with suppress(InputError):  # is the status of that point
+            yield timed(_closed(points.raw(values)))

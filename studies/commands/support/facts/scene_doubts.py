@@ -1,0 +1,66 @@
+"""What later commands would complain of in a scene, or what looks like a slip of units, from its linear response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.sweep.grid import Points, grid, resonance_axis
+from vanedamp.coupling.sweep.sweep import linear_tops
+from vanedamp.coupling.system.linear_response import linear_amplitudes
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.headline import headline
+
+#: gaps beyond this many amplitudes are slips of units, as a rule
+_WIDE = 20.0
+
+
+def sweep_doubts(scene: Scene) -> Iterator[str]:
+    """Yield what the headline of the scene's sweep will say against its frequencies, by the linear curves.
+
+    scene: without open choices. Of the first values of the other axes.
+    """
+    swept = resonance_axis(scene, scene.sweep)[0]
+    if swept is None:
+        return
+    points = grid(replace(scene, sweep={swept: scene.sweep[swept]}))
+    x = np.sort(np.array(points.axes[swept], float))
+    if len(set(x)) < 2:
+        return
+    scenes = Points(points.base)
+    try:
+        made = [scenes.scene({swept: float(value)}) for value in x]
+        curves = [linear_amplitudes(one, np.array([one.frequency])) for one in made]
+    except InputError:  # a waveform, or a point that is no scene
+        return
+    undamped, fixed = np.reshape(curves, (len(x), 2)).T
+    peaks = {name: float(values) for name, values in linear_tops(points).items()}
+    damped = fixed if scene.damper else undamped  # the damped peak lies between them, as a rule
+    found = headline(x, damped, damped, np.zeros(len(x)), undamped, fixed, peaks, along_frequency=True)
+    unit = "Hz" if swept == FREQUENCY else unit_of(swept)
+    for remark in found.remarks_in(unit):
+        yield f"sweep.{swept}: by the linear curves, {remark}"
+
+
+def gap_doubts(scene: Scene, amplitude: float) -> Iterator[str]:
+    """Yield cavities that are wide against X, m, and walls softer than their gaps allow."""
+    omega, flexibility = 2 * math.pi * scene.frequency, scene.contact.flexibility
+    for index, cavity in enumerate(scene.cavity):
+        bodies = [scene.damper[number] for number in scene.bodies_in(cavity)]
+        if amplitude and cavity.gap > _WIDE * amplitude and bodies:
+            yield (
+                f"cavity[{index}].gap: {cavity.gap / amplitude:.3g} times the amplitude X = {amplitude:.3g} m, so that "
+                "bodies hardly meet a wall; lengths are in m, not in mm"
+            )
+        depth = max((omega * amplitude * math.sqrt(body.mass * flexibility) for body in bodies), default=0.0)
+        if depth > cavity.gap:
+            yield (
+                f"contact.stiffness: a body that meets a wall at the speed omega X overlaps it by {depth:.2g} m, more "
+                f"than the gap of cavity {cavity.name!r}, {cavity.gap:.2g} m; the stiffness is in N/m"
+            )
