@@ -64,7 +64,7 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
     asked = f", not repeating after {periods}" if kind != "non-periodic" else ""
     return Starts(
         returns,
-        f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of its "
-        f"range at best, after {nearest[1]} (in the report of its `vanedamp run --samples 100`, the phase planes show "
-        "every period's start); try another `from`",
+        f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of "
+        f"its range at best, after {nearest[1]} (the phase planes in the report of its `vanedamp run --samples 100` "
+        "show every period's start); try another `from`",
     )

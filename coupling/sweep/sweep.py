@@ -23,6 +23,9 @@ from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
 
+#: takes the number of points of a list that are done
+ListProgress = Callable[[int], None]
+
 
 def sweep(
     scene: Scene | Grid | str | Path,
@@ -57,14 +60,15 @@ def run_list(
     base: Scene,
     points: Sequence[Mapping[str, Any]],
     executor: Executor | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: ListProgress | None = None,
+    finished: SweepTable | None = None,
 ) -> SweepTable:
     """Run scenes that differ from `base` in some values, by their paths; all points name the same paths.
 
-    progress: called with the number of points done.
+    progress: called with the number of points done; finished: takes the results as they come.
     """
     listed = PointList(base, points)
-    finished = SweepTable(listed.size, width_of(base))
+    finished = SweepTable(listed.size, width_of(base)) if finished is None else finished
     for task, rest, result in run_tasks(listed, finished, executor):
         finished.add(task, result, bool(rest))
         if progress is not None:

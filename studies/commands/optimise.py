@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator
 
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_optimise
 from vanedamp.studies.commands.support.messages import write_result
@@ -23,8 +24,10 @@ def run(arguments: Namespace) -> None:
     check_optimise(study, arguments.workers or available_cores())
     print_resonance(arguments.input, study.scene)
     with workers(arguments.workers) as pool, progress("optimise") as report:
-        optimisation = optimise(study, pool, report, {"versions": versions()})
+        optimisation = optimise(study, pool, report, {"versions": versions()}, arguments.checkpoint)
     write_result(arguments, optimisation.to_json(), _summary(optimisation), output=optimisation.save)
+    if arguments.checkpoint is not None:
+        clear(arguments.checkpoint)
 
 
 def _summary(optimisation: Optimisation) -> Iterator[str]:
