@@ -79,7 +79,8 @@ def run_list(
 def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     """Return the record of a grid whose points are all finished."""
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
-    of_bodies = np.reshape(finished.values[:, len(COLUMNS) :], (*grid.shape, len(IN_PLANE), -1))
+    of_bodies = finished.values[:, len(COLUMNS) :]
+    of_bodies = of_bodies.reshape(*grid.shape, len(IN_PLANE), of_bodies.shape[1] // len(IN_PLANE))
     return Sweep(
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
@@ -87,7 +88,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
-        peaks=_peaks(grid),
+        peaks=peaks(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
@@ -95,7 +96,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     )
 
 
-def _peaks(grid: Grid) -> dict[str, np.ndarray]:
+def peaks(grid: Grid) -> dict[str, np.ndarray]:
     """Return the peaks of the linear curves over the swept frequencies; nan where there is none."""
     swept = resonance_axis(grid.base, grid.axes)[0]
     if swept is None or len(set(grid.axes[swept])) < 2:

@@ -22,7 +22,9 @@ B = 0.3
 def diagram(period_map, start, low, to, **table):
     """The branches over a range of the parameter."""
     table = Table(**{"from": low, "to": to, **table})
-    found = Diagram(period_map.at(low), table, low, to, lambda: Starts([Start(np.array(start, float), 1)], "try others"))
+    found = Diagram(
+        period_map.at(low), table, low, to, lambda: Starts([Start(np.array(start, float), 1)], "try others")
+    )
     found.follow(lambda done, total: None)
     return found
 

@@ -219,7 +219,9 @@ def test_a_run_that_repeats_after_several_periods_is_an_orbit_of_so_many():
 
 
 def test_a_run_that_does_not_repeat_starts_from_its_closest_returns():
-    wandering = scene(BODY, cavity=[{"name": "c1", "gap": 5e-4}], orbit={}, excitation=BODY["excitation"] | {"frequency": 99.5})
+    wandering = scene(
+        BODY, cavity=[{"name": "c1", "gap": 5e-4}], orbit={}, excitation=BODY["excitation"] | {"frequency": 99.5}
+    )
     response, map_ = vd.simulate(wandering), period_map(wandering)
     assert response.classification == "non-periodic"
     starts = of_run(map_, response, None)
