@@ -13,11 +13,11 @@ from typing import NoReturn
 
 from vanedamp.files.errors import VanedampError, shortened
 from vanedamp.studies.commands import COMMANDS
-from vanedamp.studies.interrupts import swallowed_interrupts_again
+from vanedamp.studies.interrupts import swallowed_interrupts_again, terminate_as_interrupt
 from vanedamp.studies.terminal import stages_shown
 
 BAD_INPUT = 2
-_INTERRUPTED = 130
+_INTERRUPTED, _TERMINATED = 130, 143
 #: packages of the finite elements, and how to get them
 _SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py", "cffi")
 _FINITE_ELEMENTS = (
@@ -47,7 +47,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
-    to be had, with one line on standard error; 130 when interrupted.
+    to be had, with one line on standard error; 130 when interrupted, 143 when terminated.
 
     argv: the words after the command's name; None: this process's, whose end is not interrupted any more.
     Under mpirun the first rank runs it, and the others help with the factorisations.
@@ -56,6 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
+    terminated = terminate_as_interrupt() if argv is None else []
     try:
         with swallowed_interrupts_again():
             status = _on_first_rank(sys.argv[1:] if argv is None else argv)
@@ -64,8 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         if argv is None:
             _ignore_interrupts()
-        print("vanedamp: interrupted", file=sys.stderr)
-        status = _INTERRUPTED
+        print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
+        status = _TERMINATED if terminated else _INTERRUPTED
     return status
 
 
@@ -73,6 +74,7 @@ def _ignore_interrupts() -> None:
     """Ignore interrupts while the interpreter and libraries end: one there would end the process without a line."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def _on_first_rank(words: Sequence[str]) -> int:

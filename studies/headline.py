@@ -194,7 +194,7 @@ def _linear_top(name: str, x: np.ndarray, curve: np.ndarray, peaks: Mapping[str,
         return _top(x, np.nan_to_num(curve), along_frequency)
     height, at = float(peaks[f"{name}_peak"]), float(peaks[f"{name}_peak_frequency"])
     # a speed comes from the frequency of its engine order
-    return _Top(height, at, bool(np.isclose(at, (x[0], x[-1]), rtol=1e-12, atol=0.0).any()))
+    return _Top(height, at, bool(np.isclose(at, x[[0, -1]] if len(x) else x, rtol=1e-12, atol=0.0).any()))
 
 
 def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:

@@ -1,8 +1,9 @@
-"""Ctrl-C in callbacks: it is never lost."""
+"""Ctrl-C in callbacks: it is never lost; and a request to terminate, which ends a command as Ctrl-C does."""
 
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -32,3 +33,21 @@ def swallowed_interrupts_again() -> Iterator[None]:
             timer.join()
     finally:
         sys.unraisablehook = before
+
+
+def terminate_as_interrupt() -> list[int]:
+    """Let SIGTERM end this process as an interrupt, so that checkpoints are written and workers end as well.
+
+    Returns a list, which holds the signals that came.
+    """
+    came = list[int]()
+
+    def handler(number: int, _frame: object) -> None:
+        came.append(number)
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a command that a shell runs in the background
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.raise_signal(signal.SIGINT)  # waits where interrupts do
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, handler)
+    return came

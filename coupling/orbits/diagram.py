@@ -9,6 +9,7 @@ import numpy as np
 from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.continuation import Continuation
+from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
@@ -32,14 +33,14 @@ _MEANING = {
 class Diagram:
     """The branches of a period map, found one after the other.
 
-    table: how to follow them; low, to: range of the parameter, to: None for a single orbit; start: returns the state
-    (k,) from which the first orbit is sought; notes: what could not be done.
+    table: how to follow them; low, to: range of the parameter, to: None for a single orbit; starts: returns the states
+    from which the first orbit is sought; notes: what could not be done.
     """
 
     def __init__(
-        self, period_map: PeriodMap, table: Table, low: float, to: float | None, start: Callable[[], np.ndarray]
+        self, period_map: PeriodMap, table: Table, low: float, to: float | None, starts: Callable[[], Starts]
     ) -> None:
-        self.map, self.table, self.low, self.to, self.start = period_map, table, low, to, start
+        self.map, self.table, self.low, self.to, self.starts = period_map, table, low, to, starts
         self.problems: dict[int, Problem] = {}
         self.finished: list[Branch] = []
         self.current: Continuation | None = None
@@ -107,17 +108,20 @@ class Diagram:
 
     def _first(self) -> Continuation:
         """Return the branch through the first orbit. Raises InputError if there is none."""
-        problem = self._problem(self.table.periods)
-        start, row = problem.pack(self.start(), self.low), problem.along_parameter
-        orbit = solve(problem, start, row, np.zeros(problem.size))
-        problem.count["iterations"] += orbit.iterations
-        if orbit.status is not OrbitStatus.OK:
-            other = '"linear"' if self.table.start == "run" else '"run"'
-            raise InputError(
-                f"orbit: no orbit of {problem.map.periods} excitation period(s) at {self.table.parameter} = "
-                f"{self.low:g}: {_MEANING[orbit.status]}; try other periods, another `from`, or start = {other}"
-            )
-        return Continuation.begin(problem, self.table, orbit, row)
+        starts, failed = self.starts(), dict[str, None]()
+        for start in starts.candidates:
+            problem = self._problem(start.periods)
+            row = problem.along_parameter
+            orbit = solve(problem, problem.pack(start.state, self.low), row, np.zeros(problem.size))
+            problem.count["iterations"] += orbit.iterations
+            if orbit.status is OrbitStatus.OK:
+                return Continuation.begin(problem, self.table, orbit, row)
+            failed[_MEANING[orbit.status]] = None
+        periods = " or ".join(map(str, dict.fromkeys(start.periods for start in starts.candidates)))
+        raise InputError(
+            f"orbit: no orbit of {periods} excitation period(s) at {self.table.parameter} = {self.low:g}: "
+            f"{'; '.join(failed)}; {starts.remedy}"
+        )
 
     @property
     def _span(self) -> float:

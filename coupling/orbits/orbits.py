@@ -8,15 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -39,8 +38,15 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     run, or a parameter that is no number of it; an orbit that is not found is a status of the result.
     """
     search = _Search(scene)
-    state = search.start() if start is None else search.map.state_of(at_speed_of(search.first, start))
-    return replace(newton.find_orbit(search.map, state), parameter=search.low)
+    if start is not None:
+        candidates = [Start(search.map.state_of(at_speed_of(search.first, start)), search.map.periods)]
+    else:
+        candidates = list(search.starts().candidates)
+    for state, periods in candidates:
+        found = newton.find_orbit(search.map.over(periods), state)
+        if found.status is OrbitStatus.OK:
+            break
+    return replace(found, parameter=search.low)
 
 
 def orbits(
@@ -60,7 +66,7 @@ def orbits(
     if scene.orbit is None:
         raise InputError("orbit: missing; name the branch in a table [orbit], such as from = 95.0 and to = 105.0")
     search = _Search(scene)
-    diagram = Diagram(search.map, search.table, search.low, search.to, search.start)
+    diagram = Diagram(search.map, search.table, search.low, search.to, search.starts)
     described = replace(scene, orbit=search.table)
     data = dict(provenance or {})
 
@@ -116,19 +122,13 @@ class _Search:
             choices = choices_of(ends)
             ends = [with_choices(end, choices).scene for end in ends]
         self.first = ends[0]
-        self.map: PeriodMap = period_map(self.first, path, self.table.periods)
+        self.map: PeriodMap = period_map(self.first, path, self.table.periods or 1)
 
-    def start(self) -> np.ndarray:
-        """Return the state (k,) from which the first orbit is sought. Raises InputError if the run ends early."""
+    def starts(self) -> Starts:
+        """Return the states from which the first orbit is sought. Raises InputError if the run ends early."""
         if self.table.start == "linear":
-            return self.map.linear_orbit()
-        response = simulate(self.first)
-        if response.final is None:
-            raise InputError(
-                f'orbit.start: the run of the scene ends early ({response.status}); take start = "linear", or change '
-                "the scene"
-            )
-        return self.map.state_of(response.final)
+            return of_linear_motion(self.map, self.table.periods)
+        return of_run(self.map, simulate(self.first), self.table.periods)
 
 
 def _at(scene: Scene, path: str, value: float) -> Scene:

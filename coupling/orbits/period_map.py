@@ -22,7 +22,7 @@ from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import fitted
+from vanedamp.coupling.response.restart import at_speed_of, fitted
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 from vanedamp.coupling.scene.rotation import SPEEDS
@@ -100,6 +100,23 @@ class PeriodMap:
     def restart_of(self, state: np.ndarray) -> RestartState:
         """Return the state with which a run of the scene begins as the passage does."""
         return self._frame.restart_of(state)
+
+    def strobed(self, start: RestartState, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return states (p + 1, k) at the starts of the periods that follow a run, and its section there (p + 1, s).
+
+        The section has displacement and velocity of the response, slips and their rates. p is smaller where the engine
+        ends early.
+        """
+        system = self._frame.system
+        records = new_records(system, periods, 0)
+        begun = fitted(system, at_speed_of(self.scene, start))
+        run = engine_run(system, begun, records, False, _EVENTS_PER_PERIOD * periods)
+        states = [self.state_of(begun)]
+        while len(states) <= periods and run.advance_to(len(states)) is Status.OK:
+            if (state := run.final()) is None:
+                break
+            states.append(self.state_of(state))
+        return np.array(states), np.delete(records.section[: len(states)], 2, axis=1)
 
     def linear_orbit(self) -> np.ndarray:
         """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors.

@@ -66,11 +66,16 @@ class SceneRecord:
 class SceneCheckpoint(CheckpointFile):
     """The checkpoint of a command on a scene. A context manager, which writes what has changed as it ends."""
 
-    def __init__(self, path: str | Path | None, kind: str, scene: Scene, provenance: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: str | Path | None, kind: str, scene: Scene, provenance: Mapping[str, Any],
+        more: Mapping[str, tuple[str, Any]] | None = None,
+    ) -> None:  # fmt: skip
+        """more: further input that it belongs to."""
         belongs = {
             "scene": ("scene", scene.to_dict()),
             "model": ("reduced model or CSV file", digests(scene.files)),
             "provenance": ("version of the software", provenance),
+            **(more or {}),
         }
         super().__init__(path, kind, belongs, self.content)
 

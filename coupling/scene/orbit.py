@@ -14,8 +14,8 @@ from vanedamp.files.toml_input import STRICT, Real, Whole
 class Orbit:
     """A periodic motion, and the branch through it."""
 
-    periods: Annotated[Whole, Field(ge=1, le=64)] = 1
-    """periods of the excitation that the motion takes to repeat"""
+    periods: Annotated[Whole | None, Field(ge=1, le=64)] = None
+    """periods of the excitation that the motion takes to repeat (default: those of the run; 1 with "linear")"""
     start: Literal["run", "linear"] = "run"
     """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
     parameter: str = "excitation.frequency"

@@ -34,6 +34,9 @@ from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
 
+#: takes the number of points of a list that are done
+ListProgress = Callable[[int], None]
+
 
 def sweep(
     scene: Scene | Grid | str | Path,
@@ -68,14 +71,15 @@ def run_list(
     base: Scene,
     points: Sequence[Mapping[str, Any]],
     executor: Executor | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: ListProgress | None = None,
+    finished: SweepTable | None = None,
 ) -> SweepTable:
     """Run scenes that differ from `base` in some values, by their paths; all points name the same paths.
 
-    progress: called with the number of points done.
+    progress: called with the number of points done; finished: takes the results as they come.
     """
     listed = PointList(base, points)
-    finished = SweepTable(listed.size, width_of(base))
+    finished = SweepTable(listed.size, width_of(base)) if finished is None else finished
     for task, rest, result in run_tasks(listed, finished, executor):
         finished.add(task, result, bool(rest))
         if progress is not None:
@@ -86,7 +90,8 @@ def run_list(
 def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     """Return the record of a grid whose points are all finished."""
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
-    of_bodies = np.reshape(finished.values[:, len(COLUMNS) :], (*grid.shape, len(IN_PLANE), -1))
+    of_bodies = finished.values[:, len(COLUMNS) :]
+    of_bodies = of_bodies.reshape(*grid.shape, len(IN_PLANE), of_bodies.shape[1] // len(IN_PLANE))
     return Sweep(
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},

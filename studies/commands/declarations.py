@@ -169,8 +169,8 @@ COMMANDS = (
     ),
     Command(
         "optimise", "mass, gap and number of bodies that reduce most", 90,
-        (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers),
-        writes={"output": _RECORD},
+        (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers, resume),
+        writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(
         "report", "one HTML page of results", 100,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator
 
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_optimise
 from vanedamp.studies.commands.support.messages import write_result
@@ -28,8 +29,10 @@ def run(arguments: Namespace) -> None:
             map(study.with_bodies, range(study.table.variables.bodies[0], study.table.variables.bodies[1] + 1)), pool
         )
         with progress("optimise") as report:
-            optimisation = optimise(study, pool, report, {"versions": versions()})
+            optimisation = optimise(study, pool, report, {"versions": versions()}, arguments.checkpoint)
     write_result(arguments, optimisation.to_json(), _summary(optimisation), study.doubts, output=optimisation.save)
+    if arguments.checkpoint is not None:
+        clear(arguments.checkpoint)
 
 
 def _summary(optimisation: Optimisation) -> Iterator[str]:

@@ -71,18 +71,19 @@ def _hover(value: float, status: str) -> str:
 
 
 class Figure(NamedTuple):
-    """A key result: a name and its value as text."""
+    """A key result: a name and its value as text; closed: known in closed form, without the curve's points."""
 
     name: str
     value: str
+    closed: bool = False
 
 
 def key_figures(response: ForcedResponse) -> list[Figure]:
     """Return the key results of a curve for people, from the headline that `vanedamp sweep` prints."""
     headline = response.headline
     return [
-        Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
-        Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at)),
+        Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at), True),
+        Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at), True),
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),
         Figure("most reduced in the band", _most_reduced(response)),

@@ -91,6 +91,8 @@ def controls_of(scene: Scene) -> list[Control]:
         *_listed("cavity", scene.cavity, (_GAP,), _gap_changes),
         *(_listed("cavity", scene.cavity, (_PLAY,), _changes) if planar else ()),
         *_listed("damper", scene.damper, _MEASURES_OF_DAMPER, _changes),
+        *_listed("damper", scene.damper, _EXTENTS if planar else _EXTENTS[-4:], _changes),
+        *(_of_blocks(scene) if planar else ()),
         *(_given("structure", scene.structure, _DAMPINGS) if rigid else ()),
         *_given("excitation", scene.excitation, _LEVELS),
         *_orientation(scene),
@@ -117,6 +119,16 @@ _MEASURES_OF_DAMPER = (
     _Measure("friction", "friction", "", 1.0, high=1.0),
     _Measure("restitution", "restitution", "", 1.0),
 )
+_EXTENTS = (
+    _Measure("length", "length", "mm", 1e-3, around=5.0),
+    _Measure("height", "height", "mm", 1e-3, around=5.0),
+    _Measure("radius", "radius of a disc", "mm", 1e-3, around=5.0),
+    _Measure("inertia", "moment of inertia", "g mm²", 1e-9, around=10.0),
+    _Measure("normal_load", "load on the floor", "N", 1.0, around=20.0),
+    _Measure("stiffness", "spring to the floor", "N/m", 1.0, around=20.0),
+    _Measure("dashpot", "dashpot to the floor", "N s/m", 1.0, around=20.0),
+    _Measure("track_radius", "radius of the track", "mm", 1e-3, around=10.0),
+)
 _LEVELS = (
     _Measure("resonance_amplitude", "level: resonance without bodies", "µm", 1e-6, around=20.0),
     _Measure("force", "level: force", "N", 1.0, around=20.0),
@@ -131,7 +143,7 @@ _DAMPINGS = (
 
 def _control(measure: _Measure, name: str, label: str, value: float, changes: Any) -> Control:
     shown = value / measure.factor
-    low, high = measure.low, max(measure.high, shown)
+    low, high = min(measure.low, shown), max(measure.high, shown)
     if measure.around is not None and shown > 0.0:
         low, high = (float(f"{end:.3g}") for end in (shown / measure.around, shown * measure.around))
     elif measure.around is not None:
@@ -153,6 +165,30 @@ def _listed(table: str, entries: Sequence[Any], measures: Sequence[_Measure], ch
         for index, (entry, value) in enumerate(zip(entries, values, strict=True)):
             title, change = getattr(entry, "name", index + 1), partial(changes, f"{table}.{index}.{key}")
             yield _control(measure, f"{key}-{index}", f"{label} {title}", value, change)
+
+
+def _of_blocks(scene: Scene) -> Iterator[Control]:
+    """Yield what moves the floor of planar bodies across the cavity, and how they begin."""
+    floors = (
+        _Measure("normal_motion", "motion of the floor across, per motion along", "", 1.0, low=-1.0),
+        _Measure("rotation", "rotation of the floor per motion along", "rad/m", 1.0, low=-100.0, high=100.0),
+    )
+    yield from _listed("cavity", scene.cavity, floors, _changes)
+    half = 0.5e6 * min(cavity.gap for cavity in scene.cavity)
+    play = 1e6 * min((cavity.play for cavity in scene.cavity if cavity.play), default=2e-6 * half)
+    longest = max(max(damper.half_extent) for damper in scene.damper)
+    most = 1e-3 * play / (2.0 * longest) if longest else 1.0
+    begins = (
+        _Measure("position", "position at the start", "µm", 1e-6, low=-half, high=half),
+        _Measure("velocity", "velocity at the start", "m/s", 1.0, low=-1.0),
+        _Measure("lift", "lift at the start", "µm", 1e-6, high=play),
+        _Measure("lift_velocity", "lift velocity at the start", "m/s", 1.0, low=-1.0),
+        _Measure("tilt", "tilt at the start", "mrad", 1e-3, low=-most, high=most),
+        _Measure("tilt_rate", "tilt rate at the start", "rad/s", 1.0, low=-100.0, high=100.0),
+    )
+    single = len({damper.cavity for damper in scene.damper}) == len(scene.damper)
+    if single:  # of several in a cavity each stands where it has room
+        yield from _listed("damper", scene.damper, begins, _changes)
 
 
 def _changes(path: str, scene: Scene, number: float) -> dict[str, Any]:

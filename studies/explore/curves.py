@@ -21,7 +21,7 @@ from vanedamp.coupling.scene.scene import Continuation, Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import result_of
+from vanedamp.coupling.sweep.sweep import linear_tops, result_of
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, width_of
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.transient import left_over, settled_after
@@ -142,6 +142,7 @@ class Curve:
         assert low is not None and high is not None
         self.scene, self.linear, self.note = scene, linear_between(scene, low, high), transient_note(scene)
         self._grid = grid(scene)
+        self._peaks = linear_tops(self._grid)
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))
         self._news, self._cancelled, self.asked = Condition(), False, time.monotonic()
@@ -178,7 +179,7 @@ class Curve:
             self._news.wait_for(lambda: self._cancelled or self.done >= count, seconds)
 
     def sweep(self) -> Sweep:
-        """Return the sweep over the frequencies that are done; at least one."""
+        """Return the sweep over the frequencies that are done, with the peaks of the whole linear curves."""
         with self._news:
             done = np.flatnonzero(self._table.done)
             part = SweepTable(len(done), self._table.values.shape[1])
@@ -186,7 +187,7 @@ class Curve:
             part.put(slice(None), self._table.values[done].copy(), codes, self._table.texts)
         frequencies = self._grid.axes[FREQUENCY]
         axes = {FREQUENCY: [frequencies[point] for point in done]}
-        return result_of(replace(self._grid, axes=axes), part, {})
+        return replace(result_of(replace(self._grid, axes=axes), part, {}), peaks=self._peaks)
 
     def _add(self, task: Task, future: Future[TaskResult]) -> None:
         if future.cancelled():

@@ -200,9 +200,7 @@ def changes(exploration: Exploration, curves: Curves, request: dict[str, Any]) -
     if not curve.wanted:
         raise PreventUpdate
     answer |= {"have": curve.done, "complete": curve.done == curve.size}
-    if curve.done == 0:
-        return Changes(answer, message=_FIRST)
-    if curve.done == have:
+    if curve.done == have > 0:
         return Changes(answer)
     figure, figures, text = _drawn(curve, version)
     drawn = Changes(answer, figure, figures, message=text, tone="message", frame="")
@@ -218,13 +216,18 @@ def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     (response,) = forced_responses(sweep)
     count, complete = len(sweep.status), len(sweep.status) == curve.size
     notes = [*([curve.note] if curve.note else []), *remarks(sweep, response, complete)]
+    rows = [
+        part(text, className="" if complete or figure.closed else "unfinished")
+        for figure in key_figures(response)
+        for part, text in ((html.Dt, figure.name), (html.Dd, figure.value))
+    ]
     figures = html.Div(
         [
-            html.Dl([part for name, value in key_figures(response) for part in (html.Dt(name), html.Dd(value))]),
+            html.Dl(rows),
             html.Ul([html.Li(note) for note in notes], className="remarks"),
         ]
     )
-    text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
+    text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far" if count else _FIRST
     marks = {"version": version, "points": count, "complete": complete}
     return response_figure(sweep, response, curve.linear, marks), figures, text
 

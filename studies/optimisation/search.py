@@ -12,17 +12,17 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from vanedamp.coupling.sweep.sweep import run_list
-from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import finite, frozen
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
+from vanedamp.studies.optimisation.checkpoint import Checkpoint
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
 from vanedamp.studies.optimisation.study import Design, Study
 from vanedamp.studies.terminal import stage
@@ -39,14 +39,25 @@ def optimise(
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Optimisation:
     """Search, map and compare. The same study and seed give the same answer, whatever the executor.
 
-    progress: called with the number of runs done and of those expected.
+    progress: called with the number of runs done and of those expected; checkpoint: a file to which finished runs are
+    written and from which an interrupted search resumes; the caller removes it once the result is safe
+    (files.checkpoint_file.clear).
     """
-    started = time.perf_counter()
-    table = study.table
-    trial = _Trial(study, executor, progress, deviations(study))
+    with Checkpoint(checkpoint, study, _measures(study), provenance or {}) as kept:
+        return _optimised(study, _Trial(study, executor, progress, deviations(study), kept), dict(provenance or {}))
+
+
+def _measures(study: Study) -> tuple[str, str]:
+    """Return the columns of a run that count: with the bodies and without."""
+    return f"{study.table.measure}_dynamic", "amplitude_undamped"
+
+
+def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
+    started, table = time.perf_counter(), study.table
     with stage("search as designed"):
         first = trial.search(False, None)
     with stage("search within tolerances"):
@@ -89,7 +100,7 @@ def optimise(
         trouble=trial.trouble,
         wall_time_s=took,
         sentence=_sentence(study, nominal, robust, headlines, trial.scenes, took),
-        provenance=dict(provenance or {}),
+        provenance=provenance,
     )
 
 
@@ -115,11 +126,12 @@ class _Trial:
         executor: Executor | None,
         progress: Callable[[int, int], None] | None,
         sample: Sequence[_Deviation],
+        kept: Checkpoint,
     ) -> None:
         self.study, self.sample = study, sample
         self.history: list[tuple[Design, float, bool]] = []
         self.scenes = self.trouble = 0
-        self._executor, self._progress = executor, progress
+        self._executor, self._progress, self._kept = executor, progress, kept
         table = study.table
         self._variables = [n for n in Design._fields if len(set(getattr(table.variables, n))) > 1]
         designs = table.evaluations * (1 + len(sample) * (len(sample) > 1)) + table.map.mass_ratio * table.map.gap_ratio
@@ -197,7 +209,6 @@ class _Trial:
 
         nan with the bodies where a run is not ok, and without them where it is no scene.
         """
-        table = self.study.table
         shape = (len(designs), len(sample), len(self.study.frequencies))
         damped, undamped = np.zeros(shape), np.zeros(shape)
         levels = self.study.reference * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
@@ -207,14 +218,11 @@ class _Trial:
                 self.study.point(designs[place], deviation, float(frequency))
                 for place in places for deviation in sample for frequency in self.study.frequencies
             ]  # fmt: skip
-            finished = run_list(self.study.with_bodies(count), points, self._executor, self._tell)
+            run = self._kept.run(self.study.with_bodies(count), points, self._executor, self._tell)
             self.scenes += len(points)
-            ok = finished.text("status") == "ok"
+            ok = run[:, 2] == 1.0
             self.trouble += int(np.count_nonzero(~ok))
-            for name, amplitudes in ((f"{table.measure}_dynamic", damped), ("amplitude_undamped", undamped)):
-                values = finished.values[:, COLUMNS.index(name)]
-                if amplitudes is damped:
-                    values = np.where(ok, values, np.nan)
+            for amplitudes, values in ((damped, np.where(ok, run[:, 0], np.nan)), (undamped, run[:, 1])):
                 amplitudes[places] = values.reshape(len(places), *shape[1:]) / levels
         return damped, undamped
 

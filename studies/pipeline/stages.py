@@ -175,8 +175,11 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's inputs, and the options."""
-        return super().inputs() | {"option": asdict(self.table)}
+        """Return the case's inputs without strengths, which no reduced model depends on, and the options."""
+        found = super().inputs()
+        for material in found.get(f"case {self.file.name}", {}).get("material", {}).values():
+            material.pop("fatigue_strength", None)
+        return found | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
         """Reduce."""

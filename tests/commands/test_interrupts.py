@@ -41,11 +41,12 @@ def watch(name, arguments):
             os.killpg(0, signal.SIGINT)
 sys.addaudithook(watch)
 from vanedamp.studies.cli import main
-sys.exit(main(sys.argv[4:]))
+sys.argv[1:4] = []
+sys.exit(main())
 """
 
 
-def sweep(folder, workers, event="none", end="", count=1):
+def sweep(folder, workers, event="none", end="", count=1, ready=None):
     """The sweep in a process group of its own; its standard output and error are pipes."""
     (folder / "scene.toml").write_text(LONG)
     (folder / "sweep.h5").write_text("precious")
@@ -53,13 +54,17 @@ def sweep(folder, workers, event="none", end="", count=1):
     return subprocess.Popen(
         [sys.executable, "-c", PROGRAM, event, end, str(count), *command], cwd=folder, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(),
-        preexec_fn=heed_interrupts,
+        preexec_fn=ready or heed_interrupts,
     )  # fmt: skip
 
 
 def heed_interrupts():
     """What a shell runs in the background ignores interrupts, and so would all that the tests start there."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def ignore_interrupts():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def until(condition):
@@ -80,13 +85,13 @@ def members(group):
     return found
 
 
-def check(process, folder):
+def check(process, folder, ended=(130, "", "vanedamp: interrupted\n")):
     try:
         out, error = process.communicate(timeout=120.0)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         raise
-    assert (process.returncode, out, error) == (130, "", "vanedamp: interrupted\n")
+    assert (process.returncode, out, error) == ended
     until(lambda: not members(process.pid))
     assert (folder / "sweep.h5").read_text() == "precious"
     assert {path.name for path in folder.iterdir()} <= {"scene.toml", "sweep.h5", "sweep.h5.partial"}
@@ -128,6 +133,16 @@ def test_interrupt_while_workers_work(tmp_path):
     until((tmp_path / "sweep.h5.partial").exists)
     os.killpg(process.pid, signal.SIGINT)
     check(process, tmp_path)
+
+
+@pytest.mark.parametrize("ignoring", [False, True], ids=["", "in the background"])
+@pytest.mark.parametrize("send", [os.kill, os.killpg])
+def test_termination_leaves_no_workers_and_no_semaphores(send, ignoring, tmp_path):
+    """The tracker of semaphores would warn of those left; a shell's command in the background ignores interrupts."""
+    process = sweep(tmp_path, 2, ready=ignore_interrupts if ignoring else heed_interrupts)
+    until((tmp_path / "sweep.h5.partial").exists)
+    send(process.pid, signal.SIGTERM)
+    check(process, tmp_path, (143, "", "vanedamp: terminated\n"))
 
 
 def test_interrupts_that_a_callback_swallows_come_again():

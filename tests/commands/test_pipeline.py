@@ -150,6 +150,7 @@ def test_nothing_is_done_again(folder, capsys):
 CHANGES = [
     ("case.toml", "young = 2e11", "young = 2e11  # as delivered", [], ""),
     ("case.toml", "poisson = 0.3", "poisson = 0.29", [*ALL[:5], "report"], "material.default.poisson 0.3 -> 0.29"),
+    ("case.toml", "strength = 4e8", "strength = 5e8", [*ALL[:2], ALL[3], "report"], "fatigue_strength 4e+08 -> 5e+08"),
     ("case.toml", "share = 0.5", "share = 0.6", [*ALL[:2], ALL[3], "report"], "calibration.share 0.5 -> 0.6"),
     ("tip.csv", "f", "frequency", ["calibrate"], "file tip.csv changed"),
     ("gaps.toml", "gap = 2e-4", "gap = 3e-4", [ALL[3], "report"], "gaps.toml changed: cavity.c1.gap 0.0002 -> 0.0003"),

@@ -8,6 +8,7 @@ import pytest
 from tests.tools import closed_maps as maps
 from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.diagram import Diagram
+from vanedamp.coupling.orbits.first_orbit import Start, Starts
 from vanedamp.coupling.orbits.multipliers import indicators, multipliers
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, find_orbit, solve
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -21,7 +22,9 @@ B = 0.3
 def diagram(period_map, start, low, to, **table):
     """The branches over a range of the parameter."""
     table = Table(**{"from": low, "to": to, **table})
-    found = Diagram(period_map.at(low), table, low, to, lambda: np.array(start, float))
+    found = Diagram(
+        period_map.at(low), table, low, to, lambda: Starts([Start(np.array(start, float), 1)], "try others")
+    )
     found.follow(lambda done, total: None)
     return found
 

@@ -2,13 +2,17 @@
 
 import json
 import math
+import tomllib
 
 import numpy as np
 import pytest
 import tomli_w
 
 import vanedamp as vd
+from tests.tools.processes import ROOT
+from vanedamp.coupling.orbits.first_orbit import of_run
 from vanedamp.coupling.orbits.newton import OrbitStatus
+from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.cli import main
 
@@ -201,10 +205,29 @@ def test_a_scene_without_table_and_another_method_are_refused():
         vd.orbits(scene(BODY, solver={"method": "moreau"}))
 
 
-def test_a_chaotic_start_is_one_line():
-    with pytest.raises(InputError, match=r"orbit: no orbit of 1 excitation period") as found:
-        vd.orbits(scene(BODY, cavity=[{"name": "c1", "gap": 5e-4}], **table(BODY, **{"from": 99.5, "to": 100.0})))
-    assert "\n" not in str(found.value)
+def test_a_run_that_repeats_after_several_periods_is_an_orbit_of_so_many():
+    """Figure 9 between its first two period doublings, 2365.541 and 2368.608 Hz (docs/orbits.md)."""
+    data = tomllib.loads((ROOT / "docs" / "examples" / "orbits.toml").read_text())
+    del data["orbit"]
+    data["excitation"]["frequency"] = 2367.0
+    figure9 = scene(data)
+    assert vd.simulate(figure9).classification == "periodic-2"
+    orbit = vd.find_orbit(figure9)
+    assert (orbit.status, orbit.periods, orbit.stable) == (OrbitStatus.OK, 2, True)
+    single = vd.find_orbit(scene(data, orbit={"periods": 1}))
+    assert (single.status, single.periods, single.stable) == (OrbitStatus.OK, 1, False)
+
+
+def test_a_run_that_does_not_repeat_starts_from_its_closest_returns():
+    wandering = scene(
+        BODY, cavity=[{"name": "c1", "gap": 5e-4}], orbit={}, excitation=BODY["excitation"] | {"frequency": 99.5}
+    )
+    response, map_ = vd.simulate(wandering), period_map(wandering)
+    assert response.classification == "non-periodic"
+    starts = of_run(map_, response, None)
+    assert [start.periods for start in starts.candidates] == [1, 1, 2, 2, 3, 3]
+    assert "the run of the scene is non-periodic: over 256 periods it comes back to 0." in starts.remedy
+    assert vd.find_orbit(wandering).status is OrbitStatus.OK
 
 
 def test_the_command(tmp_path, monkeypatch, capsys):

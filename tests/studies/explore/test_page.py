@@ -19,9 +19,11 @@ pytest.importorskip("dash", reason="the page is made with dash")
 
 from tests.commands.test_interrupts import heed_interrupts, members, until
 from tests.tools.processes import environment
+from vanedamp.coupling.model_order.choices import NOTHING
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.sweep.worker import Task, run_points
 from vanedamp.files.toml_input import InputError
 from vanedamp.files.toml_output import commented
 from vanedamp.studies.cli import main
@@ -358,11 +360,48 @@ def test_key_figures_are_those_of_the_sweep():
     curve = Curve(exploration.seen(exploration.texts), at_once)
     drawn = curve.sweep()
     (response,) = forced_responses(drawn)
-    shown, headline = dict(key_figures(response)), response.headline
+    shown, headline = {figure.name: figure.value for figure in key_figures(response)}, response.headline
     # 1/sqrt(1 - 2 zeta^2) = 1.0001 below the natural frequency, where the level is reached
     assert shown["maximum without bodies X"].startswith("1000 µm at 15.91")
     assert shown["damped peak / X"] == f"{headline.peak_ratio:.3f}"
     assert shown["onset of impacts"] == f"{headline.onset:.6g} Hz"
+
+
+@pytest.mark.parametrize("done", [0, 1, 3])
+def test_closed_forms_stand_from_the_first_moment_and_the_rest_is_grey(done):
+    waiting = Waiting()
+    exploration = page.Exploration.of(scene(), "scene.toml")
+    curves = Curves(waiting)
+    curve = curves.take("t", 1, lambda: exploration.seen(exploration.texts))
+    whole = Curve(curve.scene, at_once).sweep()
+    for future, point in list(zip(waiting.futures, waiting.points, strict=True))[:done]:
+        future.set_result(
+            run_points(
+                curve.scene,
+                NOTHING,
+                [{"excitation.frequency": float(whole.axes["excitation.frequency"][point])}],
+                Task([0]),
+            )
+        )
+    (response,) = forced_responses(curve.sweep())
+    (finished,) = forced_responses(whole)
+    closed = [figure for figure in key_figures(response) if figure.closed]
+    assert closed == [figure for figure in key_figures(finished) if figure.closed] and len(closed) == 2
+    assert response.reference == finished.reference
+    _, figures, _ = page._drawn(curve, 1)
+    rows = figures.children[0].children
+    assert [row.className for row in rows] == [""] * 4 + ["unfinished"] * 10
+
+
+@pytest.mark.parametrize(
+    "key", ["length", "height", "lift", "tilt", "lift_velocity", "tilt_rate", "position", "velocity"]
+)
+def test_every_key_of_a_block_moves(key):
+    block = {"cavity": "c1", "mass": 0.05, "shape": "block", "length": 0.01, "height": 0.005, "restitution": 0.6}
+    tilted = scene(cavity=[{"name": "c1", "gap": 2e-4, "play": 1e-5}], damper=[block])
+    (control,) = [control for control in controls_of(tilted) if control.name == key]
+    other = moved(tilted, [control], {key: f"{control.high:.9g}"})
+    assert getattr(other.damper[0], key) == pytest.approx(control.high * control.factor)
 
 
 def test_linear_curves_hide_no_maximum():

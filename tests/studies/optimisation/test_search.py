@@ -106,6 +106,26 @@ def test_same_seed_same_answer(found, tmp_path):
     assert (again.nominal, again.robust) == (found[0].nominal, found[0].robust)
 
 
+@pytest.mark.parametrize("stop", [1, 80, 160])
+def test_an_interrupted_search_resumes_and_gives_the_same_answer(found, tmp_path, stop):
+    file, calls = tmp_path / "o.h5.partial", []
+
+    def interrupted(done, total):
+        if done >= stop:
+            raise KeyboardInterrupt
+
+    given = Study.load(study(tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        optimise(given, progress=interrupted, provenance={"a": 1}, checkpoint=file)
+    resumed = optimise(given, progress=lambda *call: calls.append(call), provenance={"a": 1}, checkpoint=file)
+    assert calls[0][0] > stop and resumed.scenes == found[0].scenes == calls[-1][0]
+    for name in ("map_amplitude", "history_design", "history_amplitude", "robust_response"):
+        np.testing.assert_array_equal(getattr(resumed, name), getattr(found[0], name))
+    other = Study.load(study(tmp_path, lambda data: data["optimise"].update(seed=7)))
+    with pytest.raises(InputError, match="the checkpoint of another study; nothing was done to it"):
+        optimise(other, provenance={"a": 1}, checkpoint=file)
+
+
 def test_file_round_trip(found, tmp_path):
     record = found[0]
     record.save(tmp_path / "optimum.h5")

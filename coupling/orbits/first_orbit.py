@@ -1,0 +1,70 @@
+"""Where Newton's method begins: the end of a run that repeats, or where a run comes closest to repeating.
+
+Close returns of a motion that does not repeat lie near unstable orbits (Lathrop and Kostelich 1989, Phys. Rev. A 40).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.response.response import Response
+from vanedamp.files.toml_input import InputError
+
+#: periods after the run over which returns are sought, excitation periods of an orbit if none are given, starts of each
+_WINDOW, _ORDERS, _MOST = 256, (1, 2, 3), 2
+
+
+class Start(NamedTuple):
+    """A state (k,) from which an orbit of some excitation periods is sought."""
+
+    state: np.ndarray
+    periods: int
+
+
+class Starts(NamedTuple):
+    """Starts, the most promising first, and what to say if no orbit is found from any of them."""
+
+    candidates: Sequence[Start]
+    remedy: str
+
+
+def of_linear_motion(period_map: PeriodMap, periods: int | None) -> Starts:
+    """Return the motion without contact as a start. Raises InputError at a resonance without damping."""
+    return Starts([Start(period_map.linear_orbit(), periods or 1)], 'try start = "run"')
+
+
+def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> Starts:
+    """Return starts from a run of the map's scene; periods: of the orbit, None: as the run repeats.
+
+    Raises InputError for a run that ended early.
+    """
+    if response.final is None:
+        raise InputError(f"orbit.start: the run of the scene ends early ({response.status}); change the scene")
+    kind = response.classification
+    own = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
+    repeats = kind != "non-periodic" and (periods or own) % own == 0
+    first = [Start(period_map.state_of(response.final), periods or own)] if repeats else []
+    states, sections = period_map.strobed(response.final, _WINDOW)
+    orders = [periods] if periods else sorted({own, *_ORDERS})
+    spread = np.maximum(np.ptp(sections, axis=0), np.finfo(float).tiny)
+    nearest, returns = (np.inf, 0), list[Start]()
+    for order in orders:
+        if order >= len(states):
+            continue
+        apart = (np.abs(sections[order:] - sections[:-order]) / spread).max(axis=1)
+        places = np.argsort(apart, kind="stable")[:_MOST]
+        nearest = min(nearest, (float(apart[places[0]]), order))
+        returns += [Start(states[place], order) for place in places]
+    if repeats:
+        return Starts(first + returns, f"the run of the scene is {kind}; try another `from` or other periods")
+    asked = f", not repeating after {periods}" if kind != "non-periodic" else ""
+    return Starts(
+        returns,
+        f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of "
+        f"its range at best, after {nearest[1]} (the phase planes in the report of its `vanedamp run --samples 100` "
+        "show every period's start); try another `from`",
+    )

@@ -1,0 +1,67 @@
+"""Runs of a search on disk. The same search asks for the same runs in the same order, and begins with those kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.response.scene_record import SceneCheckpoint
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import ListProgress, run_list
+from vanedamp.coupling.sweep.worker import COLUMNS, SweepTable
+from vanedamp.files.store import Variable
+from vanedamp.files.toml_input import tables
+from vanedamp.studies.optimisation.study import Study
+
+
+class Checkpoint(SceneCheckpoint):
+    """Runs that were asked for so far, in memory and in a file (path None: in memory only).
+
+    Each has measures (columns) and whether its status is ok, as a last column.
+    """
+
+    def __init__(self, path: str | Path | None, study: Study, measures: Sequence[str], provenance: Mapping[str, Any]):
+        """Take up the file's runs. Raises InputError for a file of another study, or one that cannot be read."""
+        of_table = {"optimise": ("study", json.loads(json.dumps(tables(study.table))))}
+        super().__init__(path, "optimise-checkpoint", study.scene, provenance, of_table)
+        self._columns = [COLUMNS.index(name) for name in measures]
+        self._runs, self._asked = np.empty((0, len(measures) + 1)), 0
+        self._list: SweepTable | None = None
+        if (found := self.read()) is not None:
+            self._runs = found[0]["runs"]
+
+    def run(
+        self, base: Scene, points: Sequence[Mapping[str, Any]], executor: Executor | None, progress: ListProgress
+    ) -> np.ndarray:
+        """Return the measures (p, m + 1) of scenes that differ from `base` in some values (sweep.run_list)."""
+        first, self._asked = self._asked, self._asked + len(points)
+        if missing := points[len(self._runs[first : self._asked]) :]:
+            known = len(points) - len(missing)
+            finished = SweepTable(len(missing))
+            self._list = finished
+
+            def told(done: int) -> None:
+                self.changed()
+                progress(known + done)
+
+            run_list(base, missing, executor, told, finished)
+            self._runs, self._list = np.vstack([self._runs, self._of(finished)]), None
+        return self._runs[first : self._asked]
+
+    def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
+        """Return variables of the file, and how much is finished, in words: runs up to the first that is not done."""
+        runs = self._runs
+        if self._list is not None:
+            whole = np.append(self._list.done, False).argmin()
+            runs = np.vstack([runs, self._of(self._list)[:whole]])
+        return {"runs": Variable(runs, ("run", "column"))}, {}, f"{len(runs)} runs are finished"
+
+    def _of(self, table: SweepTable) -> np.ndarray:
+        """Return the measures (p, m + 1) of a list of runs, finished or not."""
+        ok = table.text("status") == "ok" if table.count else np.zeros(len(table.done))
+        return np.column_stack([table.values[:, self._columns], ok.astype(float)])
