@@ -121,7 +121,8 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
             "damping_ratio": shipped.damping_ratio,
         }  # fmt: skip
         place: dict[str, Any] = {}
-        cavities, near = [{"name": "c1"}], [shipped.frequency] * 2
+        cavities: list[dict[str, Any]] = [{"name": "c1"}]
+        near = [shipped.frequency] * 2
     else:
         model = ReducedModel.load(rom)
         structure, place, cavities, near = _on_model(model, rom)
