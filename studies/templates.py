@@ -121,7 +121,8 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
             "damping_ratio": shipped.damping_ratio,
         }  # fmt: skip
         place: dict[str, Any] = {}
-        cavities, near = [{"name": "c1"}], [shipped.frequency] * 2
+        cavities: list[dict[str, Any]] = [{"name": "c1"}]
+        near = [shipped.frequency] * 2
     else:
         model = ReducedModel.load(rom)
         structure, place, cavities, near = _on_model(model, rom)
@@ -136,7 +137,9 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
         structure["file"] = _beside(rom, file.parent)
     mass, gap = _rounded(_MASS_RATIO * resonance.mass / len(cavities)), _rounded(_GAP_RATIO * amplitude)
     frequencies = [_rounded(share * resonance.frequency) for share in (_RUN, *_SWEEP)]
-    bodies = [{"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities]
+    bodies: list[dict[str, Any]] = [
+        {"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities
+    ]
     contact: dict[str, Any] = {}
     if rom is not None:
         contact = {"contact": {"law": "compliant", "stiffness": _contact_stiffness(model, cavities, resonance, mass)}}
@@ -145,6 +148,7 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
                 cavity["play"] = gap
                 length, height = (_rounded(extent - gap) for extent in size)
                 body |= {"shape": "block", "length": length, "height": height}
+    points = 21 if any("shape" in body for body in bodies) else 61  # blocks take longer
     return {
         "structure": structure,
         "excitation": excitation | {"frequency": frequencies[0]},
@@ -155,7 +159,7 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
         "time": {"periods": 1500, "transient": 1000},
         "sweep": {
             "cavity.gap": [gap, _rounded(gap / 5)],
-            "excitation.frequency": {"start": frequencies[1], "stop": frequencies[2], "num": 61},
+            "excitation.frequency": {"start": frequencies[1], "stop": frequencies[2], "num": points},
         },
     }
 
