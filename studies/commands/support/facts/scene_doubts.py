@@ -42,7 +42,8 @@ def sweep_doubts(scene: Scene) -> Iterator[str]:
     undamped, fixed = np.reshape(curves, (len(x), 2)).T
     peaks = {name: float(values) for name, values in linear_tops(points).items()}
     damped = fixed if scene.damper else undamped  # the damped peak lies between them, as a rule
-    found = headline(x, damped, damped, np.zeros(len(x)), undamped, fixed, peaks, along_frequency=True)
+    none = np.zeros(len(x))
+    found = headline(x, damped, damped, none, none, none, undamped, fixed, peaks, along_frequency=True)
     unit = "Hz" if swept == FREQUENCY else unit_of(swept)
     for remark in found.remarks_in(unit):
         yield f"sweep.{swept}: by the linear curves, {remark}"
