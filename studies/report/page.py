@@ -41,7 +41,7 @@ class Page:
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
-    study   the study that the results belong to; None for results of their own
+    study   name of the study that the results belong to; None for results of their own
     charts  charts made so far, by the first part of their name
     later   pieces that templates move to the energies, by the call `later`
     """
@@ -50,7 +50,7 @@ class Page:
     known: Mapping[str, Section]
     names: Mapping[str, str]
     environment: jinja2.Environment
-    study: Study | None = None
+    study: str | None = None
     charts: Counter[str] = field(default_factory=Counter)
     later: list[str] = field(default_factory=list)
 
@@ -83,8 +83,9 @@ class Page:
             for study, files in [(None, own), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
-                    shows = section.section(results, replace(self, study=study))
-                    of = {"section": shows, "study": study, "later": self._put_off}
+                    name, title = (None, "") if study is None else (study.study, study.title)
+                    shows = section.section(results, replace(self, study=name))
+                    of = {"section": shows, "study": name, "title": title, "later": self._put_off}
                     blocks.append(self.environment.from_string(template).render(of))
         return "".join([*blocks, self._energies()])
 
