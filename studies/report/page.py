@@ -76,7 +76,7 @@ class Page:
         ]
         own = set(self.results.by_file).difference(*(files for _, files in studies))
         blocks = []
-        for kind, section in self.known.items():
+        for kind, section in sorted(self.known.items(), key=lambda item: item[0] == CLAIMS):  # the claims come last
             if kind == CLAIMS:
                 blocks.append(self._energies())
             template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
@@ -87,7 +87,7 @@ class Page:
                     shows = section.section(results, replace(self, study=name))
                     of = {"section": shows, "study": name, "title": title, "later": self._put_off}
                     blocks.append(self.environment.from_string(template).render(of))
-        return "".join([*blocks, self._energies()])
+        return "".join(blocks)
 
     def _put_off(self, caller: Callable[[], str]) -> str:
         """Keep a piece of a template for the section of the energies."""
@@ -95,10 +95,8 @@ class Page:
         return ""
 
     def _energies(self) -> str:
-        """Return the pieces that were put off, below their heading; none are left."""
-        pieces = "".join(self.later)
-        self.later.clear()
-        return f"<h2>Where the energy goes</h2>{pieces}" if pieces else ""
+        """Return the pieces that were put off, below their heading."""
+        return "".join(["<h2>Where the energy goes</h2>", *self.later]) if self.later else ""
 
 
 def write_report(results: Results, path: str | Path, title: str | None = None) -> None:
