@@ -224,4 +224,4 @@ def frequency_grid(model: ReducedModel, low_hz: float, high_hz: float, points: i
 
 
 def _percent(value: float) -> str:
-    return f"{100.0 * value:.2g} %"
+    return f"{100.0 * value:.0f} %" if value > 1.0 else f"{100.0 * value:.2g} %"

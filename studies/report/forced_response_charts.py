@@ -74,6 +74,8 @@ def jumps(mean: np.ndarray, confidence: np.ndarray, reference: float) -> np.ndar
     A jump is larger than the confidence of its ends, than a small fraction of the reference, and than what the curve
     changes by around it.
     """
+    if len(mean) < 2:
+        return np.zeros(0, int)
     steps = np.abs(np.diff(mean))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, 2, mode="edge"), 5)[:, [0, 1, 3, 4]]
     sure = np.nan_to_num(confidence[1:]) + np.nan_to_num(confidence[:-1])

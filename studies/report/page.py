@@ -41,7 +41,7 @@ class Page:
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
-    study   the study that the results belong to; None for results of their own
+    study   name of the study that the results belong to; None for results of their own
     charts  charts made so far, by the first part of their name
     later   pieces that templates move to the energies, by the call `later`
     """
@@ -50,7 +50,7 @@ class Page:
     known: Mapping[str, Section]
     names: Mapping[str, str]
     environment: jinja2.Environment
-    study: Study | None = None
+    study: str | None = None
     charts: Counter[str] = field(default_factory=Counter)
     later: list[str] = field(default_factory=list)
 
@@ -76,17 +76,18 @@ class Page:
         ]
         own = set(self.results.by_file).difference(*(files for _, files in studies))
         blocks = []
-        for kind, section in self.known.items():
+        for kind, section in sorted(self.known.items(), key=lambda item: item[0] == CLAIMS):  # the claims come last
             if kind == CLAIMS:
                 blocks.append(self._energies())
             template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
             for study, files in [(None, own), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
-                    shows = section.section(results, replace(self, study=study))
-                    of = {"section": shows, "study": study, "later": self._put_off}
+                    name, title = (None, "") if study is None else (study.study, study.title)
+                    shows = section.section(results, replace(self, study=name))
+                    of = {"section": shows, "study": name, "title": title, "later": self._put_off}
                     blocks.append(self.environment.from_string(template).render(of))
-        return "".join([*blocks, self._energies()])
+        return "".join(blocks)
 
     def _put_off(self, caller: Callable[[], str]) -> str:
         """Keep a piece of a template for the section of the energies."""
@@ -94,10 +95,8 @@ class Page:
         return ""
 
     def _energies(self) -> str:
-        """Return the pieces that were put off, below their heading; none are left."""
-        pieces = "".join(self.later)
-        self.later.clear()
-        return f"<h2>Where the energy goes</h2>{pieces}" if pieces else ""
+        """Return the pieces that were put off, below their heading."""
+        return "".join(["<h2>Where the energy goes</h2>", *self.later]) if self.later else ""
 
 
 def write_report(results: Results, path: str | Path, title: str | None = None) -> None:

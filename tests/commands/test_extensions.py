@@ -252,7 +252,7 @@ def test_command_writes_a_record_that_the_report_shows(vanedamp, tmp_path):
     assert (tmp_path / "masses.csv").read_text().split() == ["ratio", "0.025", "0.00675"]
     succeeds(vanedamp("report", ".", "-o", "report.html"))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "<h2>Masses of the bodies</h2>" in page
+    assert ">Masses of the bodies</h2>" in page
     assert "masses.h5: together 0.0318 of the structure." in page
     assert 'id="masses-0"' in page and "acme 1.0" in page
     (link,) = re.findall(r'download="masses-0.csv" href="data:text/csv;charset=utf-8;base64,([^"]+)"', page)
@@ -260,14 +260,14 @@ def test_command_writes_a_record_that_the_report_shows(vanedamp, tmp_path):
     assert [float(row["ratio"]) for row in table] == [0.025, 0.00675]
 
 
-def test_results_of_a_study_stand_within_it(vanedamp, tmp_path):
+def test_results_of_a_study_know_it(vanedamp, tmp_path):
     succeeds(vanedamp("body-masses", "scene.toml", "-o", "masses.h5"))
     study = {"study": "light", "title": "Light bodies", "sources": ["masses.h5"], "claims": []}
     (tmp_path / "light.claims.json").write_text(json.dumps(study))
     succeeds(vanedamp("report", ".", "-o", "report.html"))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.index("<h2>Light bodies</h2>") < page.index("together 0.0318 of the structure in light.")
-    assert page.count("<h2>Masses of the bodies</h2>") == 1
+    assert page.index("together 0.0318 of the structure in light.") < page.index("<h3>Light bodies</h3>")
+    assert page.count(">Masses of the bodies</h2>") == 1
 
 
 def test_outputs_of_the_command_are_checked_like_ours(vanedamp):

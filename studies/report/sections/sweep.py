@@ -100,7 +100,7 @@ def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
     for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
         stem = page.names[file].removesuffix(".h5")
         if page.study is not None:
-            name = stem.removeprefix(page.study.study).strip("_").replace("_", " ") or model
+            name = stem.removeprefix(page.study).strip("_").replace("_", " ") or model
         else:
             name = model if models.count(model) == 1 else f"{model} ({stem})"
         responses += [replace(response, source=file) for response in forced_responses(sweep, name)]
