@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.response.static_deflection import about_mean, deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
@@ -40,8 +42,8 @@ from vanedamp.coupling.system.linear_response import (
 )
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
-from vanedamp.coupling.transients.ramp_record import WORKS, Ramp, RampRun
-from vanedamp.files.store import frozen
+from vanedamp.coupling.transients.ramp_record import CURVES, WORKS, Ramp, RampRun
+from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import InputError
 
 #: fraction of the gap, and of its product with the angular frequency, below which a body counts as at rest
@@ -54,12 +56,36 @@ _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 _STEP = 1e-4
 
 
+class _Checkpoint(SceneCheckpoint):
+    """Finished runs on disk (path None: nowhere), with remarks on them; a run under way begins again."""
+
+    def __init__(self, path: str | Path | None, scene: Scene, provenance: Mapping[str, Any]) -> None:
+        """Take up the file's runs. Raises InputError for a file of other runs, or one that cannot be read."""
+        super().__init__(path, "ramp-checkpoint", scene, provenance)
+        self._scene, self._provenance = scene, provenance
+        self.runs, self.notes = list[RampRun](), list[str]()
+        if (found := self.read()) is not None:
+            kept = Ramp.of(*found, str(path))
+            self.runs, self.notes = list(kept.runs), list(kept.warnings)
+
+    def content(self) -> tuple[Mapping[str, Variable], dict[str, Any], str]:
+        """Return variables and attributes of the file, and how much is finished, in words."""
+        nothing = {name: np.zeros(0) for name in CURVES}
+        kept = Ramp(self._scene, tuple(self.runs), nothing, {}, tuple(self.notes), self._provenance)
+        return kept.variables(), kept.attributes(), f"{len(self.runs)} runs are finished"
+
+
 def ramp(
-    scene: Scene, progress: Callable[[int, int], None] | None = None, provenance: Mapping[str, Any] | None = None
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Ramp:
     """Run a scene up or down, or both, at all rates of its [ramp] table.
 
-    progress: called with the number of periods done and of those to do, of all runs.
+    progress: called with the number of periods done and of those to do, of all runs; checkpoint: a file to which
+    finished runs are written and from which an interrupted call resumes; the caller removes it once the result is safe
+    (files.checkpoint_file.clear).
     Raises InputError for a scene without the table, or one that cannot be run so; numerical failure is a status of the
     run.
     """
@@ -69,22 +95,25 @@ def ramp(
     for end in ends:  # before the first run: a speed may be too high
         assemble(with_choices(end, choices).scene)
     total, before = sum(len(course.time) for course in planned), 0
-    runs: list[RampRun] = []
-    notes: list[str] = []
-    for course in planned:
-        chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
-        first, start = chosen.scene, chosen.start
-        if not runs:
-            notes += warnings_of(first)
-        if table.start == "steady":
-            start, warnings = _steady(first, start)
-            notes += warnings
-        run = _Run(first, table, course, start)
-        for done in run.advance():
-            if progress is not None:
-                progress(before + done, total)
-        before += len(course.time)
-        runs.append(run.result())
+    with _Checkpoint(checkpoint, scene, provenance or {}) as kept:
+        runs, notes = kept.runs, kept.notes
+        for number, course in enumerate(planned):
+            chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
+            first, start = chosen.scene, chosen.start
+            before += len(course.time)
+            if number < len(runs):  # of the checkpoint
+                continue
+            if not runs:
+                notes += warnings_of(first)
+            if table.start == "steady":
+                start, warnings = _steady(first, start)
+                notes += warnings
+            run = _Run(first, table, course, start)
+            for done in run.advance():
+                if progress is not None:
+                    progress(before - len(course.time) + done, total)
+            runs.append(run.result())
+            kept.changed()
     curves, tops = _stationary(first, table)
     return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), dict(provenance or {}))
 

@@ -158,8 +158,8 @@ COMMANDS = (
     ),
     Command(
         "ramp", "run-up and run-down through resonance, as the scene's [ramp] table says", 87,
-        (input_file("SCENE.toml"), output_file("RAMP.h5"), json_file),
-        writes={"output": _RECORD}, reads=_SCENE,
+        (input_file("SCENE.toml"), output_file("RAMP.h5"), json_file, resume),
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE,
     ),
     Command(
         "ringdown",

@@ -614,3 +614,22 @@ def test_bad_input_ends_with_one_line(tmp_path):
     )
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert "ramp: missing" in done.stderr
+
+
+def test_interrupted_runs_resume_and_give_the_same_file(tmp_path):
+    table = {"from": 98.0, "to": 102.0, "rate": [20.0, 40.0], "both": True}
+    given, file, calls = scene(table, BODY), tmp_path / "r.h5.partial", []
+    ramp(given).save(tmp_path / "whole.h5")
+
+    def interrupted(done, total):
+        if done > 0.7 * total:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ramp(given, interrupted, checkpoint=file)
+    resumed = ramp(given, lambda *call: calls.append(call), checkpoint=file)
+    resumed.save(tmp_path / "resumed.h5")
+    assert calls[0][0] > 1 and len(calls) < calls[-1][1] == calls[-1][0]
+    assert (tmp_path / "resumed.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
+    with pytest.raises(InputError, match="the checkpoint of another scene; nothing was done to it"):
+        ramp(scene(table | {"to": 103.0}, BODY), checkpoint=file)
