@@ -108,7 +108,8 @@ def test_report_shows_basins_and_how_many_states_there_are(basin, tmp_path):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     found = charts(page)
     # a sweep of starts only has no curves
-    assert set(found) == {"response-0", "mistuning-0", "energy-0", "map-0", "basins-0", "basins-1", "states-0"}
+    responses = {"response-0", "mistuning-0", "energy-0", "map-0"}
+    assert set(found) == responses | {"summary-0", "basins-0", "basins-1", "states-0"}
     assert not any("starts" in name for trace in found["response-0"] for name in trace["meta"]["curves"])
     states = steady_states(basin)
     panels = [trace for trace in found["basins-0"] if trace["type"] == "heatmap"]
