@@ -319,3 +319,47 @@ def test_a_mesh_file_that_is_none(tmp_path, text):
     (tmp_path / "a.msh").write_text(text)
     with pytest.raises(ValueError, match=r"a\.msh: "):
         read_header(tmp_path / "a.msh")
+
+
+def warned(tmp_path, capfd, tables, key):
+    return [text for text in checked(tmp_path, capfd, tables)["warnings"] if text.startswith(key)]
+
+
+@pytest.mark.parametrize(
+    ("span", "told"),
+    [((2300.0, 2500.0, 9), "too coarse"), ((2405.0, 2500.0, 191), "edge of the range"), ((2350.0, 2450.0, 201), "")],
+)
+def test_frequencies_are_judged_as_the_headline_will(tmp_path, capfd, span, told):
+    axis = dict(zip(("start", "stop", "num"), span, strict=True))
+    found = warned(tmp_path, capfd, DAMPED | {"sweep": {"excitation.frequency": axis}}, "sweep.")
+    assert all(told in text for text in found) and bool(found) is bool(told)
+
+
+def test_slips_of_units_in_gap_and_stiffness(tmp_path, capfd):
+    amplitude = checked(tmp_path, capfd, DAMPED)["resonance_amplitude"]
+    for ratio, told in ((19.0, False), (21.0, True)):
+        wide = DAMPED | {"cavity": [{"name": "c1", "gap": ratio * amplitude}]}
+        assert bool(warned(tmp_path, capfd, wide, "cavity[0].gap")) is told
+    # omega X sqrt(m/k) is the overlap of a body that a spring stops
+    softest = 0.003 * (2 * math.pi * 0.99 * HZ * amplitude / 2e-5) ** 2
+    for share, told in ((1.01, False), (0.99, True)):
+        soft = DAMPED | {"contact": {"law": "compliant", "stiffness": share * softest}}
+        assert bool(warned(tmp_path, capfd, soft, "contact.stiffness")) is told
+
+
+@pytest.mark.parametrize(("scale", "told"), [(1.0, False), (1e3, True)])
+def test_a_mesh_in_millimetres(tmp_path, capfd, scale, told):
+    case = changed(CLUSTER, ("degree = 2", f"degree = 2\nscale = {scale}"))
+    found = checked(tmp_path, capfd, case)
+    assert any("mesh.scale = 1e-3" in text for text in found["warnings"]) is told
+    assert found["extent"] == pytest.approx(0.0759885 * scale, rel=1e-4)
+
+
+def test_a_study_that_leaves_bodies_out(tmp_path, capfd):
+    two = DAMPED | {
+        "damper": [{"cavity": "c1", "mass": 0.0015, "friction": MU, "position": place} for place in (-5e-6, 5e-6)]
+    }
+    study = two | {"time": {"periods": 1500, "transient": 700}}
+    for given, told in (({}, True), ({"variables": {"bodies": 1}}, False)):
+        tables = study | {"optimise": {"band": [2380.0, 2400.0], **given}}
+        assert bool(warned(tmp_path, capfd, tables, "optimise.variables.bodies")) is told

@@ -106,7 +106,6 @@ def check(process, folder, ended=(130, "", "vanedamp: interrupted\n")):
         ("import", "vanedamp.coupling.sweep.sweep", 1),
         ("import", "numba.core.caching", 1),
         ("import", "vanedamp.coupling.sweep.schedule", 1),
-        ("import", "tqdm", 1),
         ("os.rename", ".partial", 1),
         ("os.rename", ".partial", 2),
     ],

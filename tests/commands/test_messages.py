@@ -10,7 +10,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.terminal import progress, stage, stages_shown
 
 RANGE = '"excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}'
 
@@ -182,6 +182,29 @@ def test_long_work_says_in_a_log_how_far_it_is(capsys, monkeypatch):
             report(done, 400)
             now[0] += 20.0
     assert capsys.readouterr().err == "vanedamp: sweep: 300 of 400, 5 per second, 0.333 min left\n"
+
+
+def test_what_is_done_before_the_first_point_says_nothing_of_the_rate(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("vanedamp.studies.terminal.time.monotonic", lambda: now[0])
+    with progress("sweep") as report:
+        now[0] = 40.0  # such as the engine, which is compiled
+        for done in range(3):
+            with stage("map"):
+                report(done, 4)
+            now[0] += 30.0
+    told = "vanedamp: sweep, map: {} of 4, 0.0333 per second, {} min left\n"
+    assert capsys.readouterr().err == told.format(1, 1.5) + told.format(2, 1)
+
+
+def test_stages_show_in_commands_only(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with stage("modes"):
+        pass
+    assert capsys.readouterr().err == ""
+    with stages_shown(), stage("modes"):
+        pass
+    assert capsys.readouterr().err == "\r\x1b[Kvanedamp: modes ...\r\x1b[K"
 
 
 def test_figures_of_a_run_have_units(folder, capsys):

@@ -9,14 +9,23 @@ import math
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from vanedamp.coupling.engine.backends import reuse_subsystems
-from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.methods.registry import run_of, why_no_restart
+from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import start_of
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.worker import OF_A_POINT
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.resonance import steady_motion
+from vanedamp.files.store import frozen
 from vanedamp.studies.commands.support.budget import RUN
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import stage
@@ -52,31 +61,59 @@ def tried(count: int) -> list[int]:
 def _cost(scene: Scene, seconds: float) -> float:
     """Return the processor time of a run, s, from a trial of about `seconds`.
 
-    Where contacts close in a new combination, the exact engines assemble a subsystem. A second trial, which has them
-    all, tells this cost, which grows as a power of the periods as combinations return, from that of the motion.
+    A run that takes longer is tried from near its steady state: little happens while it begins. Where contacts close in
+    a new combination, the exact engines assemble a subsystem. A second trial, which has them all, tells this cost,
+    which grows as a power of the periods as combinations return, from that of the motion.
     """
-    periods, marks, run, begun = scene.time.simulated, [0, 1], run_of(scene), time.process_time()
-    first = [0.0]
-    while run.advance_to(marks[-1]) is Status.OK:
-        first.append(time.process_time() - begun)
-        if marks[-1] >= periods or (first[-1] > 0.7 * seconds and len(first) > 2):
-            break
-        pace = first[-1] / marks[-1]
-        most = int((seconds - first[-1]) / max(pace, 1e-7))
-        marks.append(min(2 * marks[-1], marks[-1] + max(most, 1), periods))
-    else:
-        return RUN + time.process_time() - begun
-    if marks[-1] >= periods:
-        return RUN + first[-1]
-    again, motion = run_of(scene), [0.0]
+    periods = scene.time.simulated
+    whole = _follow(run_of(scene), periods, 0.3 * seconds)
+    if whole[-1][0] == periods or whole[-1] == whole[-2]:
+        return RUN + whole[-1][1]
+    start = _near_steady(scene)
+    run, again = run_of(scene, start=start), run_of(scene, start=start)
+    first = _follow(run, periods, 0.5 * seconds)
+    last = first[-1][0]
     reuse_subsystems(again, run)
-    begun = time.process_time()
-    for mark in marks[1:]:
-        again.advance_to(mark)
-        motion.append(time.process_time() - begun)
-    left, last = periods - marks[-1], marks[-1]
-    half = min(next(number for number, mark in enumerate(marks) if 2 * mark >= last), len(marks) - 2)
-    moving = (motion[-1] - motion[half]) / (last - marks[half])
-    assembled, before = (max(first[number] - motion[number], 1e-9) for number in (-1, half))
-    growth = min(max(math.log(assembled / before) / math.log(last / marks[half]), 0.0), 1.0)
-    return RUN + motion[-1] + left * moving + assembled * (periods / last) ** growth
+    if first[-1] == first[-2]:  # the run has ended early
+        return RUN + first[-1][1]
+    motion = _follow(again, last, math.inf, [mark for mark, _ in first])
+    half = max(number for number, (mark, _) in enumerate(first[:-1]) if 2 * mark <= last or number == 1)
+    before = first[half][0]
+    moving = (motion[-1][1] - motion[half][1]) / (last - before)
+    assembled, earlier = (max(first[number][1] - motion[number][1], 1e-9) for number in (-1, half))
+    growth = min(max(math.log(assembled / earlier) / math.log(last / before), 0.0), 1.0)
+    return RUN + motion[-1][1] + (periods - last) * moving + assembled * (periods / last) ** growth
+
+
+def _follow(run: Run, periods: int, seconds: float, marks: Sequence[int] = ()) -> list[tuple[int, float]]:
+    """Return periods done and the processor time since the begin, s, until all are done, the run ends, or time is up.
+
+    marks: the numbers of periods, from 0; without them, twice as many each time.
+    """
+    begun, found = time.process_time(), [(0, 0.0)]
+    while (done := found[-1][0]) < periods and (found[-1][1] < seconds or len(found) < 4):
+        pace = max(found[-1][1], 1e-6) / max(done, 1)
+        most = int((seconds - found[-1][1]) / pace) if seconds < math.inf else periods
+        target = marks[len(found)] if marks else min(done + min(max(done, 1), max(most, 1)), periods)
+        ok = run.advance_to(target) is Status.OK
+        found.append((target, time.process_time() - begun))
+        if not ok:
+            return [*found, found[-1]]
+    return found
+
+
+def _near_steady(scene: Scene) -> RestartState | None:
+    """Return the linear steady state, of the smaller amplitude without bodies and with bodies fixed.
+
+    None where there is none, or runs of the scene's method cannot begin with it.
+    """
+    if scene.excitation.signal is not None or isinstance(scene.structure, Prescribed) or why_no_restart(scene):
+        return None
+    system, frequency = assemble(scene), np.array([scene.frequency])
+    free, fixed = linear_responses(scene, system)
+    wave = steady_motion(free.stiffness, free.damping, free.mass, free.load[0], 2 * np.pi * frequency)[0]
+    amplitudes = [float(response.amplitude(frequency)[0]) for response in (free, fixed)]
+    wave = wave * min(amplitudes[1] / amplitudes[0], 1.0) if amplitudes[0] else wave
+    start = start_of(scene, system)
+    displacement, velocity = system.scale * wave.imag, system.scale * system.omega * wave.real
+    return replace(start, displacement=frozen(displacement), velocity=frozen(velocity))
