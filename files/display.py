@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from html import escape
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -15,16 +15,15 @@ _ENTRIES, _WIDTH = 6, 88
 
 
 class Displayed:
-    """Base of records, dataclasses with repr=False, that print so that a notebook can show them.
-
-    UNITS: units of the fields that have one
-    """
-
-    UNITS: ClassVar[Mapping[str, str]] = {}
+    """Base of records, dataclasses with repr=False, that print so that a notebook can show them."""
 
     def shown(self) -> dict[str, Any]:
         """Return the values that are printed, by name."""
         return {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
+
+    def printed_units(self) -> Mapping[str, str]:
+        """Return the units of the values that have one, by name."""
+        return {}
 
     def __repr__(self) -> str:
         """Return the record's name and a line for each of its fields that has a value."""
@@ -37,8 +36,8 @@ class Displayed:
         return html_table((type(self).__name__, ""), self._lines().items())
 
     def _lines(self) -> dict[str, str]:
-        shown = {name: _shown(value) for name, value in self.shown().items()}
-        return {name: f"{text} {self.UNITS.get(name, '')}".rstrip() for name, text in shown.items() if text is not None}
+        shown, units = {name: _shown(value) for name, value in self.shown().items()}, self.printed_units()
+        return {name: f"{text} {units.get(name, '')}".rstrip() for name, text in shown.items() if text is not None}
 
 
 class Plotted(Displayed):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -130,8 +130,6 @@ UNITS = {
 class Response(Plotted):
     """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods."""
 
-    UNITS: ClassVar[dict[str, str]] = UNITS
-
     status: Status
     """how the run ended"""
     frequency: float
@@ -213,6 +211,10 @@ class Response(Plotted):
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+
+    def printed_units(self) -> dict[str, str]:
+        """Return the units of the results that have one, by name."""
+        return UNITS
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
