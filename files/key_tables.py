@@ -187,11 +187,14 @@ def documented(record: type[Record]) -> type[Record]:
         except ValidationError:
             validate(record, keys, record.__name__.lower())
             raise
-        finally:
-            if record.__init__ is not __init__:  # pydantic puts its own in place as it builds the class on first use
-                _begin_with(record, __init__)
+
+    def __new__(cls: Any, /, *_: Any, **__: Any) -> Any:
+        if record.__init__ is not __init__:  # pydantic puts its own in place when it builds the class
+            _begin_with(record, __init__)
+        return object.__new__(cls)
 
     record.__doc__ = KeyedDocstring(record)  # type: ignore[assignment]
+    record.__new__ = __new__  # type: ignore[method-assign, assignment]
     _begin_with(record, __init__)
     return record
 
