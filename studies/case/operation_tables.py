@@ -86,7 +86,7 @@ class CampbellTable:
     modes: Annotated[Whole, Field(ge=1)] = 6
     """number of modes that are followed"""
     operating: tuple[NonNegative, NonNegative] | None = None
-    """lowest and highest speed of operation, to which crossings have a margin [rad/s, or rpm beside rpm]"""
+    """lowest and highest speed of operation, to which crossings have a margin, as the speeds [rad/s or rpm]"""
 
     def __post_init__(self) -> None:
         if self.operating is not None and self.operating[0] > self.operating[1]:

@@ -126,6 +126,11 @@ def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
     return (starts[0], starts[1]) if len(starts) == 2 else None
 
 
+def has_responses(sweep: Sweep) -> bool:
+    """Return whether a sweep has responses along an axis: one of starts only has none."""
+    return not (basin_axes(sweep) and all(map(is_start, sweep.axes)))
+
+
 def count_axes(sweep: Sweep) -> tuple[str, str] | None:
     """Return the two keys over which a sweep counts steady states; None without, or where all runs begin alike."""
     several = any(is_start(path) and len(values) > 1 for path, values in sweep.axes.items())

@@ -21,6 +21,7 @@ from vanedamp.studies.report.forced_response import (
     model_name,
 )
 from vanedamp.studies.report.forced_response_charts import responses_figure
+from vanedamp.studies.report.map_chart import has_responses
 from vanedamp.studies.report.pictures import mode_picture
 from vanedamp.studies.report.results import Results
 
@@ -34,6 +35,7 @@ def summary(results: Results, page: Any) -> dict[str, Any]:
     found = [
         replace(response, source=file)
         for file, result in results.kinds["sweep"].items()
+        if has_responses(result.record)
         for response in forced_responses(result.record)
     ]
     if found:

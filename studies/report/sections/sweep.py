@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.steady_states import SteadyState, is_start, steady_states
+from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.forced_response import (
@@ -36,6 +36,7 @@ from vanedamp.studies.report.map_chart import (
     basins_figure,
     count_axes,
     count_figure,
+    has_responses,
     map_axes,
     map_figure,
     map_panels,
@@ -91,10 +92,7 @@ def _scene(sweep: Sweep) -> dict[str, Any]:
 
 def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
     """Return the curves of sweeps; curves of a study are named after their files, others after their models."""
-    # a sweep of starts only has no response along an axis
-    sweeps = {
-        file: sweep for file, sweep in sweeps.items() if not (basin_axes(sweep) and all(map(is_start, sweep.axes)))
-    }
+    sweeps = {file: sweep for file, sweep in sweeps.items() if has_responses(sweep)}
     models = [model_name(sweep.scene) for sweep in sweeps.values()]
     responses = []
     for model, (file, sweep) in zip(models, sweeps.items(), strict=True):

@@ -108,8 +108,10 @@ def test_report_shows_basins_and_how_many_states_there_are(basin, tmp_path):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     found = charts(page)
     # a sweep of starts only has no curves
-    responses = {"response-0", "mistuning-0", "energy-0", "map-0"}
-    assert set(found) == responses | {"summary-0", "basins-0", "basins-1", "states-0"}
+    curves = {"summary-0", "response-0", "mistuning-0", "energy-0"}
+    assert set(found) == curves | {"map-0", "basins-0", "basins-1", "states-0"}
+    write_report(collect([tmp_path / "starts.h5"]), tmp_path / "starts.html")
+    assert set(charts((tmp_path / "starts.html").read_text(encoding="utf-8"))) == {"basins-0"}
     assert not any("starts" in name for trace in found["response-0"] for name in trace["meta"]["curves"])
     states = steady_states(basin)
     panels = [trace for trace in found["basins-0"] if trace["type"] == "heatmap"]
