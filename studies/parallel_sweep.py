@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.terminal import Bar
 from vanedamp.studies.workers import workers as processes
 
 
@@ -37,22 +38,6 @@ def sweep(
     """
     if workers < 0 or (workers != 1 and executor is not None):
         raise InputError("workers: expected a number of processes, 0 for one per core; leave it out beside an executor")
-    with processes(workers) if executor is None else nullcontext(executor) as pool, _shown(progress) as report:
+    shown = closing(Bar("sweep", unit="point", leave=True)) if progress is True else nullcontext(progress or None)
+    with processes(workers) if executor is None else nullcontext(executor) as pool, shown as report:
         return run_sweep(scene, pool, report, checkpoint, provenance)
-
-
-@contextmanager
-def _shown(progress: bool | Callable[[int, int], None] | None) -> Iterator[Callable[[int, int], None] | None]:
-    """Yield the function that takes the progress; None for none."""
-    if progress is not True:
-        yield progress or None
-        return
-    from tqdm import tqdm
-
-    with tqdm(desc="sweep", unit="point") as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-
-        yield show

@@ -31,7 +31,10 @@ The parametric vane cluster. `vanedamp modal {file}` computes its modes, `vaneda
 `vanedamp check {file}` says what it means. SI units; every key: `vanedamp schema case`."""
 _LEVEL_NOTE = """\
 resonance_amplitude: {level}."""
-_AT_STRENGTH = "at this amplitude the stress reaches {share:.0%} of the case's fatigue strength"
+_AT_STRENGTH = (
+    "at this amplitude the stress reaches {share:.0%} of the case's fatigue strength, {strength:.4g} Pa when the model "
+    "was reduced"
+)
 _NO_STRENGTH = "that of the shipped cluster; the model's case has no fatigue strength, set your own"
 _CONTACT_NOTE = """\
 The stiffness is that of the model's wall under a static force, without the resonance's share, and keeps a body on it

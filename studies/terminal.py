@@ -14,7 +14,7 @@ from typing import Any
 _PATIENCE, _SOON = 30.0, 2.0
 _UNITS = (("days", 86_400.0), ("h", 3600.0), ("min", 60.0))
 #: how stages are shown: by the progress under way, by lines of their own, or (None, outside of commands) not at all
-_DISPLAY: ContextVar[_Lines | _Bar | _Alone | None] = ContextVar("display", default=None)
+_DISPLAY: ContextVar[_Lines | Bar | _Alone | None] = ContextVar("display", default=None)
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
     The clock starts with the first call: what was done before, or compiled, says nothing of the rate.
     """
-    show = _Bar(title) if sys.stderr.isatty() else _Lines(title)
+    show = Bar(title) if sys.stderr.isatty() else _Lines(title)
     before = _DISPLAY.set(show)
     try:
         yield show
@@ -78,18 +78,19 @@ class _Alone:
         return before
 
 
-class _Bar:
+class Bar:
     """A bar on a terminal."""
 
-    def __init__(self, title: str) -> None:
-        self.title, self.stage = title, ""
+    def __init__(self, title: str, **look: Any) -> None:
+        """Take the title, and options of tqdm."""
+        self.title, self.stage, self.look = title, "", {"leave": False} | look
         self.bar: Any = None
 
     def __call__(self, done: int, total: int) -> None:
         if self.bar is None:
             from tqdm import tqdm
 
-            self.bar = tqdm(desc=self._title(), total=total, initial=done, leave=False)
+            self.bar = tqdm(desc=self._title(), total=total, initial=done, **self.look)
         self.bar.total = total
         self.bar.update(done - self.bar.n)
 

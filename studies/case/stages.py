@@ -514,7 +514,10 @@ def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, A
     level = _fatigue(structure, Modes(frequency, shapes, np.zeros(1)), 0, _functional(case, structure.matrices, at))
     if level is None:
         return None
-    return {"at": at, "frequency_hz": float(frequency[0]), "share": level.share, "amplitude": level.amplitude}
+    return {
+        "at": at, "frequency_hz": float(frequency[0]), "share": level.share, "strength": level.spot.strength,
+        "amplitude": level.amplitude,
+    }  # fmt: skip
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:

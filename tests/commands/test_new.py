@@ -108,7 +108,7 @@ def warnings_of_check(capfd):
 def test_a_new_scene_takes_the_level_of_the_model_and_blocks_of_its_cavity(folder, capfd):
     """A rectangle of 14 by 5 mm: its perimeter has the radius of gyration (14 + 5) / sqrt(12) mm."""
     rows = {"shroud": [1.0, 0.3, 0.0], "c1": [0.9, 0.1, 0.4], "c1.normal": [0.0, 0.2, 0.1], "c1.rotation": [5, 3, 80]}
-    level = {"at": "c1", "frequency_hz": 1e4 / (2 * np.pi), "share": 0.7, "amplitude": 31.4e-6}
+    level = {"at": "c1", "frequency_hz": 1e4 / (2 * np.pi), "share": 0.7, "strength": 4e8, "amplitude": 31.4e-6}
     vd.ReducedModel.from_matrices(
         np.eye(3), np.diag([1e8, 2e9, 9e9]), rows, damping_ratio=0.01, arms=[0, 0, 0, 19e-3 / np.sqrt(12)],
         positions=[[0, 0, 0.2], [0, 0, 0.23], [0, 0, 0.23], [0, 0, 0.2325]], provenance={"fatigue": level},
@@ -121,7 +121,7 @@ def test_a_new_scene_takes_the_level_of_the_model_and_blocks_of_its_cavity(folde
     assert body.length + cavity.gap == pytest.approx(14e-3, rel=1e-3)
     assert body.height + cavity.play == pytest.approx(5e-3, rel=1e-3)
     assert warnings_of_check(capfd) == []
-    assert "70% of the case's fatigue strength" in Path("scene.toml").read_text().replace("\n# ", " ")
+    assert "70% of the case's fatigue strength, 4e+08 Pa" in Path("scene.toml").read_text().replace("\n# ", " ")
     assert main(["new", "study", "--rom", "rom.h5"]) == 0
     assert Study.load("study.toml").scene.damper[0].shape == "slider"
 
@@ -134,6 +134,7 @@ def test_a_reduced_model_has_the_fatigue_level_of_its_modes(folder):
     level, modal = ReducedModel.load("rom.h5").provenance["fatigue"], json.loads(Path("modes.json").read_text())
     assert (level["at"], level["share"]) == ("tip", modal["fatigue"]["share"])
     assert level["amplitude"] == pytest.approx(modal["fatigue"]["amplitude"], rel=1e-3)
+    assert level["strength"] == modal["fatigue"]["strength"]
     assert level["frequency_hz"] == pytest.approx(modal["rigid"]["frequency_hz"], rel=1e-5)
 
 

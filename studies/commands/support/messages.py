@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from vanedamp.files.store import finite, json_text, together, write_json
@@ -14,7 +14,7 @@ def write_result(
     arguments: Namespace,
     result: Mapping[str, Any],
     lines: Iterable[str] = (),
-    warnings: Iterable[str] = (),
+    warnings: Collection[str] = (),
     **files: Callable[[str], object],
 ) -> None:
     """Write the results of a command. All files appear together, or none.
@@ -34,8 +34,8 @@ def write_result(
             write_json(target, finite(result))
     if target == "-":
         print(json_text(finite(result)), end="")
-    for warning in warnings:  # a command without an input file has none
-        print_warnings(arguments.input, [warning])
+    if warnings:  # a command without an input file has none
+        print_warnings(arguments.input, warnings)
     if target != "-":
         for line in lines:
             print(line)
