@@ -248,7 +248,8 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
         for name, values in parts.items()
     }
     if plane.walls is not None:
-        figures["wall_impacts"] = tuple(plane.walls[window].mean(axis=0).tolist())
+        walls = plane.walls[window]  # none in a run that ended at once
+        figures["wall_impacts"] = tuple((walls.sum(axis=0) / max(len(walls), 1)).tolist())
     return figures, bool(np.any(neglected[~slider] > plane.bound))
 
 
