@@ -155,7 +155,7 @@ install_python_packages() {
 
 compile_engine() {
     say "compiling the engine"
-    $venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up; warm_up()' ||
+    $venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up_all; warm_up_all()' ||
         say "that failed; the first run compiles it"
 }
 

@@ -143,7 +143,20 @@ def warm_up(scene: Scene | None = None) -> None:
         simulate(replace(scene, sweep={}, time=Time(periods=1, transient=0)))
 
 
-_SMALLEST = {
+def warm_up_all(planar: bool = True) -> None:
+    """Compile every kernel, or load it from the disk cache: of one body, of several, and (planar) of bodies in the plane.
+
+    The first takes most of the time, since the others share its functions.
+    """
+    warm_up()
+    [body], [cavity] = _SMALLEST["damper"], _SMALLEST["cavity"]
+    several = {"cavity": [cavity, cavity | {"name": "d"}], "damper": [body, body | {"cavity": "d"}]}
+    block = {"cavity": [cavity | {"play": 1.0}], "damper": [body | {"shape": "block", "length": 1.0, "height": 1.0}]}
+    for tables in [several, block] if planar else [several]:
+        warm_up(validate(Scene, _SMALLEST | tables, "warm-up"))
+
+
+_SMALLEST: dict[str, Any] = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.01},
     "excitation": {"frequency": 0.16, "force": 1.0},
     "cavity": [{"name": "c", "gap": 1.0}],
