@@ -20,7 +20,7 @@ system_packages=(
     # dolfinx compiles forms when they are first used
     gcc libc6-dev
     # gmsh, which works without a display but not without these
-    libglu1-mesa libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
+    libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
 )
 of_wheel=(python3-dev)
 first_of_wheel=()
@@ -84,7 +84,7 @@ install_of_group() {
     case $1 in
         browser) packages=(chromium) ;;
         # only an environment that sees apt's packages can import it
-        peers) packages=(libgl1 libegl1) && [ $dolfinx = wheel ] || packages+=(python3-siconos) ;;
+        peers) packages=(libegl1) && [ $dolfinx = wheel ] || packages+=(python3-siconos) ;;
     esac
     for package in "${packages[@]}"; do
         installed "$package" || { as_root true && (apt_get install -y --no-install-recommends "$package") 2>/dev/null; } ||
@@ -145,7 +145,9 @@ extras_of() {
 
 install_python_packages() {
     if [ $dolfinx = wheel ]; then
-        pip --constraint requirements.txt -e ".[$(extras_of "$1")]"
+        # pip finds what these need
+        [ "$1" != engine ] || pip --constraint requirements.txt $(pinned engine | sed 's/==.*//') scipy h5py
+        [ "$1" = engine ] || pip --constraint requirements.txt -e ".[$(extras_of "$1")]"
         return
     fi
     # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
@@ -153,10 +155,15 @@ install_python_packages() {
     [ "$1" != product ] || pip --no-deps --no-build-isolation -e .
 }
 
-compile_engine() {
-    say "compiling the engine"
-    $venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up_all; warm_up_all()' ||
-        say "that failed; the first run compiles it"
+# Both engines side by side, each in a process of its own.
+compile_engines() {
+    local engine
+    say "compiling the engines"
+    for engine in line plane; do
+        $venv/bin/python -c "from vanedamp.coupling.sweep.sweep import warm_up_engine; warm_up_engine('$engine')" ||
+            say "that failed; the first run compiles it" &
+    done
+    wait
 }
 
 # A finished set-up whose interpreter still finds the packages, also after an upgrade of the system's Python.
@@ -170,7 +177,7 @@ sys.exit(not all(map(find_spec, packages)))
 END
 }
 
-wanted() { { pwd && echo "${DOLFINX:-}" && cat scripts/setup.sh pyproject.toml && pinned "$1"; } | cksum; }
+wanted() { { pwd && echo "${DOLFINX:-}" && cat scripts/setup.sh pyproject.toml && pinned engine && pinned "$1"; } | cksum; }
 
 # The groups asked for that are not as they should be.
 find_open() {
@@ -212,8 +219,9 @@ for group in "${open[@]}"; do
         if [ ${#rest[@]} -gt 0 ]; then
             apt_get install -y --no-install-recommends "${rest[@]}" & installing=$!
         fi
+        install_python_packages engine
+        compile_engines & compiled=$!
         install_python_packages product
-        compile_engine & compiled=$!
         [ -z "${installing:-}" ] || wait $installing
     else
         install_python_packages "$group"

@@ -143,17 +143,16 @@ def warm_up(scene: Scene | None = None) -> None:
         simulate(replace(scene, sweep={}, time=Time(periods=1, transient=0)))
 
 
-def warm_up_all(planar: bool = True) -> None:
-    """Compile every kernel, or load it from the disk cache: of one body, of several, and (planar) of bodies in the plane.
-
-    The first takes most of the time, since the others share its functions.
-    """
-    warm_up()
+def warm_up_engine(engine: str) -> None:
+    """Compile all kernels of an engine, "line" (one body, and several) or "plane", or load them from the disk cache."""
     [body], [cavity] = _SMALLEST["damper"], _SMALLEST["cavity"]
-    several = {"cavity": [cavity, cavity | {"name": "d"}], "damper": [body, body | {"cavity": "d"}]}
-    block = {"cavity": [cavity | {"play": 1.0}], "damper": [body | {"shape": "block", "length": 1.0, "height": 1.0}]}
-    for tables in [several, block] if planar else [several]:
-        warm_up(validate(Scene, _SMALLEST | tables, "warm-up"))
+    if engine == "line":
+        warm_up()
+        tables = {"cavity": [cavity, cavity | {"name": "d"}], "damper": [body, body | {"cavity": "d"}]}
+    else:
+        block = body | {"shape": "block", "length": 1.0, "height": 1.0}
+        tables = {"cavity": [cavity | {"play": 1.0}], "damper": [block]}
+    warm_up(validate(Scene, _SMALLEST | tables, "warm-up"))
 
 
 _SMALLEST: dict[str, Any] = {

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import warm_up_all
+from vanedamp.coupling.sweep.sweep import warm_up_engine
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
 from vanedamp.studies import sweep_steps
@@ -77,7 +77,7 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
     sources: list[str] = []
     with WorkerPool(workers or available_cores()) as pool:
         # compiling the engine takes as long as the finite elements: side by side, and once for all workers
-        compiled = pool.submit(warm_up_all, planar=False)
+        compiled = pool.submit(warm_up_engine, "line")
         if rigid:
             structure = Structure.shipped()
         else:
