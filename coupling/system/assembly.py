@@ -79,9 +79,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     response[:n] = forced
     system = System(
         modes=n, bodies=len(bodies), contacts=len(contacts), mass=mass, stiffness=stiffness, damping=damping,
-        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, squares=basis.stiffness.copy(), viscous=basis.damping.copy(),
-        response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
-        period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
+        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0,
+        squares=basis.stiffness.copy(), viscous=basis.damping.copy(), response=response, table=table,
+        frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
+        delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
         in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
