@@ -62,7 +62,8 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     laws = penalty_laws(system, times.step, options)
     soft, motion = start(system, begun, laws.spring)
     matrix, excited = cosimulation_matrices(scene, soft, times)
-    fine = loads_at(scene, soft)(2 * np.pi * np.arange(options.smallest_steps) / options.smallest_steps)
+    angles = 2 * np.pi * np.arange(options.smallest_steps) / options.smallest_steps
+    fine = np.ascontiguousarray(loads_at(scene, soft)(angles))
     memory = np.zeros((3, 4 * soft.modes + 2 * len(soft.J)))
     march = partial(
         march_cosimulation, soft, times, motion, records, matrix, excited, fine, memory, laws,

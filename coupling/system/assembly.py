@@ -79,9 +79,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     response[:n] = forced
     system = System(
         modes=n, bodies=len(bodies), contacts=len(contacts), mass=mass, stiffness=stiffness, damping=damping,
-        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, squares=basis.stiffness,
-        viscous=basis.damping, response=response, table=table, frequency=omega * np.array(list(shares)), omega=omega,
-        period=2 * np.pi / omega, moment=0.0, speed=0.0, delassus=(units["J"] / mass) @ units["J"].T,
+        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0,
+        squares=basis.stiffness.copy(), viscous=basis.damping.copy(), response=response, table=table,
+        frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
+        delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
         in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
@@ -188,7 +189,8 @@ def _contacts(
 
 def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     """Return the units as arrays."""
-    elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
+    # arrays of their own, as all in a system: the compiled functions are compiled for the layout of their arguments
+    restitution, spring, dashpot = np.reshape([unit.element for unit in units], (len(units), 3)).T.astype(float, "C")
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
     kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
@@ -197,7 +199,7 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     }
     return found | {
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
-        "restitution": elements[:, 0], "spring": elements[:, 1], "dashpot": elements[:, 2],
+        "restitution": restitution, "spring": spring, "dashpot": dashpot,
     }  # fmt: skip
 
 

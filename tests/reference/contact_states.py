@@ -70,12 +70,17 @@ class Flow:
         rows[0, self.level == 0, -1] = 0.0
         return rows
 
+    @functools.cached_property
+    def limits(self) -> np.ndarray:
+        """What counts as zero for the derivatives of every guard, (VANISHES, g)."""
+        return LIMITS[self.level, :].T
+
     def signs(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """First derivative of each guard that is not zero: (its order, its value, its sign)."""
         values = self.derivatives[:VANISHES] @ z
-        alive = np.vstack([np.abs(values) > LIMITS[self.level, :].T, np.ones(values.shape[1], bool)])
-        order = alive.argmax(axis=0)
-        leading = np.vstack([values, np.zeros(values.shape[1])])[order, np.arange(values.shape[1])]
+        alive = np.abs(values) > self.limits
+        order = np.where(alive.any(axis=0), alive.argmax(axis=0), VANISHES)
+        leading = np.where(order < VANISHES, values[order - (order == VANISHES), np.arange(len(order))], 0.0)
         return order, leading, np.sign(leading)
 
 

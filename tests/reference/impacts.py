@@ -75,9 +75,11 @@ def snap(system: System, y: np.ndarray) -> None:
         return
     # contacts that are closed, or will be before the clock ticks
     touching = system.opening(y) <= 1e-12 * (np.abs(system.speed(y)) + 1e-3)
-    _level(system, r, touching, system.reach)
+    if touching.any():
+        _level(system, r, touching, system.reach)
     rd[np.abs(rd) <= ZERO] = 0.0
-    _level(system, rd, touching & (np.abs(system.speed(y)) <= ZERO), np.zeros_like(system.reach))
+    if touching.any():
+        _level(system, rd, touching & (np.abs(system.speed(y)) <= ZERO), np.zeros_like(system.reach))
 
 
 def _impulses(D: np.ndarray, speed: np.ndarray, restitution: np.ndarray) -> np.ndarray:

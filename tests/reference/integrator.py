@@ -6,16 +6,13 @@ short that samples bound what an event function can do between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from operator import mul
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853, DenseOutput, OdeSolution
-from scipy.optimize import brentq
 
 from tests.reference.contact_states import OPEN, PRESSING, STUCK, VANISHES, ZERO, Flow, Mode, Modes
+from tests.reference.dop853 import Guards, Motion, march
 from tests.reference.impacts import accumulates, collide, snap
 from tests.reference.system import System
 from vanedamp.coupling.scene.scene import Scene
@@ -55,7 +52,7 @@ class Reference:
     structure_velocity: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
-    solution: OdeSolution
+    solution: Motion
     system: System
 
     def x(self, time: np.ndarray | float) -> np.ndarray:
@@ -132,148 +129,51 @@ def integrate(
     y = np.concatenate([system.q0, system.r0, system.qd0, system.rd0, np.zeros(len(system.spring))])
     t, end = 0.0, 2 * np.pi * periods
     events: list[Event] = []
-    times, pieces = [t], []
-    mode = None
+    parts: list[list[np.ndarray]] = []
+    mode, taken = None, 0
     while True:
         mode, named = _resume(modes, t, y, mode, pressed)
         events += named
         if len(events) > 1000 and events[-1000].time == t / system.omega:
             raise RuntimeError(f"events without end at t = {t / system.omega:g} s")
-        if t >= end or len(pieces) > _MOST:
+        if t >= end or taken > _MOST:
             break
-        for now, state, piece in _march(system, modes.flow(mode), t, y, end, step, rtol):
-            t, y = now, state
-            if t > times[-1]:
-                times.append(t)
-                pieces.append(piece)
+        *steps, y = _march(system, modes.flow(mode), t, y, end, step, rtol)
+        if steps[0][-1] > t:
+            parts.append(steps)
+            taken += len(steps[0])
+            t = float(steps[0][-1])
     q, r, qd, rd = (part * system.length for part in system.split(y))
-    solution = OdeSolution(times, pieces)
+    ends, *pieces = (np.concatenate(part) for part in zip(*parts, strict=True))
+    solution = Motion(np.r_[0.0, ends], *pieces)
     if system.compliant:
         events = _completed(events, system, solution)
     return Reference(tuple(events), t / system.omega, q, qd * system.omega, r, rd * system.omega, solution, system)
 
 
-def _march(
-    system: System, flow: Flow, start: float, y: np.ndarray, end: float, step: float, rtol: float
-) -> Iterator[tuple[float, np.ndarray, DenseOutput]]:
-    """(time, state, interpolant) after each step, until the first guard turns negative or the end is reached."""
+def _march(system: System, flow: Flow, start: float, y: np.ndarray, end: float, step: float, rtol: float) -> list:
+    """Ends, widths, first states and interpolants of the steps until a guard turns negative, and the last state."""
     z = system.extended(start, y)
     order, leading, _ = flow.signs(z)
     # positions count from here, so that a flight that hardly leaves the wall keeps all its digits
     shift = np.zeros_like(y)
     if not system.compliant:
         system.split(shift)[1][:] = system.split(y)[1]
-    step /= flow.fastest
     openings = np.where(flow.level == 0, flow.guards @ z, 0.0)
     k = len(y)
-    matrix, loads = np.ascontiguousarray(flow.rate[:k, :k]), np.ascontiguousarray(flow.rate[:k, k:])
-    solver = DOP853(
-        lambda t, y: matrix @ y + loads @ system.harmonics(t),
+    *steps, last = march(
+        np.ascontiguousarray(flow.rate[:k, :k]),
+        np.ascontiguousarray(flow.rate[:k, k:]),
+        system.orders,
+        Guards(flow.relative, openings, order, leading, np.flatnonzero(order < VANISHES)),
         start,
         y - shift,
         end,
-        max_step=step,
-        rtol=rtol,
-        atol=1e-3 * rtol,
-        first_step=min(step, end - start),
+        step / flow.fastest,
+        rtol,
     )
-    while solver.status == "running":
-        solver.step()
-        piece = solver.dense_output()
-        search = _Search(system, flow, piece, np.linspace(solver.t_old, solver.t, 5), openings)
-        if solver.t_old == start:
-            search.order, search.leading = order, leading
-        root = search.first(np.flatnonzero(order < VANISHES))
-        if root is not None:
-            yield root, piece(root) + shift, _Shifted(piece, shift)
-            return
-        yield solver.t, solver.y + shift, _Shifted(piece, shift)
-
-
-class _Shifted(DenseOutput):
-    """An interpolant plus a constant."""
-
-    def __init__(self, piece: DenseOutput, shift: np.ndarray) -> None:
-        super().__init__(piece.t_old, piece.t)
-        self.piece, self.shift = piece, shift
-
-    def _call_impl(self, t: np.ndarray) -> np.ndarray:
-        return (self.piece(t).T + self.shift).T
-
-
-class _Search:
-    """The first time in one step at which a guard turns negative.
-
-    Derivatives at the samples, doubled, bound those of the guards in the step: as the step is a small fraction of the
-    fastest period, they cannot grow more. Halving goes on until the bounds say that a piece holds no root, or one.
-    A guard that is zero at an event, where the step starts, has order > 0 and leaves zero with its leading derivative.
-    """
-
-    def __init__(self, system: System, flow: Flow, piece: DenseOutput, times: np.ndarray, openings: np.ndarray) -> None:
-        self.system, self.flow, self.piece, self.times, self.openings = system, flow, piece, times, openings
-        self.samples = flow.relative @ system.extended(times, piece(times))
-        self.samples[0] += openings[:, None]
-        self.bounds = 2 * np.abs(self.samples).max(axis=2)
-        self.order = np.zeros(self.samples.shape[1], int)
-        self.leading = self.samples[0, :, 0]
-        self.polynomials: dict[int, list[tuple[float, list[float], list[float]]]] = {}
-
-    def first(self, watched: np.ndarray) -> float | None:
-        """The earliest root of the guards with these indices, None without one."""
-        values, width = self.samples[0], self.times[1] - self.times[0]
-        safe = np.minimum(values[:, :-1], values[:, 1:]) > self.bounds[2, :, None] * width**2 / 8
-        safe[self.order > 0, 0] = False
-        roots = []
-        for index in watched:
-            for sample in np.flatnonzero(~safe[index]):
-                ends = self.samples[:2, index, sample], self.samples[:2, index, sample + 1]
-                root = self._root(index, self.times[sample], self.times[sample + 1], *ends)
-                if root is not None:
-                    roots.append(root)
-                    break
-        return min(roots, default=None)
-
-    def _root(self, index: int, a: float, b: float, at_a: np.ndarray, at_b: np.ndarray) -> float | None:
-        """First root in a <= t <= b, given the guard and its rate at both."""
-        bounds, width = self.bounds[:, index], b - a
-        if a == self.times[0] and self.order[index] > 0:
-            order = self.order[index]
-            if self.leading[index] * (order + 1) > bounds[order + 1] * width:
-                return None
-        elif at_a[0] <= 0:
-            return a
-        elif min(at_a[0], at_b[0]) > bounds[2] * width**2 / 8:
-            return None
-        elif at_b[0] < 0 and max(at_a[1], at_b[1]) + bounds[3] * width**2 / 8 < 0:
-            return brentq(lambda t: self._value(index, t)[0], a, b, xtol=1e-15, rtol=1e-15)
-        if width < 1e-14:
-            return b if at_b[0] < 0 else None
-        middle = (a + b) / 2
-        at_middle = self._value(index, middle)
-        left = self._root(index, a, middle, at_a, at_middle)
-        return self._root(index, middle, b, at_middle, at_b) if left is None else left
-
-    def _value(self, index: int, t: float) -> list[float]:
-        """A guard and its rate: the interpolant of DOP853 as numbers, since arrays so short cost ten times as much."""
-        x = (t - self.piece.t_old) / self.piece.h
-        harmonics = self.system.harmonics(t)
-        values = []
-        for start, coefficients, loads in self.polynomials.get(index) or self._project(index):
-            value = 0.0
-            for power, coefficient in enumerate(coefficients):
-                value = (value + coefficient) * (1.0 - x if power % 2 else x)
-            values.append(value + start + sum(map(mul, loads, harmonics)))
-        values[0] += self.openings[index]
-        return values
-
-    def _project(self, index: int) -> list[tuple[float, list[float], list[float]]]:
-        """Start, nested coefficients (highest first) and harmonics of a guard and its rate in this step."""
-        rows, k = self.flow.relative[:2, index], len(self.piece.y_old)
-        nested = rows[:, :k] @ self.piece.F[::-1].T
-        self.polynomials[index] = list(
-            zip((rows[:, :k] @ self.piece.y_old).tolist(), nested.tolist(), rows[:, k:].tolist(), strict=True)
-        )
-        return self.polynomials[index]
+    steps[2] += shift
+    return [*steps, last + shift]
 
 
 def _resume(modes: Modes, t: float, y: np.ndarray, old: Mode | None, pressed: bool) -> tuple[Mode, list[Event]]:
@@ -319,7 +219,7 @@ def _pin(system: System, y: np.ndarray) -> None:
     elongation[slips] = np.copysign(system.limit, elongation)[slips]
 
 
-def _completed(events: list[Event], system: System, solution: OdeSolution) -> list[Event]:
+def _completed(events: list[Event], system: System, solution: Motion) -> list[Event]:
     """The events with what impacts on compliant walls leave with, and their impulses."""
     contacts = {system.name(contact)[:2]: contact for contact in range(len(system.pairs))}
     begun: dict[int, int] = {}
@@ -339,7 +239,7 @@ def _completed(events: list[Event], system: System, solution: OdeSolution) -> li
     return events
 
 
-def quadrature(solution: OdeSolution, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(solution: Motion, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
     """Nodes and weights, in radians, of six Gauss points in each step between two times."""
     nodes, weights = np.polynomial.legendre.leggauss(6)
     inside = solution.ts[(solution.ts > start) & (solution.ts < end)]

@@ -403,7 +403,7 @@ class Motion:
     def start(self, moment: Moment) -> np.ndarray:
         """The vector z at a moment."""
         angle = self.system.frequency * moment.phase
-        return np.r_[moment.q, moment.v, np.cos(angle), np.sin(angle), 1.0]
+        return np.concatenate([moment.q, moment.v, np.cos(angle), np.sin(angle), [1.0]])
 
     def size(self, z: np.ndarray) -> np.ndarray:
         """Sizes of the terms in such vectors; of loads their amplitudes."""
@@ -419,6 +419,21 @@ class Motion:
         return np.array(path)
 
 
+class Motions:
+    """The motions of a system, each made once."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self._made: dict[bytes, Motion] = {}
+
+    def of(self, moment: Moment) -> Motion:
+        """The motion in the states of a moment."""
+        key = moment.state.tobytes()
+        if key not in self._made:
+            self._made[key] = Motion(self.system, moment.state)
+        return self._made[key]
+
+
 # --- laws
 
 
@@ -430,7 +445,7 @@ class Checker:
         system = self.stepper.run.system
         self.system, self.u, self.contact = system, len(system.rest), np.arange(len(system.rest)) < system.contacts
         self.rigid = self.contact & np.isinf(system.spring)
-        self.motions: dict[bytes, Motion] = {}
+        self.motion = Motions(system).of
         # what the loads could lend each coordinate: a body that lies still has the round-off of that
         lent = 0.5 * (np.abs(system.load) ** 2 / (system.mass * system.frequency[:, None] ** 2)).sum()
         self.fastest, self.flowed = np.full(len(system.mass), 1e-3), float(lent)
@@ -443,7 +458,7 @@ class Checker:
         stepper.settle()
         before = stepper.moment()
         self.initial = before
-        self._settled(before, self._motion(before), "at the start")
+        self._settled(before, self.motion(before), "at the start")
         while worst.steps < longest:
             hits = stepper.step()
             if hits is None:
@@ -458,14 +473,8 @@ class Checker:
             worst.impacts += len(hits)
         return worst
 
-    def _motion(self, moment: Moment) -> Motion:
-        key = moment.state.tobytes()
-        if key not in self.motions:
-            self.motions[key] = Motion(self.system, moment.state)
-        return self.motions[key]
-
     def _check(self, before: Moment, after: Moment, hits: np.ndarray, where: str) -> None:
-        system, n, worst, motion = self.system, len(before.q), self.worst, self._motion(before)
+        system, n, worst, motion = self.system, len(before.q), self.worst, self.motion(before)
         span = after.phase - before.phase
         if span < 0 or (after.phase == 0.0 and after.time > before.time):
             span = system.period - before.phase
@@ -486,7 +495,7 @@ class Checker:
         self._ledger(after, where)
         losses = [VISCOUS, FRICTION, IMPACT_LOSS]
         worst.note("returns", (before.ledger - after.ledger)[losses].max() / self.flowed, where)
-        self._settled(after, self._motion(after), where)
+        self._settled(after, self.motion(after), where)
 
     def _between(self, before: Moment, motion: Motion, path: np.ndarray, span: float, where: str) -> None:
         """Walls, forces within their bounds and friction against slip on the way."""
@@ -726,15 +735,16 @@ def positions(stepper: Stepper, times: np.ndarray, unique: bool = False) -> np.n
     """Coordinates (t, N) of a run at increasing times; fewer if it ends before, or `unique` impacts do."""
     stepper.settle()
     before, found = stepper.moment(), []
-    friction = stepper.run.system.friction
+    friction, motions = stepper.run.system.friction, Motions(stepper.run.system)
     for _ in range(LONGEST):
         hits = stepper.step() if len(found) < len(times) else None
         if hits is None:
             break
         if unique and np.count_nonzero(friction[hits[:, 2].astype(int)]) > 2:
             times = times[times < stepper.moment().time]
-        after, motion = stepper.moment(), Motion(stepper.run.system, before.state)
+        after = stepper.moment()
         while len(found) < len(times) and times[len(found)] <= after.time:
+            motion = motions.of(before)
             z = expm(motion.matrix * (times[len(found)] - before.time)) @ motion.start(before)
             found.append(z[: motion.n])
         before = after

@@ -275,13 +275,13 @@ def test_a_branch_of_orbits_over_the_speed_of_a_reduced_model(turning_model):
         "structure": {"model": "rom", "file": turning_model[1]}, "damper.friction": 1e9,
         "excitation": {"engine_order": 0.5, "force": 1.0, "at": "tip"},
     })  # fmt: skip
-    table = {"parameter": "rotation.speed", "from": 20.0, "to": 60.0, "start": "linear", "step": 0.2, "max_step": 1.0}
+    table = {"parameter": "rotation.speed", "from": 20.0, "to": 40.0, "start": "linear", "step": 0.5, "max_step": 1.0}
     (branch,) = orbits(base.replace({"orbit": table})).branches
     for speed, amplitude in zip(branch.parameter, branch.amplitude_max, strict=True):
         turned = base.replace({"rotation.speed": speed})
         linear = linear_responses(turned)[0].amplitude(np.array([turned.frequency]))[0]
         assert amplitude == pytest.approx(linear, rel=1e-6)
-    assert branch.parameter[-1] == pytest.approx(60.0)
+    assert branch.parameter[-1] == pytest.approx(40.0) and len(branch.parameter) > 10
 
 
 def test_states_of_a_branch_are_those_of_runs_at_its_speeds(turning_model):

@@ -50,29 +50,30 @@ def scene(folder, modes, periods):
     return validate(Scene, data, "scene")
 
 
-#: the figures of a run whose integrals are taken in closed form from so many modes on
+#: the figures of runs whose integrals are taken in closed form from so many modes on
 _SCRIPT = """
 import json, sys
 from pathlib import Path
 from tests.coupling.engine.plane.test_integrals import scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.engine.plane import quadrature
-quadrature._MANY = int(sys.argv[1])
-r = simulate(scene(Path(sys.argv[2]), 7, 1))
-print(json.dumps([list(r.energy.values()), r.amplitude_rms, r.amplitude_harmonic, r.attached_mass_fraction, r.peak[0]]))
+for quadrature._MANY in (0, 1000):
+    r = simulate(scene(Path(sys.argv[1]), 7, 1))
+    others = r.amplitude_rms, r.amplitude_harmonic, r.attached_mass_fraction, r.peak[0]
+    print(json.dumps([list(r.energy.values()), *others]))
 """
 
 
 def test_closed_forms_are_what_quadrature_finds(tmp_path):
     """In plain Python, where the number of modes from which on they are taken can be set."""
+    done = subprocess.run(
+        [sys.executable, "-c", _SCRIPT, str(tmp_path)], capture_output=True, text=True, check=True,
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, cwd=os.getcwd(),
+    )  # fmt: skip
     figures = []
-    for many in (0, 1000):
-        done = subprocess.run(
-            [sys.executable, "-c", _SCRIPT, str(many), str(tmp_path)], capture_output=True, text=True, check=True,
-            env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, cwd=os.getcwd(),
-        )  # fmt: skip
-        energies, *others = json.loads(done.stdout)
+    for energies, *others in map(json.loads, done.stdout.splitlines()):
         figures.append(np.array([np.array(energies) / max(map(abs, energies)), *[[other] for other in others]], object))
+    assert len(figures) == 2
     for one, other in zip(*figures, strict=True):
         np.testing.assert_allclose(np.array(one, float), np.array(other, float), rtol=1e-11, atol=1e-12)
 
