@@ -495,7 +495,8 @@ def reduction(
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         with stage("speeds of rotation"):
             model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
-    model = replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+    made = {"basis": basis, "estimate": estimate, "versions": versions()}
+    model = replace(model, provenance=dict(model.provenance) | made)
     if levelled:
         model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})
     if spots:

@@ -39,6 +39,13 @@ COMMANDS = (
         (input_file("FILE.toml"), json_file),
     ),
     Command(
+        "info", "say what a result is: how it was made, and its main figures", 5,
+        (
+            argument("input", metavar="RESULT.h5", help="result of any command, or its checkpoint (.partial)"),
+            json_file,
+        ),
+    ),
+    Command(
         "schema", "JSON Schema of a kind of input file, for editors", 5,
         (Function("schema:add_kind"), output_file("FILE.json")),
     ),
