@@ -47,6 +47,7 @@ from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.checkpoint import CaseCheckpoint
 from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 from vanedamp.studies.terminal import stage
@@ -390,18 +391,26 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     return tuple(f"units: {remark}" for remark in remarks)
 
 
-def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | None = None) -> Campbell:
+def campbell_diagram(
+    structure: Structure,
+    report: Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
+) -> Campbell:
     """Return the Campbell diagram that the case's tables [campbell] and [rotation] ask for.
 
-    report: called with the number of full solutions made, and of those known to be needed. Raises the errors of
-    `modal.campbell.campbell`.
+    report: called with the number of full solutions made, and of those known to be needed; checkpoint: a file to which
+    these are written and from which an interrupted call resumes; the caller removes it once the result is safe
+    (files.checkpoint_file.clear). Raises the errors of `modal.campbell.campbell`.
     """
     table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
     assert table is not None and rotation is not None and rotating is not None
     most = rotating.standing.free.size
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
-    diagram = campbell(rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report)
+    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as kept:
+        diagram = campbell(
+            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=kept.next
+        )
     provenance = {"matrices": dict(diagram.provenance), "versions": versions()}
     return replace(diagram, operating=table.operation, provenance=provenance)
 

@@ -50,8 +50,9 @@ def run(arguments: Namespace) -> None:
     what = f"what {what} had finished" if checkpoint else what
     found = [Fact("command", f"vanedamp {command}" if command else None), *_origin(record)]
     with decoding(path):
-        found += [] if checkpoint else figures(record)
-    found += [Fact("sizes", _sizes(variables)), Fact("warnings", _warnings(record))]
+        found += [Fact("finished", record.attributes.get("finished"))] if checkpoint else figures(record)
+    sizes = {} if checkpoint else _sizes(variables)
+    found += [Fact("sizes", sizes), Fact("warnings", _warnings(record))]
     result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
     write_result(arguments, result, fact_lines(f"{path}: {kind}, {what}", found))
 
@@ -70,7 +71,7 @@ def _origin(record: _Record) -> Iterator[Fact]:
     """Yield when, by which software and from what input the file was made."""
     path, attributes = Path(record.path), record.attributes
     made = attributes.get("provenance", {})
-    matrices = made.get("matrices")
+    matrices = made.get("matrices", attributes.get("matrices"))
     matrices = matrices if isinstance(matrices, dict) else made  # of an imported model: their names
     written = datetime.fromtimestamp(path.stat().st_mtime).astimezone()
     yield Fact(
@@ -84,7 +85,7 @@ def _origin(record: _Record) -> Iterator[Fact]:
         structure = scene["structure"]
         yield Fact("structure", structure["model"], "", structure.get("file", ""))
         yield Fact("bodies", dict(Counter(body["shape"] for body in scene["damper"])))
-    yield Fact("files", attributes.get("model"), "", "SHA-256 of files that the scene names")
+    yield Fact("files", attributes.get("model"), "", "SHA-256 of the other input files")
 
 
 def _scene(record: _Record) -> dict[str, Any] | None:

@@ -130,14 +130,19 @@ class Calibrate(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Calibrate."""
+        from vanedamp.files.checkpoint_file import clear
         from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
         from vanedamp.studies.case.calibration import calibrate
 
-        found = calibrate(Case.load(self.file))
         record, tuned, scene = self.outputs
+        checkpoint = f"{record}.partial"
+        if tools.fresh:
+            clear(checkpoint)
+        found = calibrate(Case.load(self.file), checkpoint)
         found.save(record)
         save_tuned_case(self.file, found, tuned)
         save_rigid_scene(self.file, found, scene)
+        clear(checkpoint)
         tools.warn(found.warnings)
         rigid, factors = found.rigid, ""
         if found.tuning is not None:
