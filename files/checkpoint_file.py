@@ -10,7 +10,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from vanedamp.files.store import StoreError, Variable, clear_leftovers, decoding, digest, load, save
 from vanedamp.files.toml_input import InputError
@@ -20,7 +20,7 @@ SHARE = 100
 
 
 class CheckpointFile:
-    """The checkpoint of one command (path None: nothing is kept).
+    """The checkpoint of one command (path None: nothing is kept), a context manager: it writes the rest as it ends.
 
     kind: of its record; belongs: by attribute the input that it belongs to, and its name in messages; content:
     returns variables and further attributes of the record, and how much is finished, in words.
@@ -60,6 +60,14 @@ class CheckpointFile:
                 )
         return variables, attributes
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # a file that could not be written will not be now
+        if kind is None or not issubclass(kind, StoreError):
+            self.write()
+
     def changed(self) -> None:
         """Write the file, unless the last time is too short ago. Raises StoreError, such as for a full disk."""
         self._unsaved = True
@@ -74,7 +82,8 @@ class CheckpointFile:
         variables, attributes, finished = self._content()
         try:
             belongs = {name: dict(data) for name, (_, data) in self._belongs.items()}
-            save(self._path, self._kind, variables, belongs | dict(attributes), compressed=False)
+            attributes = belongs | dict(attributes) | {"finished": finished}
+            save(self._path, self._kind, variables, attributes, compressed=False)
         except StoreError as error:
             kept = "what was finished before is in it" if self._path.exists() else "nothing is kept"
             raise StoreError(f"{error}; {finished}, {kept}; make room and run the same command again") from error

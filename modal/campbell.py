@@ -16,6 +16,7 @@ import numpy as np
 from vanedamp.files import store
 from vanedamp.files.display import Plotted
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.kept_solutions import Keep, not_kept
 from vanedamp.modal.mode_tracking import Approach, Tracks
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import RPM, SpeedRange
@@ -198,6 +199,7 @@ def campbell(
     gyroscopic: bool = False,
     tolerance: float = 1e-8,
     report: Callable[[int, int], None] | None = None,
+    keep: Keep = not_kept,
 ) -> Campbell:
     """Return the lowest natural frequencies over speeds, followed by their shapes, and their crossings.
 
@@ -209,6 +211,7 @@ def campbell(
     tolerance   largest estimated relative error of the frequencies for solving the full structure at a few speeds only,
                 which become more until it is met
     report      called with the number of full solutions made, and of those known to be needed
+    keep        of full solutions, from an interrupted call
 
     Two modes cross where their frequencies agree to ten tolerances; otherwise they veer. Raises CampbellError,
     modal.rotating.UnstableError for a speed that the structure does not bear, and SolverError.
@@ -216,7 +219,7 @@ def campbell(
     wanted = _checked(speeds, orders, count, rotating.standing.free.size, tolerance)
     report = report or (lambda done, total: None)
     report(0, 2)
-    with SpeedRange(rotating, float(wanted[0]), float(wanted[-1]), count, gyroscopic) as source:
+    with SpeedRange(rotating, float(wanted[0]), float(wanted[-1]), count, gyroscopic, keep) as source:
         while True:
             report(len(source.solved), len(source.solved) + 1)
             tracks = Tracks(source, wanted, count, _SAME * tolerance)

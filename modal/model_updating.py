@@ -7,7 +7,7 @@ parts of a mesh, but any symmetric matrices do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.correlation import LEAST_MAC, MeasuredShapes, Pairing, measured_mac, modal_assurance, pair_modes
 from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.matrices import SystemMatrices
 
 #: factors stay between this and its inverse
@@ -96,6 +97,7 @@ def tune(
     modes: Sequence[int] | None = None,
     least_mac: float = LEAST_MAC,
     starts: int = 1,
+    keep: Keep = not_kept,
 ) -> Tuning:
     """Find factors on parts of the stiffness that bring modes to target frequencies, by least squares in log f.
 
@@ -106,6 +108,7 @@ def tune(
 
     starts     where modes veer, frequencies can be met nearly by several sets of factors: 1 searches from the system as
                it is, more from as many further points between half and twice its factors, and the best is kept
+    keep       of evaluations, from an interrupted call
 
     Least squares on the logarithms of the factors (Gauss-Newton in a trust region) with exact sensitivities; the modes
     are tracked by their MAC, so that they may cross.
@@ -114,7 +117,7 @@ def tune(
     meet them far better, or with far less change of the factors unless `modes` are named. These come from the best
     assignment by relative distance of the frequencies, untuned and tuned.
     """
-    problem = _Problem(matrices, dict(parts), np.asarray(target_hz, dtype=float), measured, modes, least_mac)
+    problem = _Problem(matrices, dict(parts), np.asarray(target_hz, dtype=float), measured, modes, least_mac, keep)
     start = np.zeros(len(problem.parts))
     before = problem.at(start)
     problem.check_pairs(before)
@@ -200,7 +203,9 @@ def _other_pairing(
         if tuple(meant.tolist()) in tried:
             continue
         tried.add(tuple(meant.tolist()))
-        trial = _Problem(problem.matrices, problem.parts, problem.target, None, meant.tolist(), problem.least)
+        trial = _Problem(
+            problem.matrices, problem.parts, problem.target, None, meant.tolist(), problem.least, problem.keep
+        )
         fit = _fit(trial, np.zeros(found.x.size), -np.log(LIMIT))
         problem.evaluations += trial.evaluations
         waiting.append(trial.nearest(trial.at(fit.x).all_hz))
@@ -239,6 +244,15 @@ class _State:
 
 
 @dataclass(eq=False)
+class _Followed:
+    """The modes at one set of factors by which the next ones are paired; shapes: None until they are asked for."""
+
+    point: np.ndarray
+    indices: np.ndarray
+    shapes: np.ndarray | None
+
+
+@dataclass(eq=False)
 class _Problem:
     """Residuals and Jacobian at logarithms of factors; keeps the last state, and follows the modes.
 
@@ -251,11 +265,12 @@ class _Problem:
     measured: MeasuredShapes | None
     modes: Sequence[int] | None
     least: float
+    keep: Keep = not_kept
     evaluations: int = 0
     _point: np.ndarray | None = None
     _state: _State | None = None
-    _origin: np.ndarray | None = None
-    _followed: np.ndarray | None = None
+    _origin: _Followed | None = None
+    _followed: _Followed | None = None
 
     def __post_init__(self) -> None:
         self._check(self.modes)
@@ -296,26 +311,37 @@ class _Problem:
 
     def _evaluate(self, point: np.ndarray) -> _State:
         self.evaluations += 1
-        modes = solve_modes(self.system(point), self.count)
-        pairing = self._pair(modes)
-        indices, mac = pairing.second, pairing.pair_mac
-        frequencies = modes.frequencies_hz[indices]
-        scaled = {n: f * k for f, (n, k) in zip(np.exp(point), self.parts.items(), strict=True)}
-        if self.measured is None:
-            self._followed = modes.shapes[indices]
-            if self._origin is None:
-                self._origin = self._followed
-            mac = np.diag(modal_assurance(self._origin, self._followed, self.matrices.mass))
-        residual, jacobian = np.log(frequencies / self.target), sensitivities(modes, scaled, indices)
-        return _State(modes.frequencies_hz, frequencies, indices, mac, residual, jacobian)
+        shapes: np.ndarray | None = None  # of an evaluation that was kept they are not known
+
+        def solved() -> Arrays:
+            nonlocal shapes
+            modes = solve_modes(self.system(point), self.count)
+            pairing = self._pair(modes)
+            indices, mac = pairing.second, pairing.pair_mac
+            shapes, frequencies = modes.shapes[indices], modes.frequencies_hz[indices]
+            scaled = {n: f * k for f, (n, k) in zip(np.exp(point), self.parts.items(), strict=True)}
+            if self.measured is None:
+                origin = shapes if self._origin is None else self._shapes(self._origin)
+                mac = np.diag(modal_assurance(origin, shapes, self.matrices.mass))
+            residual, jacobian = np.log(frequencies / self.target), sensitivities(modes, scaled, indices)
+            return asdict(_State(modes.frequencies_hz, frequencies, indices, mac, residual, jacobian))
+
+        state = _State(**self.keep(solved))
+        self._followed = _Followed(np.array(point), state.indices, shapes)
+        self._origin = self._origin or self._followed
+        return state
+
+    def _shapes(self, modes: _Followed) -> np.ndarray:
+        if modes.shapes is None:
+            modes.shapes = solve_modes(self.system(modes.point), self.count).shapes[modes.indices]
+        return modes.shapes
 
     def _pair(self, modes: Modes) -> Pairing:
         """Pair all targets (first) with computed modes (second), even where a search passes modes hard to pair."""
         if self.measured is not None:
             return pair_modes(measured_mac(modes, self.matrices, self.measured).T, least=0.0)
-        if self._followed is None:
-            self._followed = modes.shapes[self.meant]
-        return pair_modes(modal_assurance(self._followed, modes.shapes, self.matrices.mass), least=0.0)
+        followed = modes.shapes[self.meant] if self._followed is None else self._shapes(self._followed)
+        return pair_modes(modal_assurance(followed, modes.shapes, self.matrices.mass), least=0.0)
 
     def _check(self, modes: Sequence[int] | None) -> None:
         count, size = self.target.size, self.matrices.size

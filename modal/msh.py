@@ -6,6 +6,8 @@ import contextlib
 import itertools
 import os
 import re
+import signal
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -35,6 +37,9 @@ def session(name: str) -> Iterator[None]:
         # reading config files and catching signals are a program's business, not a library's
         with _native_stderr_muted():
             gmsh.initialize(readConfigFiles=False, interruptible=False)
+        handler = signal.getsignal(signal.SIGTERM)
+        if handler is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, handler)  # gmsh resets it
     terminal = gmsh.option.getNumber("General.Terminal")
     gmsh.option.setNumber("General.Terminal", 0)
     try:

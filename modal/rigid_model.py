@@ -102,21 +102,16 @@ def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bo
     return abs(displacement) >= 1e-9 * np.abs(functional).sum() * np.abs(shape).max() and displacement != 0.0
 
 
-def fatigue_amplitude(
-    modes: Modes,
-    mode: int,
-    functional: np.ndarray,
-    peak_stress: float,
-    fatigue_strength: float,
-    share: float = FATIGUE_SHARE,
-) -> float:
-    """Return the displacement amplitude, m, of an interface coordinate at a fraction of a mode's fatigue strength.
+def fatigue_amplitude(stress_per_amplitude: float, fatigue_strength: float, share: float = FATIGUE_SHARE) -> float:
+    """Return the displacement amplitude, m, of an interface coordinate at a fraction of the fatigue strength.
 
-    peak_stress       Pa, largest von Mises stress of the mode's shape as it is stored (Solid.von_mises(shape).max()).
-                      Sharp corners are singular points of elasticity: their stress grows with mesh refinement
-    fatigue_strength  Pa
+    stress_per_amplitude  Pa/m, largest von Mises stress of the mode over its displacement of that coordinate. Sharp
+                          corners are singular points of elasticity: their stress grows with mesh refinement
+    fatigue_strength      Pa
     """
-    for name, value in (("peak_stress", peak_stress), ("fatigue_strength", fatigue_strength), ("share", share)):
+    for name, value in (
+        ("stress_per_amplitude", stress_per_amplitude), ("fatigue_strength", fatigue_strength), ("share", share)
+    ):  # fmt: skip
         if not (math.isfinite(value) and value > 0.0):
             raise CalibrationError(f"{name}: expected a positive number, not {value}")
-    return share * fatigue_strength / peak_stress * abs(float(functional @ modes.shapes[mode]))
+    return share * fatigue_strength / stress_per_amplitude

@@ -15,6 +15,7 @@ from scipy import linalg, sparse
 from vanedamp.modal.algebra import orthogonal, orthonormal, symmetric_part
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
+from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.rotating import RotatingMatrices
 
 #: 1/min per rad/s
@@ -44,13 +45,16 @@ class SpeedRange:
     low, high   ends of the range, rad/s, where the first full solutions are made
     count       modes of interest: the lowest at every speed
     gyroscopic  whether they have the gyroscopic coupling
+    keep        of full solutions
 
     solved      rad/s, speeds with full solutions so far
 
     Raises modal.rotating.UnstableError for a structure that is unstable at the maximum speed, and SolverError.
     """
 
-    def __init__(self, rotating: RotatingMatrices, low: float, high: float, count: int, gyroscopic: bool) -> None:
+    def __init__(
+        self, rotating: RotatingMatrices, low: float, high: float, count: int, gyroscopic: bool, keep: Keep = not_kept
+    ) -> None:
         standing, self.rotating, self.gyroscopic = rotating.standing, rotating, gyroscopic
         self._free = standing.free
         # modes beyond the last of interest, so that those that come down are known before they are among the lowest
@@ -60,6 +64,7 @@ class SpeedRange:
         named = [standing.stiffness, rotating.centrifugal_stiffness, standing.mass]
         named += [rotating.gyroscopic] if gyroscopic else []
         self._operators = [standing.of_free(matrix) for matrix in named]
+        self._keep = keep
         self._basis = np.empty((self._free.size, 0))
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
@@ -144,16 +149,24 @@ class SpeedRange:
         ratio = beyond / np.maximum(beyond - omega**2, _NEAREST * beyond)
         return np.asarray(residual * ratio / (self._inertia(modes, speed) * omega))
 
-    def _solve(self, speed: float) -> Modes | GyroscopicModes:
-        """Return the modes of the full structure at a speed."""
-        if self.gyroscopic:
-            return gyroscopic_modes(self.rotating, speed, self._solved_count)
-        return solve_modes(self.rotating.at(speed), self._solved_count)
+    def _solve(self, speed: float) -> Arrays:
+        """Return frequencies (Hz) and shapes of the modes of the full structure at a speed."""
 
-    def _join(self, speed: float, modes: Modes | GyroscopicModes) -> None:
+        def solved() -> Arrays:
+            modes: Modes | GyroscopicModes
+            if self.gyroscopic:
+                modes = gyroscopic_modes(self.rotating, speed, self._solved_count)
+            else:
+                modes = solve_modes(self.rotating.at(speed), self._solved_count)
+            return {"frequency": modes.frequencies_hz, "shape": modes.shapes}
+
+        return self._keep(solved)
+
+    def _join(self, speed: float, modes: Arrays) -> None:
         self.solved.append(speed)
-        self._highest.append(float(2.0 * np.pi * modes.frequencies_hz[-1]) ** 2)
-        shapes = np.vstack([modes.shapes.real, modes.shapes.imag]) if self.gyroscopic else modes.shapes
+        self._highest.append(float(2.0 * np.pi * modes["frequency"][-1]) ** 2)
+        shapes = modes["shape"]
+        shapes = np.vstack([shapes.real, shapes.imag]) if self.gyroscopic else shapes
         mass, known = self._operators[2], [self._basis]
         rest = orthogonal(shapes[:, self._free].T, mass, known)
         lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2

@@ -108,20 +108,37 @@ class Diagram:
 
     def _first(self) -> Continuation:
         """Return the branch through the first orbit. Raises InputError if there is none."""
-        starts, failed = self.starts(), dict[str, None]()
+        starts = self.starts()
+        first, failed = self._solved(starts)
+        if first is not None:
+            return first
+        remedy = starts.remedy
+        if starts.run is not None:
+            of_run = starts.run()
+            found, more = self._solved(of_run)
+            if found is None:
+                remedy = f'start = "run" finds none either ({"; ".join(more)}): {of_run.remedy}'
+            else:
+                own = found.problem.map.periods
+                remedy = f'start = "run" finds an orbit of {own} period(s)'
+        periods = " or ".join(map(str, dict.fromkeys(start.periods for start in starts.candidates)))
+        raise InputError(
+            f"orbit: no orbit of {periods} excitation period(s) at {self.table.parameter} = {self.low:g}: "
+            f"{'; '.join(failed)}; {remedy}"
+        )
+
+    def _solved(self, starts: Starts) -> tuple[Continuation | None, list[str]]:
+        """Return the branch through the first orbit found from some starts, and why none is found from others."""
+        failed = dict[str, None]()
         for start in starts.candidates:
             problem = self._problem(start.periods)
             row = problem.along_parameter
             orbit = solve(problem, problem.pack(start.state, self.low), row, np.zeros(problem.size))
             problem.count["iterations"] += orbit.iterations
             if orbit.status is OrbitStatus.OK:
-                return Continuation.begin(problem, self.table, orbit, row)
+                return Continuation.begin(problem, self.table, orbit, row), list(failed)
             failed[_MEANING[orbit.status]] = None
-        periods = " or ".join(map(str, dict.fromkeys(start.periods for start in starts.candidates)))
-        raise InputError(
-            f"orbit: no orbit of {periods} excitation period(s) at {self.table.parameter} = {self.low:g}: "
-            f"{'; '.join(failed)}; {starts.remedy}"
-        )
+        return None, list(failed)
 
     @property
     def _span(self) -> float:

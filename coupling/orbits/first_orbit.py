@@ -5,17 +5,21 @@ Close returns of a motion that does not repeat lie near unstable orbits (Lathrop
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
 #: periods after the run over which returns are sought, excitation periods of an orbit if none are given, starts of each
 _WINDOW, _ORDERS, _MOST = 256, (1, 2, 3), 2
+
+_FIGURE = "(the phase planes in the report of its `vanedamp run --samples 100` show every period's start)"
 
 
 class Start(NamedTuple):
@@ -26,15 +30,22 @@ class Start(NamedTuple):
 
 
 class Starts(NamedTuple):
-    """Starts, the most promising first, and what to say if no orbit is found from any of them."""
+    """Starts, the most promising first, and what to say if no orbit is found from any of them.
+
+    run: returns those of the scene's run, which are tried for the message only; None: they are
+    """
 
     candidates: Sequence[Start]
     remedy: str
+    run: Callable[[], Starts] | None = None
 
 
-def of_linear_motion(period_map: PeriodMap, periods: int | None) -> Starts:
+def of_linear_motion(period_map: PeriodMap, scene: Scene, periods: int | None) -> Starts:
     """Return the motion without contact as a start. Raises InputError at a resonance without damping."""
-    return Starts([Start(period_map.linear_orbit(), periods or 1)], 'try start = "run"')
+    return Starts(
+        [Start(period_map.linear_orbit(), periods or 1)], "",
+        lambda: of_run(period_map, simulate(scene), periods),
+    )  # fmt: skip
 
 
 def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> Starts:
@@ -60,11 +71,10 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
         nearest = min(nearest, (float(apart[places[0]]), order))
         returns += [Start(states[place], order) for place in places]
     if repeats:
-        return Starts(first + returns, f"the run of the scene is {kind}; try another `from` or other periods")
+        return Starts(first + returns, f"the run of the scene is {kind} {_FIGURE}; try another `from` or other periods")
     asked = f", not repeating after {periods}" if kind != "non-periodic" else ""
     return Starts(
         returns,
         f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of "
-        f"its range at best, after {nearest[1]} (the phase planes in the report of its `vanedamp run --samples 100` "
-        "show every period's start); try another `from`",
+        f"its range at best, after {nearest[1]} {_FIGURE}; try another `from`",
     )

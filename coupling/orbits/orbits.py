@@ -127,7 +127,7 @@ class _Search:
     def starts(self) -> Starts:
         """Return the states from which the first orbit is sought. Raises InputError if the run ends early."""
         if self.table.start == "linear":
-            return of_linear_motion(self.map, self.table.periods)
+            return of_linear_motion(self.map, self.first, self.table.periods)
         return of_run(self.map, simulate(self.first), self.table.periods)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.checkpoint_file import CheckpointFile, digests
-from vanedamp.files.store import StoreError, Variable, dataset, load, reader, save
+from vanedamp.files.store import Variable, dataset, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class SceneRecord:
 
 
 class SceneCheckpoint(CheckpointFile):
-    """The checkpoint of a command on a scene. A context manager, which writes what has changed as it ends."""
+    """The checkpoint of a command on a scene."""
 
     def __init__(
         self, path: str | Path | None, kind: str, scene: Scene, provenance: Mapping[str, Any],
@@ -82,11 +82,3 @@ class SceneCheckpoint(CheckpointFile):
     def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
         """Return variables and further attributes of the file, and how much is finished, in words."""
         raise NotImplementedError
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # a file that could not be written will not be now
-        if kind is None or not issubclass(kind, StoreError):
-            self.write()

@@ -15,10 +15,12 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError, nearest
 from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify, is_in_decibels
+from vanedamp.modal.kept_solutions import Keep
 from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
+from vanedamp.studies.case.checkpoint import CaseCheckpoint
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
 from vanedamp.studies.terminal import stage
@@ -177,9 +179,11 @@ class Calibration:
         return {"share": fatigue.share, "amplitude": fatigue.amplitude, "force": self.force, "hot_spot": spot}
 
 
-def calibrate(case: Case) -> Calibration:
+def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
     """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
 
+    checkpoint: a file to which evaluations of the tuning are written and from which an interrupted call resumes; the
+    caller removes it once the result is safe (files.checkpoint_file.clear).
     Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what
     cannot be met.
     """
@@ -189,7 +193,10 @@ def calibrate(case: Case) -> Calibration:
     table = case.calibration or CalibrationTable()
     structure, tuning = assemble(case), None
     if table.tune is not None:
-        tuning = _tuned(structure, table.tune)
+        # what follows the tuning may be changed before it resumes
+        tuned = replace(case, calibration=CalibrationTable(tune=table.tune))
+        with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as kept:
+            tuning = _tuned(structure, table.tune, kept.next)
         structure = assemble(tuned_case(case, dict(zip(tuning.names, tuning.factors.tolist(), strict=True)), structure))
     analysis = modal_analysis(structure)
     if analysis.first_bending is None or analysis.functional is None:
@@ -235,7 +242,7 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
 
 
 @stage("tuning to the measured frequencies")
-def _tuned(structure: Structure, table: TuneTable) -> Tuning:
+def _tuned(structure: Structure, table: TuneTable, keep: Keep) -> Tuning:
     """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
     known = parts_by_name(structure.case, structure.solid.domain.volumes)
     seen: set[str] = set()
@@ -248,7 +255,7 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
     parts = structure.solid.stiffness_parts()
     varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
     measured = None if table.shapes is None else read_shapes(table.shapes)
-    return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
+    return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts, keep=keep)
 
 
 @stage("damping of the measured response")

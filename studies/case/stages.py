@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import Variable
+from vanedamp.files.store import Variable, load_any, save
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
@@ -30,7 +30,7 @@ from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
-from vanedamp.modal.stress import HotSpot, hot_spot
+from vanedamp.modal.stress import HotSpot, PeakStress, hot_spot, peak_stresses
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis import BLOCKS, basis_ladder, basis_named
@@ -47,6 +47,7 @@ from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.checkpoint import CaseCheckpoint
 from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 from vanedamp.studies.terminal import stage
@@ -178,12 +179,31 @@ class Fatigue:
 
     share      fraction of the strength
     amplitude  m, displacement of the response coordinate
-    spot       where the stress does
+    spot       where the stress does; its stress is that of the amplitude 1 m
+    peaks      of every volume group, for this amplitude, from which other strengths give another level
     """
 
     share: float
     amplitude: float
     spot: HotSpot
+    peaks: Sequence[PeakStress]
+
+    @classmethod
+    def of(cls, case: Case, peaks: Sequence[PeakStress]) -> Fatigue | None:
+        """Return the level of a case; None without a fatigue strength."""
+        table, strengths = case.calibration or CalibrationTable(), case.strengths(peak.group for peak in peaks)
+        if not strengths:
+            return None
+        spot = hot_spot(peaks, strengths, table.hot_spot)
+        return cls(table.share, fatigue_amplitude(spot.stress, spot.strength, table.share), spot, peaks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        spot = self.spot
+        return {
+            "strength": spot.strength, "share": self.share, "amplitude": self.amplitude,
+            "coordinates": list(spot.coordinates), "group": spot.group,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,14 +256,7 @@ class ModalAnalysis:
                 "residual": self.gyroscopic.residuals.tolist(),
             }
         if self.fatigue is not None:
-            spot = self.fatigue.spot
-            data["fatigue"] = {
-                "strength": spot.strength,
-                "share": self.fatigue.share,
-                "amplitude": self.fatigue.amplitude,
-                "coordinates": list(spot.coordinates),
-                "group": spot.group,
-            }
+            data["fatigue"] = self.fatigue.to_json()
         return data
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
@@ -273,12 +286,32 @@ class ModalAnalysis:
                 "gyroscopic_shape_imaginary": Variable(complex_modes.shapes.imag, ("mode", "dof"), "kg^-0.5"),
                 "whirl": Variable(complex_modes.whirl, ("mode",)),
             }
+        if self.fatigue is not None:
+            stress, places, groups = zip(*self.fatigue.peaks, strict=True)
+            variables |= {
+                "volume": Variable(np.array(groups, dtype=object), ("volume",)),
+                "stress_per_amplitude": Variable(np.array(stress), ("volume",), "Pa/m"),
+                "stress_place": Variable(np.array(places), ("volume", "axis"), "m"),
+            }
         result = self.to_json()
         kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
         attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
         attributes |= {"damping_ratio": self.structure.matrices.damping_ratio}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
+
+
+def set_level(path: Path, case: Case) -> bool:
+    """Write the fatigue level of a case into the file of its modes. Returns whether the file holds what that takes."""
+    kind, variables, attributes = load_any(path)
+    if "stress_per_amplitude" not in variables:
+        return False
+    columns = (variables[name].values.tolist() for name in ("stress_per_amplitude", "stress_place", "volume"))
+    level = Fatigue.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)])
+    if level is None:
+        return False
+    save(path, kind, variables, attributes | {"fatigue": level.to_json()})
+    return True
 
 
 def modal_analysis(structure: Structure) -> ModalAnalysis:
@@ -311,14 +344,12 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
 
 def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> Fatigue | None:
     """Return the fatigue level of a mode; None without a fatigue strength."""
-    case = structure.case
-    table, strengths = case.calibration or CalibrationTable(), case.strengths(structure.solid.domain.volumes)
-    if not strengths:
+    if structure.case.fatigue_strength is None:
         return None
+    shape = modes.shapes[bending]
     with stage("stress of the first bending"):
-        spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
-    amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
-    return Fatigue(table.share, amplitude, spot)
+        peaks = peak_stresses(structure.solid, shape / abs(float(functional @ shape)))
+    return Fatigue.of(structure.case, peaks)
 
 
 def _cavities(
@@ -390,18 +421,26 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     return tuple(f"units: {remark}" for remark in remarks)
 
 
-def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | None = None) -> Campbell:
+def campbell_diagram(
+    structure: Structure,
+    report: Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
+) -> Campbell:
     """Return the Campbell diagram that the case's tables [campbell] and [rotation] ask for.
 
-    report: called with the number of full solutions made, and of those known to be needed. Raises the errors of
-    `modal.campbell.campbell`.
+    report: called with the number of full solutions made, and of those known to be needed; checkpoint: a file to which
+    these are written and from which an interrupted call resumes; the caller removes it once the result is safe
+    (files.checkpoint_file.clear). Raises the errors of `modal.campbell.campbell`.
     """
     table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
     assert table is not None and rotation is not None and rotating is not None
     most = rotating.standing.free.size
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
-    diagram = campbell(rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report)
+    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as kept:
+        diagram = campbell(
+            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=kept.next
+        )
     provenance = {"matrices": dict(diagram.provenance), "versions": versions()}
     return replace(diagram, operating=table.operation, provenance=provenance)
 
@@ -495,7 +534,8 @@ def reduction(
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         with stage("speeds of rotation"):
             model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
-    model = replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+    made = {"basis": basis, "estimate": estimate, "versions": versions()}
+    model = replace(model, provenance=dict(model.provenance) | made)
     if levelled:
         model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})
     if spots:

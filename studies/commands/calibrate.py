@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
 from vanedamp.studies.case.calibration import calibrate
 from vanedamp.studies.case.tables import Case
@@ -15,13 +16,15 @@ from vanedamp.studies.commands.support.messages import cavity_lines, write_resul
 
 def run(arguments: Namespace, case: Case) -> None:
     """Update the model, and find damping, rigid model and excitation."""
-    calibration = calibrate(case)
+    calibration = calibrate(case, arguments.checkpoint)
     result = calibration.to_json()
     write_result(
         arguments, result, _summary(result), calibration.warnings, output=calibration.save,
         case=partial(save_tuned_case, arguments.input, calibration),
         scene=partial(save_rigid_scene, arguments.input, calibration),
     )  # fmt: skip
+    if arguments.checkpoint is not None:
+        clear(arguments.checkpoint)
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:

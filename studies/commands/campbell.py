@@ -7,6 +7,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
@@ -23,7 +24,7 @@ def run(arguments: Namespace, case: Case) -> None:
     started = time.perf_counter()
     structure = assemble(case)
     with progress("campbell") as report:
-        diagram = campbell_diagram(structure, report)
+        diagram = campbell_diagram(structure, report, arguments.checkpoint)
     seconds = time.perf_counter() - started
     warnings = [*diagram.warnings, *unit_doubts(structure)]
 
@@ -34,6 +35,8 @@ def run(arguments: Namespace, case: Case) -> None:
 
     result = diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}
     write_result(arguments, result, _summary(diagram, seconds), warnings, output=diagram.save, picture=picture)
+    if arguments.checkpoint is not None:
+        clear(arguments.checkpoint)
 
 
 def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:

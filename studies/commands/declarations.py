@@ -39,6 +39,13 @@ COMMANDS = (
         (input_file("FILE.toml"), json_file),
     ),
     Command(
+        "info", "say what a result is: how it was made, and its main figures", 5,
+        (
+            argument("input", metavar="RESULT.h5", help="result of any command, or its checkpoint (.partial)"),
+            json_file,
+        ),
+    ),
+    Command(
         "schema", "JSON Schema of a kind of input file, for editors", 5,
         (Function("schema:add_kind"), output_file("FILE.json")),
     ),
@@ -60,8 +67,9 @@ COMMANDS = (
         (
             input_file("CASE.toml"), output_file("CAMPBELL.h5"), json_file,
             argument("--picture", metavar="FILE.png", help="the diagram as a picture"),
+            resume,
         ),
-        writes={"output": _RECORD, "picture": (".png",)},
+        writes={"output": _RECORD, "picture": (".png",)}, checkpoint=True,
         reads=Function("support.cases:read_campbell_case"),
     ),
     Command(
@@ -70,9 +78,9 @@ COMMANDS = (
             input_file("CASE.toml"), output_file("CALIBRATION.h5"),
             argument("--case", metavar="TUNED.toml", help="the case with the tuned numbers"),
             argument("--scene", metavar="RIGID.toml", help="a scene of the calibrated rigid model"),
-            json_file,
+            json_file, resume,
         ),
-        writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, reads=_CASE,
+        writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, checkpoint=True, reads=_CASE,
     ),
     Command(
         "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", 40,

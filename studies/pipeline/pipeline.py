@@ -119,7 +119,8 @@ def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callab
     say(f"{stage.name}: runs, {'; '.join(reasons)}")
     same = record.begin(stage.name, inputs)
     started = time.perf_counter()
-    found = stage.work(Tools(lambda line: say(f"{stage.name}: {line}"), pool, fresh=not same))
+    tools = Tools(lambda line: say(f"{stage.name}: {line}"), pool, not same, record.inputs(stage.name, stage.outputs))
+    found = stage.work(tools)
     seconds = time.perf_counter() - started
     record.end(stage.name, inputs, stage.outputs)
     say(f"{stage.name}: {found} ({seconds:.1f} s)")

@@ -49,6 +49,11 @@ class Record:
             return ["not done so far"]
         return list(changes(done["inputs"], plain(inputs))) + list(_lost(done["outputs"], outputs))
 
+    def inputs(self, name: str, outputs: Sequence[Path]) -> Inputs | None:
+        """Return the inputs that a stage's outputs were made of; None unless they are as it made them."""
+        done = self._done.get(name)
+        return None if done is None or any(_lost(done["outputs"], outputs)) else done["inputs"]
+
     def edited(self, name: str, outputs: Sequence[Path]) -> list[Path]:
         """Return the outputs of a stage that are not as it made them, of those that it has made."""
         made = self._done.get(name, {"outputs": {}})["outputs"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.metadata
 import json
 import os
@@ -18,6 +19,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, load
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.case.tables import Case, check_interface
+from vanedamp.studies.pipeline.record import Inputs, plain
 from vanedamp.studies.pipeline.tables import (
     CALIBRATION,
     MODES,
@@ -51,12 +53,14 @@ class Tools:
     """The inputs of a stage's work.
 
     note: takes a line for the user, to which it adds the stage's name; pool: returns the worker processes, started when
-    first asked for; fresh: what an earlier start left is of other inputs.
+    first asked for; fresh: what an earlier start left is of other inputs; made_of: the inputs of the outputs that are
+    there, if they are as the stage made them.
     """
 
     note: Callable[[str], None]
     pool: Callable[[], Executor | None]
     fresh: bool = False
+    made_of: Inputs | None = None
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Pass warnings to the user."""
@@ -130,14 +134,19 @@ class Calibrate(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Calibrate."""
+        from vanedamp.files.checkpoint_file import clear
         from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
         from vanedamp.studies.case.calibration import calibrate
 
-        found = calibrate(Case.load(self.file))
         record, tuned, scene = self.outputs
+        checkpoint = f"{record}.partial"
+        if tools.fresh:
+            clear(checkpoint)
+        found = calibrate(Case.load(self.file), checkpoint)
         found.save(record)
         save_tuned_case(self.file, found, tuned)
         save_rigid_scene(self.file, found, scene)
+        clear(checkpoint)
         tools.warn(found.warnings)
         rigid, factors = found.rigid, ""
         if found.tuning is not None:
@@ -154,9 +163,13 @@ class Modal(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Compute the modes."""
-        from vanedamp.studies.case.stages import assemble, modal_analysis
+        from vanedamp.studies.case.stages import assemble, modal_analysis, set_level
 
-        analysis = modal_analysis(assemble(Case.load(self.file)))
+        case, now = Case.load(self.file), plain(self.inputs())
+        same = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
+        if same and set_level(self.outputs[0], case):
+            return "modes kept, only the amplitude at the fatigue strength is new"
+        analysis = modal_analysis(assemble(case))
         analysis.save(self.outputs[0])
         tools.warn(analysis.warnings)
         first = "" if analysis.rigid is None else f", first bending {analysis.rigid.frequency_hz:.6g} Hz"
@@ -176,10 +189,7 @@ class Reduce(CaseStage):
 
     def inputs(self) -> dict[str, Any]:
         """Return the case's inputs without strengths, which no reduced model depends on, and the options."""
-        found = super().inputs()
-        for material in found.get(f"case {self.file.name}", {}).get("material", {}).values():
-            material.pop("fatigue_strength", None)
-        return found | {"option": asdict(self.table)}
+        return _without_level(super().inputs()) | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
@@ -329,6 +339,16 @@ class Report(Stage):
         files = [path for path in (*self.takes, *self.results) if path.exists()]
         write_report(collect(files), self.outputs[0], self.title)
         return f"{len(files)} results on {self.outputs[0].name}"
+
+
+def _without_level(inputs: Inputs) -> dict[str, Any]:
+    """Return the inputs of a case's stage without those of the fatigue level, which concerns no mode."""
+    found = copy.deepcopy(dict(inputs))
+    for tables in (data for subject, data in found.items() if subject.startswith("case ")):
+        tables.pop("calibration", None)
+        for material in tables.get("material", {}).values():
+            material.pop("fatigue_strength", None)
+    return found
 
 
 def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage]:

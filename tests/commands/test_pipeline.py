@@ -146,6 +146,28 @@ def test_nothing_is_done_again(folder, capsys):
     assert {path: path.stat().st_mtime_ns for path in (folder / "out").iterdir()} == before
 
 
+def test_a_fatigue_strength_makes_no_modes_again(tmp_path, monkeypatch):
+    """The stresses of the mode are in its file, from which the level of another strength follows."""
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(CASE.split("[calibration")[0])
+    Path("pipeline.toml").write_text('case = "case.toml"\nfolder = "out"\n[modal]\n')
+    vd.pipeline("pipeline.toml")
+    replace_in(Path("case.toml"), "strength = 4e8", "strength = 5e8")
+    (stage,) = vd.pipeline("pipeline.toml").stages
+    assert stage.status == "done" and stage.found.startswith("modes kept")
+    assert main(["modal", "case.toml", "-o", "anew.h5"]) == 0
+    (kept, one), (anew, other) = load("out/modes.h5", "modes"), load("anew.h5", "modes")
+    assert json.loads(one["fatigue"]) == json.loads(other["fatigue"]) and json.loads(one["fatigue"])["strength"] == 5e8
+    assert one.keys() == other.keys() and kept.keys() == anew.keys()
+    for name, values in anew.items():
+        np.testing.assert_array_equal(kept[name], values)
+    replace_in(Path("case.toml"), "poisson = 0.3", "poisson = 0.29")
+    assert "modes kept" not in vd.pipeline("pipeline.toml").stages[0].found
+    replace_in(Path("case.toml"), "fatigue_strength = 5e8", "")
+    assert "modes kept" not in vd.pipeline("pipeline.toml").stages[0].found
+    assert "fatigue" not in load("out/modes.h5", "modes")[1]
+
+
 #: by the file, the change in it, the stages that depend on it, and what is told
 CHANGES = [
     ("case.toml", "young = 2e11", "young = 2e11  # as delivered", [], ""),

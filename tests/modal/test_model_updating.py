@@ -143,6 +143,28 @@ def test_modes_that_cross_are_followed():
     assert tuned.modes_after.tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("starts", [1, 2])
+def test_a_search_that_was_stopped_anywhere_resumes_bit_for_bit(system, starts):
+    """With starts of its own it goes back to the untuned modes in between."""
+    matrices, parts = system
+    target = solve_modes(stretched(system, (1.2, 0.7)), 3).frequencies_hz
+    all_kept = []
+
+    def recorded(solve):
+        all_kept.append(solve())
+        return all_kept[-1]
+
+    whole = tune(matrices, parts, target, starts=starts, keep=recorded)
+    assert len(all_kept) == whole.evaluations > 4
+    for number in range(1, len(all_kept) + 1):
+        waiting = all_kept[:number]
+        resumed = tune(
+            matrices, parts, target, starts=starts, keep=lambda solve, kept=waiting: kept.pop(0) if kept else solve()
+        )
+        for name in ("factors", "deviations", "after_hz", "mac_after", "sensitivities", "modes_after"):
+            np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
+
+
 def test_a_beam_with_an_elastic_clamp(tmp_path):
     """Finite elements: Young's modulus and the springs of the root from three frequencies, to 0.1 %."""
     path = build(Block(0.1, 0.02, 0.01, divisions=(6, 1, 1), hexahedra=True), tmp_path / "b.msh")

@@ -10,8 +10,10 @@ import tomli_w
 
 import vanedamp as vd
 from tests.tools.processes import ROOT
+from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import of_run
 from vanedamp.coupling.orbits.newton import OrbitStatus
+from vanedamp.coupling.orbits.orbits import _Search
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.cli import main
@@ -228,6 +230,24 @@ def test_a_run_that_does_not_repeat_starts_from_its_closest_returns():
     assert [start.periods for start in starts.candidates] == [1, 1, 2, 2, 3, 3]
     assert "the run of the scene is non-periodic: over 256 periods it comes back to 0." in starts.remedy
     assert vd.find_orbit(wandering).status is OrbitStatus.OK
+
+
+def test_a_linear_start_that_leads_nowhere_says_what_the_run_gives():
+    """Figure 9 near its resonance: the linear motion would pass through the walls."""
+    data = tomllib.loads((ROOT / "docs" / "examples" / "orbits.toml").read_text())
+    data["excitation"]["frequency"], data["cavity"][0]["gap"] = 2395.0, 3.5e-5
+    data["orbit"] = {"start": "linear"}
+    lost = scene(data)
+    kind = vd.simulate(lost).classification
+    with pytest.raises(InputError, match=r"no orbit of 1 .*; start = \"run\" finds an orbit of 1 period\(s\)$"):
+        vd.orbits(lost)
+    search = _Search(lost)
+    starts = search.starts()
+    assert starts.run is not None
+    none = starts.run()._replace(candidates=[])
+    diagram = Diagram(search.map, search.table, search.low, search.to, lambda: starts._replace(run=lambda: none))
+    with pytest.raises(InputError, match=rf"finds none either .* run of the scene is {kind}.* \(the phase planes"):
+        diagram.follow(lambda done, total: None)
 
 
 def test_the_command(tmp_path, monkeypatch, capsys):

@@ -1,0 +1,66 @@
+"""Solutions of a long command on a case, on disk, with which the same command begins after a kill."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.checkpoint_file import CheckpointFile, clear, digests
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import StoreError, Variable
+from vanedamp.files.toml_input import tables
+from vanedamp.modal.kept_solutions import Arrays
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.studies.case.tables import Case
+
+
+class CaseCheckpoint(CheckpointFile):
+    """Solutions in the order in which a command asks for them (path None: nothing is kept)."""
+
+    def __init__(self, path: str | Path | None, command: str, case: Case, matrices: SystemMatrices) -> None:
+        """Take up the file's solutions. Raises InputError for a file of another case, or one that cannot be read."""
+        belongs: dict[str, tuple[str, Mapping[str, Any]]] = {
+            "case": ("case", json.loads(json.dumps(tables(case)))),
+            "matrices": ("mesh", matrices.provenance),
+            "model": ("file of measurements", digests(case.files)),
+            "versions": ("version of the software", versions()),
+        }
+        super().__init__(path, f"{command}-checkpoint", belongs, self._content)
+        self._solutions: list[dict[str, np.ndarray]] = []
+        self._asked, self._kept = 0, path is not None
+        if (found := self.read()) is not None:
+            self._solutions = [{} for _ in found[0]["solution"]]
+            for place, values in found[0].items():
+                name, of, number = place.partition(" ")
+                if of:  # no dimension
+                    self._solutions[int(number)] |= {name: values}
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        if self._path is not None and kind is not None and issubclass(kind, VanedampError) and kind is not StoreError:
+            clear(self._path)  # the case must be changed, and the solutions belong to no other
+        else:
+            super().__exit__(kind, *rest)
+
+    def next(self, solve: Callable[[], Arrays]) -> Arrays:
+        """Return the next solution: the file's, or else that of the function (modal.kept_solutions.Keep)."""
+        self._asked += 1
+        if self._asked <= len(self._solutions):
+            return self._solutions[self._asked - 1]
+        found = solve()
+        if self._kept:
+            self._solutions.append(dict(found))
+            self.changed()
+        return found
+
+    def _content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
+        variables = {"solution": Variable(np.arange(len(self._solutions)), ("solution",))}
+        for number, arrays in enumerate(self._solutions):
+            for name, values in arrays.items():
+                dims = [f"{name}_{number}_{axis}" for axis in range(values.ndim)]
+                variables[f"{name} {number}"] = Variable(values, dims)
+        return variables, {}, f"{len(self._solutions)} solutions are finished"

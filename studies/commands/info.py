@@ -1,0 +1,244 @@
+"""`vanedamp info`: what a result is, how it was made, and its main figures."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.response.response import UNITS
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.studies.commands.support.facts import Fact, fact_lines
+from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.report.forced_response import best_first, forced_responses
+
+#: entries of a list that are shown
+_MOST = 10
+#: ending of the kinds of checkpoints
+_CHECKPOINT = "-checkpoint"
+_OF_RESPONSE = (
+    "status", "classification", "frequency", "amplitude_mean", "amplitude_max", "amplitude_harmonic",
+    "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
+)  # fmt: skip
+
+
+class _Record(NamedTuple):
+    """The content of a file, its texts of nested data as such."""
+
+    path: str
+    variables: Mapping[str, Variable]
+    attributes: Mapping[str, Any]
+
+
+def run(arguments: Namespace) -> None:
+    """Print the facts. Raises StoreError for a file that is no record of ours, or damaged."""
+    path = arguments.input
+    kind, variables, attributes = load_any(path)
+    record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
+    checkpoint = kind.endswith(_CHECKPOINT)
+    what, command, figures = _KINDS.get(kind.removesuffix(_CHECKPOINT), (kind, None, _any))
+    what = f"what {what} had finished" if checkpoint else what
+    found = [Fact("command", f"vanedamp {command}" if command else None), *_origin(record)]
+    with decoding(path):
+        found += [Fact("finished", record.attributes.get("finished"))] if checkpoint else figures(record)
+    sizes = {} if checkpoint else _sizes(variables)
+    found += [Fact("sizes", sizes), Fact("warnings", _warnings(record))]
+    result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
+    write_result(arguments, result, fact_lines(f"{path}: {kind}, {what}", found))
+
+
+def _nested(value: Any) -> Any:
+    """Return nested data of its JSON text; any other value as it is."""
+    if isinstance(value, str) and value[:1] in "{[":
+        try:
+            return json.loads(value)
+        except ValueError:  # a text that begins like that
+            return value
+    return value
+
+
+def _origin(record: _Record) -> Iterator[Fact]:
+    """Yield when, by which software and from what input the file was made."""
+    path, attributes = Path(record.path), record.attributes
+    made = attributes.get("provenance", {})
+    matrices = made.get("matrices", attributes.get("matrices"))
+    matrices = matrices if isinstance(matrices, dict) else made  # of an imported model: their names
+    written = datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+    yield Fact(
+        "written", written.isoformat(" ", "seconds"), "", f"time of the file, {path.stat().st_size / 1e6:.3g} MB"
+    )
+    versions = matrices.get("versions", {}) | made.get("versions", {}) | attributes.get("versions", {})
+    yield Fact("versions", versions)
+    if "mesh" in matrices:
+        yield Fact("mesh", {"file": matrices["mesh"], "sha256": matrices["mesh_sha256"]})
+    if scene := _scene(record):
+        structure = scene["structure"]
+        yield Fact("structure", structure["model"], "", structure.get("file", ""))
+        yield Fact("bodies", dict(Counter(body["shape"] for body in scene["damper"])))
+    yield Fact("files", attributes.get("model"), "", "SHA-256 of the other input files")
+
+
+def _scene(record: _Record) -> dict[str, Any] | None:
+    """Return the scene in a file, as plain data; None without."""
+    of_study, made = record.attributes.get("study", {}), record.attributes.get("provenance", {})
+    found: dict[str, Any] | None = record.attributes.get("scene") or of_study.get("scene") or made.get("scene")
+    return found
+
+
+def _modes(record: _Record) -> Iterator[Fact]:
+    attributes = record.attributes
+    yield Fact("frequency_hz", record.variables["frequency"].values[:_MOST].tolist(), "Hz", "natural frequencies")
+    if "first_bending" in attributes:
+        yield Fact("first_bending_number", attributes["first_bending"] + 1, "", "of the modes, counted from 1")
+    yield Fact("rigid", attributes.get("rigid"), "", "rigid model, SI units")
+    yield from _level(attributes.get("fatigue"))
+
+
+def _level(level: Mapping[str, Any] | None) -> Iterator[Fact]:
+    if level:
+        yield Fact("fatigue_amplitude", level["amplitude"], "m", f"at {level['share']:.0%} of the fatigue strength")
+
+
+def _calibration(record: _Record) -> Iterator[Fact]:
+    attributes, variables = record.attributes, record.variables
+    yield Fact("rigid", attributes["rigid"], "", "rigid model, SI units")
+    if "factor" in variables:
+        names, factors = (variables[name].values.tolist() for name in ("part", "factor"))
+        yield Fact("factor", dict(zip(names, factors, strict=True)), "", "on stiffness")
+        for name in ("target_frequency", "frequency_after"):
+            yield Fact(name, variables[name].values.tolist(), "Hz")
+    yield Fact("damping", attributes["damping"])
+    level = attributes.get("excitation")
+    yield from _level(level)
+    if level:
+        yield Fact("force", level["force"], "N", "at resonance, gives this amplitude")
+
+
+def _campbell(record: _Record) -> Iterator[Fact]:
+    of = {name: variable.values for name, variable in record.variables.items()}
+    rpm = of["speed"] * 30 / np.pi
+    yield Fact("rpm", [float(rpm[0]), float(rpm[-1])], "", "lowest and highest speed")
+    ends = [f"mode {mode + 1} {np.nanmin(row):.6g} to {np.nanmax(row):.6g}" for mode, row in zip(
+        of["mode"], of["frequency"], strict=True)]  # fmt: skip
+    yield Fact("frequencies", ends, "Hz")
+    crossings = zip(of["crossing_mode"], of["crossing_order"], of["crossing_speed"] * 30 / np.pi, strict=True)
+    found = [f"mode {mode + 1} and order {order:g} at {speed:.6g} rpm" for mode, order, speed in crossings]
+    yield Fact("crossings", found)
+    yield Fact("veerings", int((of["approach_kind"] == "veering").sum()))
+    yield Fact("error", float(of["error"].max()), "", "estimated, relative, of the frequencies")
+
+
+def _reduced(record: _Record) -> Iterator[Fact]:
+    made = record.attributes.get("provenance", {})
+    frequencies = record.variables["natural_frequency"].values
+    yield Fact("frequency_hz", frequencies[:_MOST].tolist(), "Hz", "natural frequencies")
+    yield Fact("interface", record.variables["interface"].values.tolist())
+    yield Fact("basis", made.get("basis"))
+    yield Fact("estimate", made.get("estimate", {}).get("sentence"))
+    yield from _level(made.get("fatigue"))
+
+
+def _response(record: _Record) -> Iterator[Fact]:
+    for name in _OF_RESPONSE:
+        yield Fact(name, record.attributes.get(name), UNITS.get(name, ""))
+
+
+def _sweep(record: _Record) -> Iterator[Fact]:
+    sweep = Sweep.load(record.path)
+    units = sweep.units()
+    ends = {path: f"{values[0]} to {values[-1]} {units[path]}".strip() for path, values in sweep.axes.items()}
+    yield Fact("axes", {path: f"{ends[path]}, {len(values)} values" for path, values in sweep.axes.items()})
+    for name, texts in (("status", sweep.status), ("classification", sweep.classification)):
+        yield Fact(name, dict(Counter(map(str, texts.ravel()))), "", "points")
+    found = [response.sentence for response in best_first(forced_responses(sweep)) if response.reference > 0]
+    yield Fact("response", found[:1], "", "best curve")
+    yield Fact("curves", len(found))
+
+
+def _orbits(record: _Record) -> Iterator[Fact]:
+    branches = Branches.load(record.path)
+    yield Fact("parameter", branches.parameter)
+    found = branches.to_json()
+    yield Fact("branches", [
+        f"{branch['points']} orbits from {branch['parameter_min']:.6g} to {branch['parameter_max']:.6g} "
+        f"{found['unit']}, {branch['stable_points']} stable" for branch in found["branches"]
+    ])  # fmt: skip
+    yield Fact("special_points", dict(Counter(point["kind"] for point in found["special_points"])))
+
+
+def _ramp(record: _Record) -> Iterator[Fact]:
+    found = Ramp.load(record.path).to_json()
+    yield Fact("runs", [
+        f"{abs(run['rate']):g} {found['unit']}/s {run['direction']}: {run['status']}, peak {run['peak']:.6g} m at "
+        f"{run['peak_frequency']:.6g} Hz, {run['peak_share']:.1%} of the steady peak without bodies"
+        for run in found["runs"]
+    ])  # fmt: skip
+
+
+def _ring_down(record: _Record) -> Iterator[Fact]:
+    found = RingDown.load(record.path)
+    half = found.half_cycles
+    yield Fact("status", found.status.value)
+    yield Fact("mode_hz", found.linear.frequency, "Hz", f"mode {found.linear.mode}, without bodies")
+    yield Fact("damping_ratio", found.linear.damping_ratio, "", "of it")
+    yield Fact("half_cycles", len(half.time))
+    yield Fact("amplitude", half.amplitude[[0, -1]].tolist() if len(half.time) else None, "m", "first and last")
+    yield Fact("impacts", int(found.impacts.sum()))
+    yield Fact("rest_time", found.rest_time, "s")
+
+
+def _optimisation(record: _Record) -> Iterator[Fact]:
+    attributes = record.attributes
+    yield Fact("answer", attributes["sentence"])
+    yield Fact("nominal", attributes["nominal"], "", "best as designed")
+    yield Fact("robust", attributes["robust"], "", "best within the tolerances")
+    yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
+
+
+def _any(record: _Record) -> Iterator[Fact]:
+    """Yield the numbers and words of a record of another kind."""
+    for name, value in record.attributes.items():
+        if isinstance(value, str | int | float) and name not in ("kind", "schema_version"):
+            yield Fact(name, value)
+
+
+def _sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
+    """Return the lengths of the dimensions."""
+    return {
+        name: length
+        for variable in variables.values()
+        for name, length in zip(variable.dims, np.shape(variable.values), strict=True)
+    }
+
+
+def _warnings(record: _Record) -> list[str]:
+    found = record.attributes.get("warnings") or record.attributes.get("provenance", {}).get("warnings", [])
+    return list(found)
+
+
+#: kinds of records: in words, the command that writes them, and their figures
+_KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] = {
+    "modes": ("a modal analysis", "modal", _modes),
+    "calibration": ("a case calibrated with measurements", "calibrate", _calibration),
+    "campbell": ("a Campbell diagram", "campbell", _campbell),
+    "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
+    "response": ("the response of a scene", "run", _response),
+    "sweep": ("responses of a scene over a grid", "sweep", _sweep),
+    "orbits": ("branches of periodic orbits", "orbits", _orbits),
+    "ramp": ("run-ups and run-downs", "ramp", _ramp),
+    "ring_down": ("a ring-down", "ringdown", _ring_down),
+    "optimisation": ("an optimisation", "optimise", _optimisation),
+    "optimise": ("an optimisation", "optimise", _any),
+    "calibrate": ("a calibration", "calibrate", _any),
+    "system-matrices": ("matrices of finite elements", None, _any),
+}
