@@ -35,7 +35,7 @@ class Headline:
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
-    onset                        first place with impacts on walls
+    onset                        first place with impacts on walls (of sliders in one cavity, or between them)
     touched_below                first place below it where a body hits its floor or ceiling only, or another body
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are

@@ -118,7 +118,7 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
     onset = "The bodies hit no wall"
     if found.onset is not None:
         first_point = " or below, the first point" if found.onset == best.x[0] else ""
-        onset = f"Impacts on walls begin at {format_value(found.onset)}{unit}{first_point}"
+        onset = f"{best.onset_of.capitalize()} begin at {format_value(found.onset)}{unit}{first_point}"
     if found.touched_below is not None:
         onset += f"; below, from {format_value(found.touched_below)}{unit} on, a body hits its floor or ceiling"
     second = (

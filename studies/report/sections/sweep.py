@@ -139,7 +139,8 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
     ]  # fmt: skip
     return charts | {
-        "axis": axis, "units": responses[0].units, "rows": rows, "every": every, "panels": len(panels),
+        "axis": axis, "units": responses[0].units, "onset_of": max((each.onset_of for each in responses), key=len),
+        "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
     }  # fmt: skip
 
