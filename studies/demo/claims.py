@@ -46,7 +46,7 @@ def fig9(curves: Curves) -> list[Claim]:
     return [
         claim(
             "At reference/2 the bodies take about half of the amplitude away, averaged.",
-            f"highest mean {peaks['reference/2']}, smoothed {smooth:.3f}: a reduction of {1 - smooth:.0%}",
+            f"highest mean {peaks['reference/2']}, smoothed {smooth:.3f}: {1 - smooth:.0%} gained",
             verdict(0.4 <= 1 - smooth <= 0.6, 0.3 <= 1 - smooth <= 0.7),
             figures={"peak_mean": peaks["reference/2"].height, "peak_smoothed": smooth, "peak_max": tops["reference/2"],
                      "reduction": 1 - smooth, "confidence": peaks["reference/2"].confidence},

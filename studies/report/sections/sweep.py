@@ -78,7 +78,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
 
 
 def _body_note(sweep: Sweep) -> str | None:
-    return body_note(sweep.provenance, any(not damper.form.planar for damper in sweep.scene.damper))
+    return body_note(sweep.provenance, sweep.scene)
 
 
 def _scene(sweep: Sweep) -> dict[str, Any]:
