@@ -161,7 +161,7 @@ def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str]
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw where the energy goes: stacked fractions of the losses, one panel per response."""
+    """Draw where the energy goes: stacked fractions of the losses, one panel per response, each with a point."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
     # a name is as wide as a panel at most: its settings stand below each other
@@ -184,6 +184,9 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
                 showlegend=number == piece == 0, hovertemplate=f"{loss}: %{{y:.1f}} %<extra></extra>",
                 row=number // columns + 1, col=number % columns + 1,
             )  # fmt: skip
+        if response.x[0] < response.x[-1]:  # also where its ends are not ok
+            ends = [response.x[0], response.x[-1]]
+            figure.update_xaxes(range=ends, row=number // columns + 1, col=number % columns + 1)
     figure.update_yaxes(range=[0, 100])
     figure.update_annotations(font_size=12)
     figure.update_yaxes(title_text="share of the energy lost, %", col=1)

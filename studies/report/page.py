@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -145,6 +146,7 @@ def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
+    shared.filters |= {"ratio": lambda value: f"{value:.3f}" if math.isfinite(value) else "none"}
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return shared

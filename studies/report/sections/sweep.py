@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -119,11 +120,12 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         responses = best_first(responses)[:_MOST_CURVES]
     shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
     linear = [linear_curves(sweeps[response.source], response) for response in responses]
-    panels = responses if page.study is not None else responses[:_MOST_PANELS]
+    panels = [response for response in responses if np.isfinite(response.energy_share).any()]
+    panels = panels if page.study is not None else panels[:_MOST_PANELS]
     figures = {
         "response": responses_figure(responses, linear, shown),
         "mistuning": mistuning_figure(responses, shown),
-        "energy": energy_figure(panels),
+        **({"energy": energy_figure(panels)} if panels else {}),
     }
     axis, sources = responses[0].axis, [response.source for response in responses]
     charts: dict[str, Chart | None] = {
@@ -134,7 +136,8 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     rows = [
         {
             "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
-            "impacts": float(np.nan_to_num(response.impacts_per_period).max()), "place": places[response.name],
+            "impacts": max(response.impacts_per_period[np.isfinite(response.damped_mean)], default=math.nan),
+            "place": places[response.name],
         }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
     ]  # fmt: skip
