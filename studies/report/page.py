@@ -163,13 +163,14 @@ def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
     facts = {
         file: {
             key: value
-            for key, value in (_flat(result.provenance) | {"sha256": digest(file)}).items()
+            for key, value in _flat(result.provenance).items()
             if mine.get(key.removeprefix("versions.")) != value
         }
         for file, result in results.by_file.items()
         if result.provenance is not None
     }
-    return {(): mine} | _by_owners(facts)
+    groups, own = _by_owners(facts), {(file,): {"sha256": digest(file)} for file in facts}
+    return {(): mine} | {key: groups.get(key, {}) | own.get(key, {}) for key in (groups | own)}
 
 
 def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...], dict[str, str]]:

@@ -125,11 +125,12 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     figures = {
         "response": responses_figure(responses, linear, shown),
         "mistuning": mistuning_figure(responses, shown),
-        **({"energy": energy_figure(panels)} if panels else {}),
+        "energy": energy_figure(panels) if panels else None,
     }
     axis, sources = responses[0].axis, [response.source for response in responses]
     charts: dict[str, Chart | None] = {
-        kind: page.chart(kind, figure, ("response", axis, *_COLUMNS[kind]), _table(responses, _COLUMNS[kind]), sources)
+        kind: figure
+        and page.chart(kind, figure, ("response", axis, *_COLUMNS[kind]), _table(responses, _COLUMNS[kind]), sources)
         for kind, figure in figures.items()
     }
     charts["plane"] = _plane_chart(responses, shown, page)
