@@ -128,7 +128,7 @@ def format_value(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
-def without_round_off(value: float, scale: float) -> float:
+def without_round_off(value: float, scale: float = 1.0) -> float:
     """Return a value, or 0 where it is round-off of numbers of a scale."""
     return 0.0 if abs(value) <= _ROUND_OFF * scale else value
 

@@ -88,7 +88,7 @@ def key_figures(response: ForcedResponse, onset: tuple[float, float] | None) -> 
     return [
         Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at), True),
         Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at), True),
-        *(() if onset is None else (Figure("onset of impacts, grown slowly", _at_amplitude(*onset), True),)),
+        *(() if onset is None else (Figure("onset of impacts, slow growth", _at_amplitude(*onset), True),)),
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),
         Figure("most reduced in the band", _most_reduced(response)),
@@ -132,4 +132,4 @@ def _micro(height: float) -> str:
 
 
 def _ratio(value: float) -> str:
-    return f"{value:.3f}" if math.isfinite(value) else "-"
+    return f"{value:z.3f}" if math.isfinite(value) else "-"

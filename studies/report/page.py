@@ -19,6 +19,7 @@ from markupsafe import Markup
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
+from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
@@ -146,7 +147,8 @@ def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
-    shared.filters |= {"ratio": lambda value: f"{value:.3f}" if math.isfinite(value) else "none"}
+    shared.filters |= {"ratio": lambda value: f"{value:z.3f}" if math.isfinite(value) else "none"}
+    shared.filters["clean"] = without_round_off
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return shared
