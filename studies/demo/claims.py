@@ -131,8 +131,8 @@ def onset(curve: Curve) -> Claim:
         f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
         f"by at most {apart:.2%} over {below.sum()} points",
         verdict(apart < 0.01 and below.sum() > 5),
-        "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that grows "
-        "slowly hits only from amplitudes of about half of the gap on.",
+        "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
+        "grows slowly hits only from amplitudes of about half of the gap on.",
         {"onset_hz": curve.onset, "difference": apart},
     )
 
