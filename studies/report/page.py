@@ -171,8 +171,10 @@ def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
         for file, result in results.by_file.items()
         if result.provenance is not None
     }
-    groups, own = _by_owners(facts), {(file,): {"sha256": digest(file)} for file in facts}
-    return {(): mine} | {key: groups.get(key, {}) | own.get(key, {}) for key in (groups | own)}
+    groups = {(): mine, **_by_owners(facts)}
+    for file in facts:  # equal files have their places, too
+        groups.setdefault((file,), {})["sha256"] = digest(file)
+    return groups
 
 
 def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...], dict[str, str]]:
