@@ -80,8 +80,8 @@ class Headline:
         """Reasons why the ratio does not compare two resonance peaks, along the frequency."""
         return self.remarks_in("Hz")
 
-    def remarks_in(self, units: str) -> list[str]:
-        """Return these reasons; units: of the axis."""
+    def remarks_in(self, units: str, left_out: bool = True) -> list[str]:
+        """Return these reasons; units: of the axis; left_out: points that are not ok among them."""
         remarks = []
         if self.undamped_at_edge:
             remarks.append("no resonance without bodies lies within the range")
@@ -92,7 +92,7 @@ class Headline:
                 f"points {self.spacing:.3g} {units} apart are too coarse for a resonance {self.half_power_width:.3g} "
                 f"{units} wide"
             )
-        if self.points_left_out:
+        if left_out and self.points_left_out:
             remarks.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
         return remarks
 
