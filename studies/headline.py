@@ -35,7 +35,7 @@ class Headline:
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
-    onset                        first place with impacts on walls
+    onset                        first place with impacts on walls (of sliders in one cavity, or between them)
     touched_below                first place below it where a body hits its floor or ceiling only, or another body
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
@@ -80,8 +80,8 @@ class Headline:
         """Reasons why the ratio does not compare two resonance peaks, along the frequency."""
         return self.remarks_in("Hz")
 
-    def remarks_in(self, units: str) -> list[str]:
-        """Return these reasons; units: of the axis."""
+    def remarks_in(self, units: str, left_out: bool = True) -> list[str]:
+        """Return these reasons; units: of the axis; left_out: points that are not ok among them."""
         remarks = []
         if self.undamped_at_edge:
             remarks.append("no resonance without bodies lies within the range")
@@ -92,7 +92,7 @@ class Headline:
                 f"points {self.spacing:.3g} {units} apart are too coarse for a resonance {self.half_power_width:.3g} "
                 f"{units} wide"
             )
-        if self.points_left_out:
+        if left_out and self.points_left_out:
             remarks.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
         return remarks
 
@@ -128,7 +128,7 @@ def format_value(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
-def without_round_off(value: float, scale: float) -> float:
+def without_round_off(value: float, scale: float = 1.0) -> float:
     """Return a value, or 0 where it is round-off of numbers of a scale."""
     return 0.0 if abs(value) <= _ROUND_OFF * scale else value
 

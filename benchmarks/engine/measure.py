@@ -224,7 +224,7 @@ def _counts(scene: Scene, lengths: tuple[int, int]) -> tuple[float, float, float
     short, long = (simulate(scene.replace({"time.periods": periods})) for periods in lengths)
     span = lengths[1] - lengths[0]
     evaluations = long.counters["evaluations"] - short.counters["evaluations"]
-    return 1.0, (long.events - short.events) / span, evaluations / span
+    return 1.0, (long.counters["changes"] - short.counters["changes"]) / span, evaluations / span
 
 
 def _clock(method: Callable[..., Any], case: ImpactOscillator, periods: int) -> float:

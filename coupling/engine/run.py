@@ -52,6 +52,7 @@ class EventDrivenRun(ABC):
         self.whole, self.records, self.keep, self.max_events = whole, records, events, max_events
         self.chunks: list[np.ndarray] = []
         self.begun, self.ended, self._since = False, False, START
+        self.listed = 0  # entries of the log, kept or not
 
     @abstractmethod
     def begin(self, max_events: int) -> int:
@@ -89,6 +90,7 @@ class EventDrivenRun(ABC):
             code = self._advance(periods, max_events)
             if self.keep and self.counters[LOGGED]:
                 self.chunks.append(self.log[: self.counters[LOGGED]].copy())
+            self.listed += int(self.counters[LOGGED])
             self.counters[LOGGED] = 0
             if code == NEEDS_FLOW:
                 try:
@@ -123,10 +125,10 @@ class EventDrivenRun(ABC):
     def outcome(self) -> Outcome:
         """Return the results of the run."""
         found = {name: int(self.counters[place]) for name, place in self.NUMBERS.items()}
-        found["subsystems"] = int(np.count_nonzero(self.flows.modes))
+        found |= {"changes": int(self.counters[EVENTS]), "subsystems": int(np.count_nonzero(self.flows.modes))}
         return Outcome(
-            self.whole, self.records, int(self.counters[PERIOD]), int(self.counters[EVENTS]), OPEN_LEDGER, found,
-            self.chunks, self.rows_of(self.whole), plane=self._plane(),
+            self.whole, self.records, int(self.counters[PERIOD]), self.listed, OPEN_LEDGER, found, self.chunks,
+            self.rows_of(self.whole), plane=self._plane(),
         )  # fmt: skip
 
     def _plane(self) -> Plane | None:

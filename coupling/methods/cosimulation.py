@@ -60,7 +60,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     options: Any = scene.solver
     times = time_grid(scene, system, options.steps_per_period)
     laws = penalty_laws(system, times.step, options)
-    soft, motion = start(system, begun, laws.spring)
+    soft, motion = start(system, begun, laws.spring, records)
     matrix, excited = cosimulation_matrices(scene, soft, times)
     angles = 2 * np.pi * np.arange(options.smallest_steps) / options.smallest_steps
     fine = np.ascontiguousarray(loads_at(scene, soft)(angles))

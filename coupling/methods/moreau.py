@@ -65,7 +65,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     """Return a run. Raises InputError for bodies that overlap at the start."""
     options: Any = scene.solver
     rigid = np.isinf(system.spring)
-    moving, motion = start(system, begun, np.where(rigid, 0.0, system.spring))
+    moving, motion = start(system, begun, np.where(rigid, 0.0, system.spring), records)
     times, theta = time_grid(scene, system, options.steps_per_period), options.theta
     inverse, turned, mobility = moreau_matrices(moving, times.step, theta)
     exact = not system.in_plane if options.contacts is None else options.contacts == "exact"

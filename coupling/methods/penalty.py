@@ -82,7 +82,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
     options: Any = scene.solver
     times = time_grid(scene, system, options.steps_per_period)
     laws = penalty_laws(system, times.step, options)
-    soft, motion = start(system, begun, laws.spring)
+    soft, motion = start(system, begun, laws.spring, records)
     if options.scheme == "central_difference":
         inverse = sparse(np.linalg.inv(np.diag(soft.mass) + 0.5 * times.step * soft.damping))
         march = partial(march_central_difference, soft, times, motion, records, inverse, laws)

@@ -17,7 +17,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
-from vanedamp.coupling.system.system import FLOOR
+from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
 from vanedamp.coupling.system.unit_kinematics import elongation, gap
 
 #: a motion above this, in m or m/s, has no physical meaning
@@ -210,20 +210,23 @@ def _stands(system, motion, b):
 
 @kernel
 def _follow_contacts(system, times, motion, records, log, k):
-    """Count contacts that begin to carry force, and log those that have ended."""
+    """Count contacts that begin to carry force by an impact, and log those that have ended."""
     u, p = len(system.rest), motion.counters[PERIOD]
     for r in range(system.contacts):
         pushed, before = motion.impulse[r] > 0.0, motion.before[r]
-        if pushed and motion.active[r] == 0 and before < 0.0:
-            motion.counters[IMPACTS] += 1
-            records.impacts[p] += 1
-            records.collided[p] += 0.5 * before * before / system.delassus[r, r]
+        if pushed and motion.active[r] == 0:
+            if before < 0.0:
+                motion.counters[IMPACTS] += 1
+                records.impacts[p] += 1
+                if system.surface[r] == LEFT or system.surface[r] == RIGHT:
+                    motion.walls[p, system.body[r]] += 1
+                records.collided[p] += 0.5 * before * before / system.delassus[r, r]
             motion.speed[r], motion.total[r], motion.total[u + r], motion.lost[r] = before, 0.0, 0.0, 0.0
             motion.begun[r] = (p * (len(times.phase) - 1) + k) * times.step
         if pushed:
             motion.total[r] += motion.impulse[r]
             motion.total[u + r] += motion.impulse[u + r]
-        elif motion.active[r] == 1 and motion.counters[LOGGED] < len(log):
+        elif motion.active[r] == 1 and motion.speed[r] < 0.0 and motion.counters[LOGGED] < len(log):
             entry = log[motion.counters[LOGGED]]
             entry[0], entry[1], entry[2], entry[3] = motion.begun[r], IMPACT, r, motion.speed[r]
             entry[4], entry[5], entry[6], entry[7] = before, motion.total[r], motion.total[u + r], motion.lost[r]

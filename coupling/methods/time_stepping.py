@@ -15,7 +15,7 @@ from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
 from vanedamp.coupling.response.recorder import plane_of
-from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.response.records import ENERGIES, IMPACT, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -64,6 +64,7 @@ class Motion(NamedTuple):
     half: np.ndarray  # (N,) velocity half a step later (central differences), or acceleration (Newmark)
     force: np.ndarray  # (2u,) of rows, N
     counters: np.ndarray  # (COUNTERS,) int
+    walls: np.ndarray  # (periods, b) int: impacts on walls
     ledger: np.ndarray  # (6,) J
     deepest: np.ndarray  # (1,) largest penetration relative to the free travel
 
@@ -120,7 +121,7 @@ def loads_at(scene: Scene, system: System) -> Loads:
     return loads_of(scene, signal) if signal else lambda angle: (system.phases(angle) @ system.load).real
 
 
-def start(system: System, begun: RestartState, spring: np.ndarray) -> tuple[System, Motion]:
+def start(system: System, begun: RestartState, spring: np.ndarray, records: Records) -> tuple[System, Motion]:
     """Return the system whose slips of Jenkins elements are those of what draws them, and its motion at time zero.
 
     spring: (u,) as in Motion.
@@ -130,7 +131,8 @@ def start(system: System, begun: RestartState, spring: np.ndarray) -> tuple[Syst
     contact = np.arange(u) < system.contacts
     return on_structure(system), Motion(
         q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
-        counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
+        counters=np.zeros(COUNTERS, np.int64), walls=np.zeros((len(records.impacts), system.bodies), np.int64),
+        ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
         spring=spring,
         live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
         speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u), start=np.zeros((2, size)),
@@ -146,7 +148,7 @@ class SteppedRun:
         self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
     ) -> None:
         self.system, self.march, self.motion, self.records, self.options = system, march, motion, records, options
-        self.plane = plane_of(system, records, options.linearisation) if system.in_plane else None
+        self.plane = plane_of(system, records, options.linearisation, motion.walls) if system.in_plane else None
         # a contact logs at most one impact per step
         self.slice = max(_SLICE // max(system.contacts, 1), 1)
         self.log = np.zeros((_SLICE if events else 0, WIDTH))
@@ -172,9 +174,17 @@ class SteppedRun:
         }  # fmt: skip
         return Outcome(
             self.system, self.records, int(counters[PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
-            [chunk for chunk in self.chunks if len(chunk)], rows_of_units(self.system),
+            [chunk for chunk in (*self.chunks, self._lasting()) if len(chunk)], rows_of_units(self.system),
             float(self.motion.deepest[0]), self.plane,
         )  # fmt: skip
+
+    def _lasting(self) -> np.ndarray:
+        """Return the entries of impacts whose contacts still carry force, as they are now."""
+        m, u = self.motion, len(self.system.rest)
+        lasting = np.flatnonzero((m.active == 1) & (m.speed < 0.0)) if len(self.log) else np.zeros(0, int)
+        now, total = self.system.J[:u] @ m.v, np.split(m.total, 2)
+        found = np.column_stack([m.begun, np.full(u, IMPACT), np.arange(u), m.speed, now, *total, m.lost])[lasting]
+        return found[:, : WIDTH if self.plane else LINE_WIDTH]
 
     def final(self) -> None:
         """Return None: the state between two steps is no state that another run could begin with."""

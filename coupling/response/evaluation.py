@@ -66,8 +66,7 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; samples: in the plane, from the response's samples; walls: (periods, b) impacts on walls, None where the method
-    does not count them.
+    ok; samples: in the plane, from the response's samples; walls: (periods, b) impacts on walls.
     """
 
     tilt: np.ndarray
@@ -75,7 +74,7 @@ class Plane(NamedTuple):
     neglected: np.ndarray
     bound: float
     samples: Callable[[np.ndarray], PlanarSamples]
-    walls: np.ndarray | None = None
+    walls: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -247,9 +246,8 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
         name: tuple(None if slider[body] else float(value) for body, value in enumerate(values))
         for name, values in parts.items()
     }
-    if plane.walls is not None:
-        walls = plane.walls[window]  # none in a run that ended at once
-        figures["wall_impacts"] = tuple((walls.sum(axis=0) / max(len(walls), 1)).tolist())
+    walls = plane.walls[window]  # none in a run that ended at once
+    figures["wall_impacts"] = tuple((walls.sum(axis=0) / max(len(walls), 1)).tolist())
     return figures, bool(np.any(neglected[~slider] > plane.bound))
 
 

@@ -14,10 +14,10 @@ from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.system.system import FLOOR, System
 
 
-def plane_of(system: System, records: Records, linearisation: float) -> Plane:
-    """Return the results in the plane of a run."""
+def plane_of(system: System, records: Records, linearisation: float, walls: np.ndarray) -> Plane:
+    """Return the results in the plane of a run; walls: (periods, b) impacts on walls."""
     samples = partial(_samples, system, records.sampled, records.shut)
-    return Plane(records.tilt, records.lifted, system.neglected, linearisation, samples)
+    return Plane(records.tilt, records.lifted, system.neglected, linearisation, samples, walls)
 
 
 def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarray) -> PlanarSamples:

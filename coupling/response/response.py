@@ -156,8 +156,9 @@ class Response(Plotted):
     impacts_per_period: float
     """mean number of impacts in a period"""
     events: int
-    """changes of the motion in the whole run, of which `solver.max_events` are allowed; `event_list` has another
-    length: an entry for each contact that hits, sticks, slips, detaches or comes to rest"""
+    """entries of `event_list` over the whole run, listed or not: contacts that hit, stick, slip, detach or come to rest
+    (methods other than "exact": impacts); `solver.max_events` bounds `counters.changes`, or the impacts of methods with
+    steps"""
     classification: str
     """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
     energy: dict[str, float]

@@ -54,7 +54,7 @@ class SolverOptions(BaseModel):
     method: str
     """method of time integration"""
     max_events: Annotated[Whole, Field(gt=0)] = 20_000_000
-    """most events; beyond, the run ends as event_budget"""
+    """most changes of the motion (methods with steps: impacts); beyond, the run ends as event_budget"""
 
     @property
     def seconds_per_period(self) -> float:

@@ -220,7 +220,7 @@ class _Run:
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
         self.stuck[k] = slow.all(axis=0) & same & ~named_bodies(outcome.rows, outcome.log, b)
-        self.events, self.open_ledger = self.events + outcome.events, outcome.open_ledger
+        self.events, self.open_ledger = self.events + outcome.counters["changes"], outcome.open_ledger
         if outcome.plane is not None:
             neglected = outcome.plane.neglected * outcome.plane.tilt[0] ** 2  # nan for sliders
             self.tilted = self.tilted or bool(np.any(neglected > outcome.plane.bound))

@@ -3,7 +3,7 @@ Where impacts begin, and what they gain
 =======================================
 
 A loose body changes nothing until it hits the walls of its cavity. From the frequency at which impacts begin, the
-response leaves the curve of the cluster without bodies and follows that of the cluster with the body glued to its
+response leaves the curve of the cluster without bodies and follows that of the cluster with the body fixed in its
 cavity. Its resonance there is cut to half, and at the frequency of the old resonance hardly anything is left:
 *impact mistuning*.
 """
@@ -46,7 +46,7 @@ print(f"largest mean amplitude with the body: {result.amplitude_mean.max() / ref
 # onset.
 #
 # The attached mass fraction says how much of the body's mass the structure feels: 0 of a body that floats, 1 of one
-# that is glued. Where the body hits both walls in every period it can be more than 1.
+# that is fixed. Where the body hits both walls in every period it can be more than 1.
 
 figure, (top, bottom) = plt.subplots(2, sharex=True, figsize=(7.5, 6.5), layout="constrained", height_ratios=[2, 1])
 top.plot(frequency, 1e6 * result.amplitude_undamped, color="0.5", label="without bodies")

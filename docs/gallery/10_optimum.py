@@ -54,5 +54,5 @@ for name, item, marker in (("as designed", best.nominal, "o"), ("robust", best.r
     print(f"{name}: {100 * item.reduction:.0f} %, within the tolerances {100 * item.reduction_tolerances:.0f} %")
 axes.set(xlabel="gap over X (-)", ylabel="mass over that of the structure (%)")
 axes.legend(loc="upper right", title="optimum")
-figure.colorbar(filled, label="reduction of the largest amplitude (%)")
+figure.colorbar(filled, label="gained of the largest amplitude (%)")
 plt.show()

@@ -46,7 +46,7 @@ def fig9(curves: Curves) -> list[Claim]:
     return [
         claim(
             "At reference/2 the bodies take about half of the amplitude away, averaged.",
-            f"highest mean {peaks['reference/2']}, smoothed {smooth:.3f}: a reduction of {1 - smooth:.0%}",
+            f"highest mean {peaks['reference/2']}, smoothed {smooth:.3f}: {1 - smooth:.0%} gained",
             verdict(0.4 <= 1 - smooth <= 0.6, 0.3 <= 1 - smooth <= 0.7),
             figures={"peak_mean": peaks["reference/2"].height, "peak_smoothed": smooth, "peak_max": tops["reference/2"],
                      "reduction": 1 - smooth, "confidence": peaks["reference/2"].confidence},
@@ -131,8 +131,8 @@ def onset(curve: Curve) -> Claim:
         f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
         f"by at most {apart:.2%} over {below.sum()} points",
         verdict(apart < 0.01 and below.sum() > 5),
-        "The onset is where an amplitude without bodies reaches half of the gap, for a body that starts at rest in the "
-        "middle; one that is already flying goes on down to lower frequencies.",
+        "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
+        "grows slowly hits only from amplitudes of about half of the gap on.",
         {"onset_hz": curve.onset, "difference": apart},
     )
 

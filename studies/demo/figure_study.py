@@ -108,13 +108,12 @@ def study(of: FigureStudy, session: Session) -> Study:
     claims = of.claims(read)
     of.picture(read, session.folder / f"{figure.name}.png")
     trouble = [text for curve, sweep in sweeps.items() for text in _trouble(curve, sweep)]
-    title = f"{figure.title} (not ok: {', '.join(trouble)})" if trouble else figure.title
     if trouble:
         count = sum(int((sweep.status != "ok").sum()) for sweep in sweeps.values())
         failed = f" ({count} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
         claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
     sources = [f"{figure.stem(curve)}.h5" for curve in sweeps]
-    return written(Study(figure.name, title, sources, claims), session.folder)
+    return written(Study(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
 
 
 def provenance(scene: Scene) -> dict[str, Any]:
@@ -163,6 +162,8 @@ def written(study: Study, folder: Path) -> Study:
 def print_claims(study: Study, seconds: float) -> None:
     """Print a study's claims: the paper's words, the finding here, the verdict."""
     print(f"\n{study.study}: {study.title} ({seconds:.1f} s)")
+    if study.not_ok:
+        print(f"  not ok    {study.not_ok}")
     for claim in study.claims:
         rows = [("paper", claim.claim), ("here", claim.ours), (claim.verdict, claim.why)]
         for head, text in rows:

@@ -78,16 +78,21 @@ class Figure(NamedTuple):
     closed: bool = False
 
 
-def key_figures(response: ForcedResponse) -> list[Figure]:
-    """Return the key results of a curve for people, from the headline that `vanedamp sweep` prints."""
+def key_figures(response: ForcedResponse, onset: tuple[float, float] | None) -> list[Figure]:
+    """Return the key results of a curve for people, from the headline that `vanedamp sweep` prints.
+
+    onset: frequency, Hz, and amplitude, m, in closed form (curves.impact_onset).
+    """
     headline = response.headline
+    hits = "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"
     return [
         Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at), True),
         Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at), True),
+        *(() if onset is None else (Figure("onset of impacts, slow growth", _at_amplitude(*onset), True),)),
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),
         Figure("most reduced in the band", _most_reduced(response)),
-        Figure("onset of impacts", "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"),
+        Figure("first point with impacts", hits),
         Figure("attached mass fraction", _ratio(headline.attached_mass_fraction)),
     ]
 
@@ -111,6 +116,11 @@ def _most_reduced(response: ForcedResponse) -> str:
     return _at(f"to {share[best]:.3f} of that without bodies", response.x[best])
 
 
+def _at_amplitude(frequency: float, amplitude: float) -> str:
+    where = f"at {frequency:.6g} Hz" if math.isfinite(frequency) else "which the band does not reach"
+    return f"{_micro(amplitude)} without bodies, {where}"
+
+
 def _at(text: str, frequency: Any) -> str:
     return text if frequency is None or text == "-" else f"{text} at {frequency:.6g} Hz"
 
@@ -122,4 +132,4 @@ def _micro(height: float) -> str:
 
 
 def _ratio(value: float) -> str:
-    return f"{value:.3f}" if math.isfinite(value) else "-"
+    return f"{value:z.3f}" if math.isfinite(value) else "-"

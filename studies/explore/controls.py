@@ -92,7 +92,8 @@ def controls_of(scene: Scene) -> list[Control]:
         *(_listed("cavity", scene.cavity, (_PLAY,), _changes) if planar else ()),
         *_listed("damper", scene.damper, _MEASURES_OF_DAMPER, _changes),
         *_listed("damper", scene.damper, _EXTENTS if planar else _EXTENTS[-4:], _changes),
-        *(_of_blocks(scene) if planar else ()),
+        *(_listed("cavity", scene.cavity, _FLOORS, _changes) if planar else ()),
+        *(_starts(scene, planar) if scene.damper else ()),
         *(_given("structure", scene.structure, _DAMPINGS) if rigid else ()),
         *_given("excitation", scene.excitation, _LEVELS),
         *_orientation(scene),
@@ -128,6 +129,10 @@ _EXTENTS = (
     _Measure("stiffness", "spring to the floor", "N/m", 1.0, around=20.0),
     _Measure("dashpot", "dashpot to the floor", "N s/m", 1.0, around=20.0),
     _Measure("track_radius", "radius of the track", "mm", 1e-3, around=10.0),
+)
+_FLOORS = (
+    _Measure("normal_motion", "motion of the floor across, per motion along", "", 1.0, low=-1.0),
+    _Measure("rotation", "rotation of the floor per motion along", "rad/m", 1.0, low=-100.0, high=100.0),
 )
 _LEVELS = (
     _Measure("resonance_amplitude", "level: resonance without bodies", "µm", 1e-6, around=20.0),
@@ -167,16 +172,11 @@ def _listed(table: str, entries: Sequence[Any], measures: Sequence[_Measure], ch
             yield _control(measure, f"{key}-{index}", f"{label} {title}", value, change)
 
 
-def _of_blocks(scene: Scene) -> Iterator[Control]:
-    """Yield what moves the floor of planar bodies across the cavity, and how they begin."""
-    floors = (
-        _Measure("normal_motion", "motion of the floor across, per motion along", "", 1.0, low=-1.0),
-        _Measure("rotation", "rotation of the floor per motion along", "rad/m", 1.0, low=-100.0, high=100.0),
-    )
-    yield from _listed("cavity", scene.cavity, floors, _changes)
+def _starts(scene: Scene, planar: bool) -> Iterator[Control]:
+    """Yield how bodies begin; those of one cavity have a position each."""
     half = 0.5e6 * min(cavity.gap for cavity in scene.cavity)
     play = 1e6 * min((cavity.play for cavity in scene.cavity if cavity.play), default=2e-6 * half)
-    longest = max(max(damper.half_extent) for damper in scene.damper)
+    longest = max(max(damper.half_extent) for damper in scene.damper) if planar else 0.0
     most = 1e-3 * play / (2.0 * longest) if longest else 1.0
     begins = (
         _Measure("position", "position at the start", "µm", 1e-6, low=-half, high=half),
@@ -186,9 +186,7 @@ def _of_blocks(scene: Scene) -> Iterator[Control]:
         _Measure("tilt", "tilt at the start", "mrad", 1e-3, low=-most, high=most),
         _Measure("tilt_rate", "tilt rate at the start", "rad/s", 1.0, low=-100.0, high=100.0),
     )
-    single = len({damper.cavity for damper in scene.damper}) == len(scene.damper)
-    if single:  # of several in a cavity each stands where it has room
-        yield from _listed("damper", scene.damper, begins, _changes)
+    yield from _listed("damper", scene.damper, begins if planar else begins[:2], _changes)
 
 
 def _changes(path: str, scene: Scene, number: float) -> dict[str, Any]:

@@ -24,15 +24,18 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import linear_tops, result_of
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, width_of
 from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.transient import left_over, settled_after
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.report.forced_response import linear_between
+from vanedamp.studies.report.forced_response import LinearCurves, linear_between
 
 #: frequencies of a curve, and the step from one to the next of its coarse form
 POINTS, _COARSE = 60, 4
 #: periods evaluated, the shortest and the longest transient, and the budget of events of a run, which no worker is lost
 #: to for long
 EVALUATED, _SHORTEST, _LONGEST, _EVENTS = 200, 50, 2000, 300_000
+#: repetitions after which the frequency of an onset is known
+_ROUNDS = 3
 #: most periods that may be evaluated
 _MOST_PERIODS = 10_000
 #: tabs of the page whose curves are kept
@@ -89,6 +92,27 @@ def seen(scene: Scene, band: Band) -> Scene:
     )
 
 
+def impact_onset(scene: Scene, linear: LinearCurves) -> tuple[float, float] | None:
+    """Return the lowest frequency, Hz, at which a motion that grows slowly brings impacts, and its amplitude, m.
+
+    The amplitude without bodies reaches there that of a first impact (coupling.system.onset); nan: nowhere. None
+    without a closed form.
+    """
+    at = float(linear.x[np.argmax(linear.undamped)])
+    for _ in range(_ROUNDS):  # friction's part of the amplitude depends on the frequency
+        found = [onset for onset in onsets(scene.replace({FREQUENCY: at})) if onset is not None]
+        if len(found) < len(scene.damper) or not found:
+            return None
+        amplitude = min(onset.impact for onset in found)
+        reached = linear.undamped >= amplitude
+        if not reached.any():
+            return math.nan, amplitude
+        first = max(int(np.argmax(reached)), 1)
+        ends = slice(first - 1, first + 1)
+        at = float(np.interp(amplitude, linear.undamped[ends], linear.x[ends]))
+    return at, amplitude
+
+
 def transient_note(scene: Scene) -> str | None:
     """Return a warning where the transient of a `seen` scene has not ended before its runs are evaluated."""
     left = left_over(scene.replace({FREQUENCY: ends_of(scene)[1]}), scene.time.dropped)
@@ -133,14 +157,16 @@ def ends_of(scene: Scene) -> tuple[float | None, float | None]:
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    linear: its linear curves; done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a
-    warning, of transient_note; asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
+    linear: its linear curves; onset: of impacts, by these (impact_onset); done, size: points so far, and of the whole
+    curve; coarse: of its coarse form; note: a warning, of transient_note; asked: when a tab last asked for it, s of
+    time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
         low, high = ends_of(scene)
         assert low is not None and high is not None
         self.scene, self.linear, self.note = scene, linear_between(scene, low, high), transient_note(scene)
+        self.onset = impact_onset(scene, self.linear)
         self._grid = grid(scene)
         self._peaks = linear_tops(self._grid)
         self.size = self._grid.size

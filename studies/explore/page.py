@@ -218,7 +218,7 @@ def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     notes = [*([curve.note] if curve.note else []), *remarks(sweep, response, complete)]
     rows = [
         part(text, className="" if complete or figure.closed else "unfinished")
-        for figure in key_figures(response)
+        for figure in key_figures(response, curve.onset)
         for part, text in ((html.Dt, figure.name), (html.Dd, figure.value))
     ]
     figures = html.Div(

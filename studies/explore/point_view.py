@@ -103,7 +103,7 @@ def _summary(response: Response) -> str:
         *([f"of that static {1e6 * response.static_deflection:.4g} µm"] if response.static_deflection else []),
         f"{response.impacts_per_period:.3g} impacts per period",
         response.classification,
-        *([] if attached is None else [f"attached mass fraction {attached:.3f}"]),
+        *([] if attached is None else [f"attached mass fraction {attached:z.3f}"]),
     ]  # fmt: skip
     if response.status is not Status.OK:
         parts.append(f"status {response.status.value}: its figures are not to be relied on")

@@ -102,7 +102,8 @@ def best_sentence(sweep: Sweep, best: Best | None) -> str:
         if path != swept and not is_start(path)
     )
     highest = "highest mean amplitude" if swept or any(map(is_start, sweep.axes)) else "mean amplitude"
-    text = f"Best of {best.designs} designs: {design or 'the only one'}, {highest} {1e6 * best.amplitude:.4g} µm"
+    which = f"Best of {best.designs} designs: {design}, " if design else "The only design: "
+    text = f"{which}{highest} {1e6 * best.amplitude:.4g} µm"
     if np.isfinite(best.relative):
         text += f", {best.relative:.3f} of the {'maximum' if swept else 'amplitude'} without bodies"
     if swept is not None:

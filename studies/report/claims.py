@@ -21,9 +21,10 @@ class Claim:
 
 @dataclass(frozen=True)
 class Study:
-    """A study of several results; sources: names of their files, in its own folder."""
+    """A study of several results; sources: names of their files, in its own folder; not_ok: which points are not ok."""
 
     study: str
     title: str
     sources: list[str]
     claims: list[Claim]
+    not_ok: str = ""

@@ -49,6 +49,7 @@ class ForcedResponse:
     in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
                        bodies in the plane
     headline           results and sentence of the curve
+    onset_of           impacts whose first place is the onset
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
     source             the file it comes from
@@ -70,6 +71,7 @@ class ForcedResponse:
     in_plane: Mapping[str, np.ndarray]
     headline: Headline
     hertz: float = math.nan
+    onset_of: str = "impacts on walls"
     settings: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
 
@@ -149,8 +151,10 @@ def response_along(
     tops = peaks_of(sweep, point) if axis == swept else {}
     in_plane = {key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()}
     impacts = cut["impacts_per_period"]
-    known = in_plane.get("wall_impacts")  # sliders hit walls, and each other
-    walls = impacts if known is None or np.isnan(known[ok]).any() else known.sum(axis=1)
+    known = in_plane.get("wall_impacts")
+    counted = known is not None and not np.isnan(known[ok]).any()
+    alone = not in_plane and len({damper.cavity for damper in sweep.scene.damper}) == len(sweep.scene.damper)
+    walls = known.sum(axis=1) if counted and known is not None else impacts
     return ForcedResponse(
         name=name,
         axis=axis,
@@ -166,6 +170,7 @@ def response_along(
             tops, axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
+        onset_of="impacts on walls" if counted or alone else "impacts of any kind",
         settings=settings,
         **cut,
     )  # fmt: skip

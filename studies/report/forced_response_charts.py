@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -93,9 +94,8 @@ def _add_band(
     figure: go.Figure, shown: Collection[str] | None, response: ForcedResponse, colour: str, gaps: np.ndarray
 ) -> None:
     """Draw the 95 % confidence of the means as a band, in a piece between two jumps each."""
-    sure = np.isfinite(response.confidence) & np.isfinite(response.damped_mean)
-    for piece in np.split(np.arange(len(response.x)), gaps):
-        kept = piece[sure[piece]]
+    sure = _known(np.isfinite(response.confidence) & np.isfinite(response.damped_mean))
+    for kept in (part for piece in sure for part in np.split(piece, np.searchsorted(piece, gaps))):
         if not (response.confidence[kept] > 0.0).any():
             continue
         mean, half = response.damped_mean[kept] / response.reference, response.confidence[kept] / response.reference
@@ -161,7 +161,7 @@ def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str]
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw where the energy goes: stacked fractions of the losses, one panel per response."""
+    """Draw where the energy goes: stacked fractions of the losses, one panel per response, each with a point."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
     # a name is as wide as a panel at most: its settings stand below each other
@@ -174,21 +174,31 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
         vertical_spacing=(above + below) / (height - above - below) if rows > 1 else 0.0,
     )  # fmt: skip
     for number, response in enumerate(responses):
-        for index, loss in enumerate(LOSSES):
+        pieces = _known(np.isfinite(response.energy_share).all(axis=1))  # in a stack, plotly takes what is not for zero
+        for (piece, part), (index, loss) in itertools.product(enumerate(pieces), enumerate(LOSSES)):
             if not any((other.energy_share[:, index] > 0).any() for other in responses):
                 continue
             figure.add_scatter(
-                x=response.x, y=100 * response.energy_share[:, index], name=loss, stackgroup=str(number), mode="lines",
-                line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss, showlegend=number == 0,
-                hovertemplate=f"{loss}: %{{y:.1f}} %<extra></extra>",
+                x=response.x[part], y=100 * response.energy_share[part, index], name=loss, mode="lines",
+                stackgroup=f"{number}-{piece}", line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss,
+                showlegend=number == piece == 0, hovertemplate=f"{loss}: %{{y:.1f}} %<extra></extra>",
                 row=number // columns + 1, col=number % columns + 1,
             )  # fmt: skip
+        if response.x[0] < response.x[-1]:  # also where its ends are not ok
+            ends = [response.x[0], response.x[-1]]
+            figure.update_xaxes(range=ends, row=number // columns + 1, col=number % columns + 1)
     figure.update_yaxes(range=[0, 100])
     figure.update_annotations(font_size=12)
     figure.update_yaxes(title_text="share of the energy lost, %", col=1)
     _finish(figure, responses, height=height)
     figure.update_layout(margin_t=above, margin_b=below)
     return figure.update_xaxes(title_font_size=11) if columns == _PANELS else figure
+
+
+def _known(known: np.ndarray) -> list[np.ndarray]:
+    """Return the places of the points (n,) that are known, in pieces without others between them."""
+    places = np.flatnonzero(known)
+    return [piece for piece in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if piece.size]
 
 
 def _wrapped(name: str, width: int) -> list[str]:

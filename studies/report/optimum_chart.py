@@ -16,8 +16,8 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
         go.Contour(
             x=100 * record.map_mass_ratio, y=record.map_gap_ratio, z=100 * (1 - record.map_amplitude.T),
             colorscale="Viridis", contours={"showlabels": True, "labelfont": {"color": "white"}},
-            colorbar={"title": {"text": f"reduction of the {of}, %", "side": "right"}},
-            hovertemplate="mass %{x:.2f} %<br>gap %{y:.3f} X<br>reduction %{z:.1f} %<extra></extra>",
+            colorbar={"title": {"text": f"gained of the {of}, %", "side": "right"}},
+            hovertemplate="mass %{x:.2f} %<br>gap %{y:.3f} X<br>%{z:.1f} % gained<extra></extra>",
         )
     )  # fmt: skip
     for name, optimum, symbol, colour in (

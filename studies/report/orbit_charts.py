@@ -15,6 +15,8 @@ from vanedamp.studies.report.charts import COLOURS, DASHES, Table, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
+#: of panels side by side, over the width: room for ticks and a title on a page of 800 pixels
+_APART = 0.13
 #: periods that are drawn, and starts of periods
 _PERIODS, _MOST_STARTS = 25, 2000
 
@@ -24,8 +26,8 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
     bodies = any(history.slip.shape[1] for history in histories.values())
     rows = len(histories)
     figure = make_subplots(
-        rows=rows, cols=2 + bodies, column_widths=[0.44, 0.28, 0.28] if bodies else [0.6, 0.4],
-        horizontal_spacing=0.09, vertical_spacing=0.3 / rows,
+        rows=rows, cols=2 + bodies, column_widths=[0.4, 0.3, 0.3] if bodies else [0.6, 0.4],
+        horizontal_spacing=_APART, vertical_spacing=0.3 / rows,
         subplot_titles=[title for name in histories for title in (name, "", "")[: 2 + bodies]],
     )  # fmt: skip
     for row, history in enumerate(histories.values(), start=1):
@@ -54,7 +56,7 @@ def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> 
     for place, (what, values) in enumerate(planes, start=col):
         reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
         figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=place)
-        figure.update_yaxes(title_text="mm/s", row=row, col=place)
+        figure.update_yaxes(title={"text": "mm/s", "font_size": 12, "standoff": 2}, row=row, col=place)
 
 
 def add_starts(figure: go.Figure, states: Sequence[np.ndarray], name: str, row: int, col: int, size: int) -> None:
@@ -85,6 +87,8 @@ def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
         marker={"color": _IMPACT, "symbol": "x", "size": 7}, showlegend=row == 1,
         hovertemplate="impact, %{x:.6g} ms: %{y:.5g} µm", row=row, col=1,
     )  # fmt: skip
+    figure.update_xaxes(title_text="time, ms", row=row, col=1)
+    figure.update_yaxes(title={"text": "displacement, µm", "font_size": 12, "standoff": 2}, row=row, col=1)
 
 
 class _Curve(NamedTuple):
@@ -126,7 +130,7 @@ def phase_figure(response: Response) -> go.Figure:
     history = late_history(response, _PERIODS)
     bodies = response.slip.shape[1]
     columns = 1 + bool(bodies)
-    figure = make_subplots(rows=1, cols=columns, horizontal_spacing=0.12)
+    figure = make_subplots(rows=1, cols=columns, horizontal_spacing=_APART)
     add_planes(figure, history, row=1, col=1)
     figure.update_traces(showlegend=True, opacity=0.55)
     late = slice(max(response.transient, len(response.section) - _MOST_STARTS), None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,8 +16,10 @@ import plotly.graph_objects as go
 import plotly.offline
 from markupsafe import Markup
 
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
+from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
@@ -30,8 +33,8 @@ _MOST_COLUMNS = 4
 #: scripts of the page by the kind of chart that needs them
 _SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response"}
 _SLIDERS = (
-    'The bodies are sliders, which only move along their cavities. Of bodies with corners, shape = "auto" with their '
-    "length and height tells whether that is enough."
+    '{} only along the cavity. Of bodies with corners, shape = "auto" with their length and height tells whether that '
+    "is enough."
 )
 
 
@@ -83,9 +86,9 @@ class Page:
             for study, files in [(None, own), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
-                    name, title = (None, "") if study is None else (study.study, study.title)
+                    name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
                     shows = section.section(results, replace(self, study=name))
-                    of = {"section": shows, "study": name, "title": title, "later": self._put_off}
+                    of = {"section": shows, "study": name, "title": title, "not_ok": not_ok, "later": self._put_off}
                     blocks.append(self.environment.from_string(template).render(of))
         return "".join(blocks)
 
@@ -144,8 +147,9 @@ def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
+    shared.filters |= {"ratio": lambda value: f"{value:z.3f}" if math.isfinite(value) else "none"}
+    shared.filters["clean"] = without_round_off
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
-    shared.filters["body_note"] = body_note_of_run
     shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return shared
 
@@ -155,18 +159,34 @@ def _anchor(name: str) -> str:
     return "from-" + re.sub(r"\W", "-", name)
 
 
-def _provenance(results: Results) -> dict[str, dict[str, str]]:
-    """Return the known facts of every file, by its path; of the page itself under "", which are not repeated."""
+def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
+    """Return the facts of every file, by its path, and common ones by those of several; of the page itself by none."""
     mine = versions()
-    return {"": mine} | {
+    facts = {
         file: {
             key: value
-            for key, value in (_flat(result.provenance) | {"sha256": digest(file)}).items()
+            for key, value in _flat(result.provenance).items()
             if mine.get(key.removeprefix("versions.")) != value
         }
         for file, result in results.by_file.items()
         if result.provenance is not None
     }
+    groups = {(): mine, **_by_owners(facts)}
+    for file in facts:  # equal files have their places, too
+        groups.setdefault((file,), {})["sha256"] = digest(file)
+    return groups
+
+
+def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...], dict[str, str]]:
+    """Return the entries of tables by the names of all that have them; those of many first."""
+    owners: dict[tuple[str, str], tuple[str, ...]] = {}
+    for name, table in tables.items():
+        for entry in table.items():
+            owners[entry] = (*owners.get(entry, ()), name)
+    groups: dict[tuple[str, ...], dict[str, str]] = {}
+    for (key, value), names in sorted(owners.items(), key=lambda item: -len(item[1])):
+        groups.setdefault(names, {})[key] = value
+    return groups
 
 
 def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
@@ -174,7 +194,9 @@ def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
     keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
     values = {key: [scene.get(key, "") for scene in scenes.values()] for key in keys}
     common = {key: same[0] for key, same in values.items() if len(set(same)) == 1}
-    return {"common": common, "differing": [key for key in keys if key not in common], "most_columns": _MOST_COLUMNS}
+    differing = [key for key in keys if key not in common]
+    own = {name: {key: scene[key] for key in differing if key in scene} for name, scene in scenes.items()}
+    return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(own)}
 
 
 def _flat(data: Any, path: str = "") -> dict[str, str]:
@@ -195,15 +217,17 @@ def format_setting(value: Any) -> str:
     return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
-def body_note(notes: Mapping[str, Any], sliders: bool) -> str | None:
-    """Return a sentence on the bodies. notes: with the advice, as data or as text; sliders: whether bodies are such."""
+def body_note(notes: Mapping[str, Any], scene: Scene | None) -> str | None:
+    """Return a sentence on the bodies of a scene; notes: with the advice, as data or as text."""
     advice = notes.get("advice")
     if advice is None:
-        return _SLIDERS if sliders else None
+        sliders = [number for number, damper in enumerate(scene.damper, 1) if not damper.form.planar] if scene else []
+        if not scene or not sliders:
+            return None
+        if len(sliders) < len(scene.damper):
+            return _SLIDERS.format(f"Sliders, here body {', '.join(map(str, sliders))}, move")
+        return _SLIDERS.format(
+            "The body is a slider, which moves" if len(sliders) == 1 else "The bodies are sliders, which move"
+        )
     sentence: str = (json.loads(advice) if isinstance(advice, str) else advice)["sentence"]
     return f"Bodies run as {sentence}."
-
-
-def body_note_of_run(measures: Mapping[str, Any]) -> str | None:
-    """Return the sentence on the bodies of a run with these results."""
-    return body_note(measures, "attached_mass_fraction" in measures and "tilt_max" not in measures)

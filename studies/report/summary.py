@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
@@ -117,8 +119,11 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
     )
     onset = "The bodies hit no wall"
     if found.onset is not None:
-        first_point = " or below, the first point" if found.onset == best.x[0] else ""
-        onset = f"Impacts on walls begin at {format_value(found.onset)}{unit}{first_point}"
+        known = best.x[np.isfinite(best.damped_mean)]
+        first_point = ""
+        if found.onset == known[0]:
+            first_point = " or below, the first point" + (" that is ok" if known[0] != best.x[0] else "")
+        onset = f"{best.onset_of.capitalize()} begin at {format_value(found.onset)}{unit}{first_point}"
     if found.touched_below is not None:
         onset += f"; below, from {format_value(found.touched_below)}{unit} on, a body hits its floor or ceiling"
     second = (

@@ -108,4 +108,4 @@ class PlanarRun(EventDrivenRun):
         np.add.at(self.walls, (periods, self.system.body[units[walls]]), 1)
 
     def _plane(self) -> Plane:
-        return plane_of(self.system, self.records, self.linearisation)._replace(walls=self.walls)
+        return plane_of(self.system, self.records, self.linearisation, self.walls)

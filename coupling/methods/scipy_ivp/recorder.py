@@ -20,7 +20,7 @@ from vanedamp.coupling.response.records import (
     VISCOUS,
     Records,
 )
-from vanedamp.coupling.system.system import FLOOR
+from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
 
 #: the integrals; behind them, of each contact that yields, its impulses, along and across, and its loss
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(10)
@@ -41,6 +41,7 @@ class Recorder:
         self.first = 0 if self.plane else system.bodies + system.dampers
         self.period, self.impacts, self.deep = 0, 0, 0.0
         self.impact_loss, self.spring_loss = 0.0, 0.0
+        self.walls = np.zeros((len(records.impacts), system.bodies), np.int64)
         self.log: list[list[float]] = []
         self.begun: dict[int, tuple[list[float], np.ndarray]] = {}
         self.state = np.full(free.u, OPEN)
@@ -185,6 +186,8 @@ class Recorder:
     def _count(self, t: float, r: int, before: float, after: float, *others: float) -> list[float]:
         self.impacts += 1
         self.records.impacts[self.period] += 1
+        if self.system.surface[r] in (LEFT, RIGHT):
+            self.walls[self.period, self.system.body[r]] += 1
         self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
         entry = [self.period * self.system.period + t, IMPACT, self.first + r, before, after, *others]
         entry = entry[: WIDTH if self.plane else LINE_WIDTH]

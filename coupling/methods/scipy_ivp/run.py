@@ -121,11 +121,21 @@ class IvpRun:
         record, system = self.record, self.system
         rows, plane = rows_of_line(system), None
         if system.in_plane:
-            rows, plane = rows_of_units(system), plane_of(system, record.records, self.options.linearisation)
-        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
+            rows = rows_of_units(system)
+            plane = plane_of(system, record.records, self.options.linearisation, record.walls)
+        numbers = {"impacts": record.impacts, "changes": self.events, "evaluations": self.evaluations}
         log, bound = [np.array(record.log)] if record.log else [], _OPEN_LEDGER * max(self.options.rtol, _LEAST)
         return Outcome(
-            system, record.records, record.period, self.events, bound, numbers, log, rows, max(record.deep, 0.0), plane
+            system,
+            record.records,
+            record.period,
+            record.impacts,
+            bound,
+            numbers,
+            log,
+            rows,
+            max(record.deep, 0.0),
+            plane,
         )
 
     def final(self) -> None:

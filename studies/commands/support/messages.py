@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from vanedamp.files.store import finite, json_text, together, write_json
+from vanedamp.studies.headline import without_round_off
 
 
 def write_result(
@@ -57,5 +58,6 @@ def cavity_lines(result: Mapping[str, Any]) -> Iterator[str]:
     for label, motion in result["cavity"].items():
         yield (
             f"cavity {label}: moves by {motion['along']:.4g} of {result['rigid']['at']}, normal_motion = "
-            f"{motion['normal_motion']:.5g}, rotation = {motion['rotation']:.5g} rad/m"
+            f"{without_round_off(motion['normal_motion']):.5g}, rotation = "
+            f"{without_round_off(motion['rotation']):.5g} rad/m"
         )

@@ -257,7 +257,8 @@ def _multipliers_figure(branches: Branches) -> go.Figure:
     figure.update_layout(
         coloraxis={"colorscale": "Viridis", "colorbar": bar | {"x": 0.2, "len": 0.4, "yanchor": "top"}}
     )
-    return dressed(figure, height=560)
+    legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0}
+    return dressed(figure, height=560).update_layout(legend=legend)
 
 
 def _beyond(values: np.ndarray) -> float:

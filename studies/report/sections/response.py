@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.report.charts import COLOURS, dressed
-from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.time_history import History, history_figure
@@ -39,7 +39,7 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
     largest = max(map(abs, energies.values()), default=0.0)
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
     shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
-    shown["hits"] = bool(history.hits)
+    shown |= {"hits": bool(history.hits), "note": body_note(history.measures, history.scene)}
     shown |= dict.fromkeys(("chart", "motion", "player", "impacts"))
     if len(history.time):
         late = history.late()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -78,7 +79,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
 
 
 def _body_note(sweep: Sweep) -> str | None:
-    return body_note(sweep.provenance, any(not damper.form.planar for damper in sweep.scene.damper))
+    return body_note(sweep.provenance, sweep.scene)
 
 
 def _scene(sweep: Sweep) -> dict[str, Any]:
@@ -119,27 +120,31 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         responses = best_first(responses)[:_MOST_CURVES]
     shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
     linear = [linear_curves(sweeps[response.source], response) for response in responses]
-    panels = responses if page.study is not None else responses[:_MOST_PANELS]
+    panels = [response for response in responses if np.isfinite(response.energy_share).any()]
+    panels = panels if page.study is not None else panels[:_MOST_PANELS]
     figures = {
         "response": responses_figure(responses, linear, shown),
         "mistuning": mistuning_figure(responses, shown),
-        "energy": energy_figure(panels),
+        "energy": energy_figure(panels) if panels else None,
     }
     axis, sources = responses[0].axis, [response.source for response in responses]
     charts: dict[str, Chart | None] = {
-        kind: page.chart(kind, figure, ("response", axis, *_COLUMNS[kind]), _table(responses, _COLUMNS[kind]), sources)
+        kind: figure
+        and page.chart(kind, figure, ("response", axis, *_COLUMNS[kind]), _table(responses, _COLUMNS[kind]), sources)
         for kind, figure in figures.items()
     }
     charts["plane"] = _plane_chart(responses, shown, page)
     rows = [
         {
             "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
-            "impacts": float(np.nan_to_num(response.impacts_per_period).max()), "place": places[response.name],
+            "impacts": max(response.impacts_per_period[np.isfinite(response.damped_mean)], default=math.nan),
+            "place": places[response.name],
         }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
     ]  # fmt: skip
     return charts | {
-        "axis": axis, "units": responses[0].units, "rows": rows, "every": every, "panels": len(panels),
+        "axis": axis, "units": responses[0].units, "onset_of": max((each.onset_of for each in responses), key=len),
+        "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
     }  # fmt: skip
 

@@ -323,6 +323,26 @@ def test_moreau_on_random_scenes():
     assert np.quantile(fine, 0.7) <= 0.5 * np.quantile(coarse, 0.7)
 
 
+@pytest.mark.parametrize("method", ["exact", "moreau", "penalty", "solve_ivp"])
+def test_events_are_listed_and_those_on_walls_counted(method):
+    """A block on a rigid structure: `events` is the length of the list, `wall_impacts` its impacts on walls."""
+    block = {"cavity": "c1", "mass": 3e-3, "shape": "block", "length": 4e-3, "height": 3e-3, "restitution": 0.7}
+    scene = scene_of({
+        "structure": {"model": "rigid", "mass": 0.157, "stiffness": 3.6e7, "damping_ratio": 0.002},
+        "excitation": {"frequency": 2382.0, "resonance_amplitude": 7e-5},
+        "cavity": [{"name": "c1", "gap": 4e-6, "play": 5e-6}], "damper": [block | {"friction": 0.4}],
+        "time": {"periods": 14, "transient": 4}, "solver": {"method": method},
+    })  # fmt: skip
+    response = simulate(scene, events=True)
+    assert response.events == len(response.event_list) == simulate(scene).events
+    begin, end = response.transient / scene.frequency, response.periods / scene.frequency
+    hits = [e for e in response.event_list if e.kind == "impact" and begin <= e.time < end]
+    walls = [event for event in hits if event.side in ("left", "right")]
+    assert response.wall_impacts == (pytest.approx(len(walls) / 10),)
+    assert len(walls) >= 10
+    assert response.impacts_per_period == pytest.approx(len(hits) / 10)
+
+
 def test_statuses_of_a_tilt_too_large():
     """Every method says it."""
     body = {"shape": "block", "length": 0.02, "height": 0.01, "mass": 1.3, "tilt": 2e-3, "restitution": 0.5}

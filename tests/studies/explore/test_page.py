@@ -24,6 +24,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import Task, run_points
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.onset import swing
 from vanedamp.files.toml_input import InputError
 from vanedamp.files.toml_output import commented
 from vanedamp.studies.cli import main
@@ -93,7 +95,8 @@ def test_fields_that_are_not_touched_change_nothing():
 def test_each_control_moves_its_number():
     controls = {control.name: control for control in controls_of(scene())}
     assert list(controls) == [
-        "bodies", "gap", "mass", "friction", "restitution", "damping_ratio", "resonance_amplitude", "orientation"
+        "bodies", "gap", "mass", "friction", "restitution", "position", "velocity", "damping_ratio",
+        "resonance_amplitude", "orientation",
     ]  # fmt: skip
     wanted = {
         "bodies": "1", "gap": "300", "mass": "20", "friction": "0.1", "restitution": "0.5", "damping_ratio": "2",
@@ -127,6 +130,19 @@ def test_bodies_that_differ_have_controls_of_their_own():
     assert {"mass-0", "mass-1", "friction"} <= {control.name for control in controls}
     assert "bodies" not in {control.name for control in controls}
     assert [damper.mass for damper in moved(two, controls, {"mass-1": "30"}).damper] == pytest.approx([0.01, 0.03])
+
+
+def test_bodies_of_a_cavity_begin_each_at_a_place_of_its_own():
+    body = {"cavity": "c1", "mass": 0.05, "shape": "block", "length": 0.01, "height": 0.005, "restitution": 0.6}
+    row = scene(
+        cavity=[{"name": "c1", "gap": 2e-4, "play": 1e-5}],
+        damper=[body | {"position": -4e-5}, body | {"position": 4e-5}],
+    )
+    controls = controls_of(row)
+    assert {"position-0", "position-1", "velocity", "lift", "tilt"} <= {control.name for control in controls}
+    other = moved(row, controls, {"position-1": "60", "lift": "5"})
+    assert [damper.position for damper in other.damper] == pytest.approx([-4e-5, 6e-5])
+    assert [damper.lift for damper in other.damper] == pytest.approx([5e-6, 5e-6])
 
 
 def test_play_is_for_bodies_with_extent():
@@ -360,11 +376,18 @@ def test_key_figures_are_those_of_the_sweep():
     curve = Curve(exploration.seen(exploration.texts), at_once)
     drawn = curve.sweep()
     (response,) = forced_responses(drawn)
-    shown, headline = {figure.name: figure.value for figure in key_figures(response)}, response.headline
+    shown, headline = {figure.name: figure.value for figure in key_figures(response, curve.onset)}, response.headline
     # 1/sqrt(1 - 2 zeta^2) = 1.0001 below the natural frequency, where the level is reached
     assert shown["maximum without bodies X"].startswith("1000 µm at 15.91")
     assert shown["damped peak / X"] == f"{headline.peak_ratio:.3f}"
-    assert shown["onset of impacts"] == f"{headline.onset:.6g} Hz"
+    assert shown["first point with impacts"] == f"{headline.onset:.6g} Hz"
+    # room of 50 um to a wall; friction, s = mu g/w^2 = 295 um, holds the body until it slips that far
+    frequency, amplitude = curve.onset
+    slip = 0.3 * 9.81 / (2 * math.pi * frequency) ** 2
+    assert swing(amplitude, slip) == pytest.approx(5e-5, rel=2e-3)
+    assert abs(linear_responses(curve.scene)[0].amplitude(np.array([frequency]))[0]) == pytest.approx(
+        amplitude, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("done", [0, 1, 3])
@@ -385,12 +408,12 @@ def test_closed_forms_stand_from_the_first_moment_and_the_rest_is_grey(done):
         )
     (response,) = forced_responses(curve.sweep())
     (finished,) = forced_responses(whole)
-    closed = [figure for figure in key_figures(response) if figure.closed]
-    assert closed == [figure for figure in key_figures(finished) if figure.closed] and len(closed) == 2
+    closed = [figure for figure in key_figures(response, curve.onset) if figure.closed]
+    assert closed == [figure for figure in key_figures(finished, curve.onset) if figure.closed] and len(closed) == 3
     assert response.reference == finished.reference
     _, figures, _ = page._drawn(curve, 1)
     rows = figures.children[0].children
-    assert [row.className for row in rows] == [""] * 4 + ["unfinished"] * 10
+    assert [row.className for row in rows] == [""] * 6 + ["unfinished"] * 10
 
 
 @pytest.mark.parametrize(
