@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -39,6 +39,8 @@ _FLOOR = 1e-3
 _SYMMETRIC = 1e-6
 #: corrections of a point of a branch before its step is shortened, which is better than many
 _ITERATIONS, _HALVINGS = 8, 3
+#: scenes and passages that are kept for the next step, which often wants them again; more would fill the memory
+_MAPS, _PASSAGES = 3, 16
 
 
 class OrbitStatus(StrEnum):
@@ -141,6 +143,7 @@ class Problem:
     span: float = 1.0
     count: Counter[str] = field(default_factory=Counter)
     _maps: dict[float, PeriodMap] = field(default_factory=dict)
+    _passages: dict[bytes, Passage | None] = field(default_factory=dict)
 
     @cached_property
     def along_parameter(self) -> np.ndarray:
@@ -162,9 +165,7 @@ class Problem:
         if math.isnan(parameter):
             return self.map
         if parameter not in self._maps:
-            made = self.map.at(parameter)
-            self._maps.clear()  # the next passage is often one of the same scene; more would fill the memory
-            self._maps[parameter] = made
+            _keep(self._maps, parameter, self.map.at(parameter), _MAPS)
         return self._maps[parameter]
 
     def parameter(self, y: np.ndarray) -> float:
@@ -181,6 +182,12 @@ class Problem:
         return self._passage(y[:-1] * self.weight, self.parameter(y))
 
     def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
+        key = np.append(state, parameter).tobytes()
+        if key not in self._passages:
+            _keep(self._passages, key, self._walked(state, parameter), _PASSAGES)
+        return self._passages[key]
+
+    def _walked(self, state: np.ndarray, parameter: float) -> Passage | None:
         self.count["passages"] += 1
         try:
             passage = self.at(parameter)(state)
@@ -214,6 +221,13 @@ class Problem:
             elif found is None and (above is not None or below is not None):
                 found = (above - here) / h if above is not None else (here - below) / h
         return np.zeros(self.size) if found is None else np.asarray(found / self.weight * self.span)
+
+
+def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+    """Keep a value in place of the oldest of many."""
+    kept[key] = value
+    if len(kept) > most:
+        del kept[next(iter(kept))]
 
 
 def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
@@ -277,9 +291,9 @@ def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.nda
     """Return the orbit in the plane through a point; with the slope there, if the one given does not serve."""
     for renewed in (False, True):
         if renewed:
-            if (passage := problem.passage(predicted)) is None:
+            given, passage = slope, problem.passage(predicted)
+            if passage is None or np.array_equal(given, slope := problem.slope(predicted, passage)):
                 return None
-            slope = problem.slope(predicted, passage)
         orbit = solve(problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
         problem.count["iterations"] += orbit.iterations
         if orbit.status is OrbitStatus.OK:

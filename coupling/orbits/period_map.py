@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.derivative import Before, Derivative, Guard, begins
@@ -48,8 +48,8 @@ class PeriodMap:
     periods: int
     scale: np.ndarray
     speed: float | None = None
-    #: the last run, whose subsystems the next one reuses
-    _earlier: list[EventRun] = field(default_factory=list, init=False)
+    #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
+    _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -80,7 +80,7 @@ class PeriodMap:
         start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
         for earlier in self._earlier:
-            run.reuse(earlier)
+            reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
         walk = _PassageWalk(self._frame, self._dynamics, self._event_names, state)
         return walk.passage(run, periods), walk.half_way
