@@ -152,7 +152,7 @@ class Continuation:
 
     def _repeats(self, orbit: Orbit) -> bool:
         """Say whether an orbit repeats after half of its periods."""
-        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state)
+        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state, False)
         return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
 
     def _note(self, orbit: Orbit, kind: str, note: str) -> None:

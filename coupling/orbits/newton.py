@@ -181,20 +181,25 @@ class Problem:
         """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
         return self._passage(y[:-1] * self.weight, self.parameter(y))
 
-    def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
-        key = np.append(state, parameter).tobytes()
+    def motion(self, y: np.ndarray) -> Passage | None:
+        """Return the passage of y without its derivative; None if its parameter makes no scene, or it has no end."""
+        return self._passage(y[:-1] * self.weight, self.parameter(y), False)
+
+    def _passage(self, state: np.ndarray, parameter: float, derivative: bool = True) -> Passage | None:
+        key = np.r_[state, parameter, derivative].tobytes()
         if key not in self._passages:
-            _keep(self._passages, key, self._walked(state, parameter), _PASSAGES)
+            _keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
         return self._passages[key]
 
-    def _walked(self, state: np.ndarray, parameter: float) -> Passage | None:
+    def _walked(self, state: np.ndarray, parameter: float, derivative: bool) -> Passage | None:
         self.count["passages"] += 1
         try:
-            passage = self.at(parameter)(state)
+            passage = self.at(parameter)(state, derivative)
         except InputError:
             return None
         known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
-        return passage if known and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+        known = known and bool(np.isfinite(passage.state).all())
+        return passage if known and not (derivative and not np.isfinite(passage.derivative).all()) else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -212,7 +217,7 @@ class Problem:
         found = None
         for shrink in _SHRINKS:
             h = shrink * _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
-            sides = [self._passage(state, parameter + way * h) for way in (1, -1)]
+            sides = [self._passage(state, parameter + way * h, False) for way in (1, -1)]
             above, below = (side.state if side and side.sequence == passage.sequence else None for side in sides)
             if above is not None and below is not None:
                 found = (above - below) / (2 * h)
