@@ -149,7 +149,7 @@ def differences(mapped, state, passage):
         columns = []
         for j in range(len(state)):
             move = step * mapped.scale[j] * (np.arange(len(state)) == j)
-            ends = [mapped(state + way * move) for way in (1, -1)]
+            ends = [mapped(state + way * move, derivative=False) for way in (1, -1)]
             if any(end.sequence != passage.sequence for end in ends):
                 break
             columns.append((ends[0].state - ends[1].state) / mapped.scale / (2 * step))
