@@ -186,7 +186,7 @@ class Problem:
         return self._passage(y[:-1] * self.weight, self.parameter(y), False)
 
     def _passage(self, state: np.ndarray, parameter: float, derivative: bool = True) -> Passage | None:
-        key = np.r_[state, parameter, derivative].tobytes()
+        key = np.append(state, (parameter, derivative)).tobytes()
         if key not in self._passages:
             _keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
         return self._passages[key]

@@ -200,7 +200,8 @@ class _PassageWalk:
             guards = made.guards(before, segment) if self._whole else []
             name = self._names.event(before.flow.named, flow.named, before.event.struck)
             if name and (before.event.impulse.any() or not begins(segment)):
-                self._crossings.append(Crossing(segment.start, name, guards[0].rate if guards else np.nan, before.event.loss))
+                speed = guards[0].rate if guards else np.nan
+                self._crossings.append(Crossing(segment.start, name, speed, before.event.loss))
         if not self._whole:
             return self._dynamics.from_state
         try:
