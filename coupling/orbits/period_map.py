@@ -71,8 +71,8 @@ class PeriodMap:
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         """Return the passage that begins with a state (k,).
 
-        Without its derivative, a third of the time, the derivative, the speeds of crossings and the clearance are
-        unknown, and the status is OK or STOPPED.
+        Without the derivative, in less than half of the time, the derivative, the speeds of crossings and the clearance
+        are unknown, and the status is OK or STOPPED.
         """
         if not np.all(np.isfinite(state)):
             return Passage.stopped(state, self.periods)

@@ -115,6 +115,9 @@ def test_the_derivative_is_that_of_40_digits(name):
     mapped, state = passed(*SCENES[name])
     passage = mapped(state)
     assert passage.status is PassageStatus.OK and passage.crossings
+    alone = mapped(state, derivative=False)
+    assert np.array_equal(alone.state, passage.state) and alone.sequence == passage.sequence
+    assert np.isnan(alone.derivative).all()
     made = mapped.scene
     law = (lambda speed: 1 - made.contact.coefficient * speed**0.2) if made.contact.depends_on_speed else None
     system, contact = mapped._frame.system, None
