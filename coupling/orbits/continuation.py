@@ -152,7 +152,7 @@ class Continuation:
 
     def _repeats(self, orbit: Orbit) -> bool:
         """Say whether an orbit repeats after half of its periods."""
-        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state)
+        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state, False)
         return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
 
     def _note(self, orbit: Orbit, kind: str, note: str) -> None:
@@ -216,7 +216,7 @@ class Continuation:
                 break
             at = forecast([(where, found.passage) for where, found in seen[-2:]])
             middle, margin = (low + high) / 2, max(1e-3 * (high - low), close / 4)
-            if at is None or attempt % 3 == 2:
+            if at is None or not low <= at <= high or attempt % 3 == 2:
                 at = middle
             else:
                 at = float(np.clip(at + (margin if attempt % 3 else -margin), low + margin / 2, high - margin / 2))

@@ -187,7 +187,7 @@ class Derivative:
         if event.impulse.any():
             jump = impact(system, jump.v, event, before.segment.speed)
             missed = np.abs(system.J[event.struck] @ jump.v - event.after)[np.isinf(system.spring[event.struck])]
-            fastest = np.abs(np.r_[event.before, event.after]).max()
+            fastest = np.abs(np.concatenate([event.before, event.after])).max()
             if np.any(missed > _LAW * fastest + _ROUND_OFF * before.segment.speed):
                 raise Untrusted
         derivative = follow @ (root[:, None] * jump.derivative / root)

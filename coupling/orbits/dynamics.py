@@ -20,7 +20,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import expm, null_space
-from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.orbits.frame import Frame
@@ -87,8 +86,11 @@ class Dynamics:
         """Numbers (N,) of the parts of the system that do not feel each other."""
         system = self.system
         bound = np.vstack([system.J, system.elongation]) != 0.0
-        joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T.astype(int) @ bound > 0)
-        return np.asarray(connected_components(joined, directed=False)[1])
+        joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T @ bound)
+        joined = joined | joined.T | np.eye(len(joined), dtype=bool)
+        while not np.array_equal(joined, wider := joined @ joined):
+            joined = wider
+        return np.asarray(joined.argmax(axis=1))  # by the first coordinate of each
 
     def state(self, segment: Segment) -> np.ndarray:
         """Return u (2N,) at the start of a segment."""
@@ -171,7 +173,7 @@ class Flow:
         stretch = drawn[holds]
         free[:, dynamics.places] -= stretch.T @ (system.tangential[holds, None] * stretch) / dynamics.rate
         # and those that hold
-        kept = np.r_[closed, u + stick]
+        kept = np.concatenate([closed, u + stick])
         wrench = np.vstack([rows[closed] - drag[closed] * rows[u + closed], rows[u + stick]]).T
         oblique = _oblique(rows[kept], wrench)
         length = np.linalg.norm(rows[kept], axis=1)  # of forces that depend on each other, the least by these

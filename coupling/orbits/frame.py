@@ -6,12 +6,13 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from vanedamp.coupling.response.restart import at_speed_of, state_at
+from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
@@ -30,18 +31,29 @@ class Frame:
 
     def __init__(self, scene: Scene, speed: float | None = None) -> None:
         self.scene, self.system = scene, assemble(scene)
-        self._turn = np.eye(self.system.modes)  # from modes of the states to the scene's own
+        self._turn = self._back = np.eye(self.system.modes)  # from modes of the states to the scene's own, and back
         if speed is not None and isinstance(scene.structure, Rom):
             self._turn = modal_transfer(scene.structure, speed, scene.speed)
+            self._back = np.linalg.inv(self._turn)
         self.extended = np.flatnonzero(self.system.tilt >= 0)
         size, sliders = len(self.system.mass), len(self.system.tangential)
         self.drawn = self.system.body[len(self.system.body) - sliders :]
         self.longest = self.system.limit[len(self.system.limit) - sliders :] / self.system.tangential
-        units = np.eye(2 * size)
-        self.to_state = np.column_stack([self.state_of(state_at(self.system, Motion(*np.split(z, 2)))) for z in units])
+        self.to_state = self._to_state()
         moves = slice(0, 2 * size - sliders)
         self.from_state = np.zeros((2 * size, len(self.to_state)))
         self.from_state[moves] = np.linalg.inv(self.to_state[:, moves])
+
+    def _to_state(self) -> np.ndarray:
+        """Return the map (k, 2N) of (q, q') to states."""
+        system, unit, more = self.system, np.eye(len(self.system.mass)), self.extended
+        x = system.along[more]
+        parts = (
+            self._back @ (system.scale * unit[: system.modes]), unit[system.along] - system.floor,
+            unit[x + 1] - system.rise[more], unit[x + 2] - system.turn[more],
+        )  # fmt: skip
+        elongation = np.pad(system.elongation, ((0, 0), (0, len(unit))))
+        return np.vstack([*(block_diag(part, part) for part in parts), elongation])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -56,7 +68,7 @@ class Frame:
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) of a restart state."""
-        restart, back = at_speed_of(self.scene, restart), np.linalg.inv(self._turn)
+        restart, back = at_speed_of(self.scene, restart), self._back
         out_of_line = (restart.lift, restart.lift_velocity, restart.tilt, restart.tilt_rate)
         return np.concatenate([
             back @ restart.displacement, back @ restart.velocity, restart.slip, restart.slip_velocity,

@@ -64,7 +64,7 @@ def impact(system: System, v: np.ndarray, event: Event, speed: float) -> Jump:
     approach, slope = -system.J[: len(system.rest)] @ v, -system.J[: len(system.rest)]
     approach[event.struck] = -event.before
     restitution, change = np.zeros((2, len(slope)))
-    fastest = np.abs(np.r_[event.before, event.after]).max(initial=0.0)
+    fastest = np.abs(np.concatenate([event.before, event.after])).max(initial=0.0)
     bounces = np.unique(event.struck[np.abs(event.after) > _PLASTIC * fastest])
     restitution[bounces], change[bounces] = _restitution(system, bounces, approach[bounces])
     if not system.two_phases:
@@ -150,7 +150,7 @@ def _blow(system: System, begun: Jump, roles: _Roles, target: np.ndarray, steep:
     lever = lever / system.mass[:, None]
     size = 1.0 / np.sqrt((rows**2 / system.mass).sum(axis=1))
     solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=DEPENDENT) * size * size[:, None]
-    wanted = np.r_[target, np.zeros(len(sticks))] - rows @ begun.v
+    wanted = np.concatenate([target, np.zeros(len(sticks))]) - rows @ begun.v
     slope = np.vstack([steep, np.zeros((len(sticks), len(begun.v)))]) - rows @ begun.derivative
     jump = Jump(begun.v + lever @ solve @ wanted, begun.derivative + lever @ solve @ slope)
     return _Blow(jump, (solve @ wanted)[: len(hit)], (solve @ slope)[: len(hit)])

@@ -29,8 +29,8 @@ def least_minimum(
     value, slope = functionals @ motion.T, slopes @ motion.T
     noise = _ROUND_OFF * np.abs(slopes) @ np.abs(motion).max(axis=0)
     side = np.where(np.abs(slope) > noise[:, None], np.sign(slope), 0.0)
-    for i in range(1, steps):
-        side[:, i] = np.where(side[:, i] == 0.0, side[:, i - 1], side[:, i])
+    last = np.maximum.accumulate(np.where(side[:, :-1] != 0.0, np.arange(steps), 0), axis=1)
+    side[:, :-1] = np.take_along_axis(side, last, axis=1)  # without a sign of its own, the one before
     which, cell = np.nonzero((side[:, :-1] < 0.0) & (side[:, 1:] > 0.0))
     if not len(which):
         return np.inf, -1

@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -39,6 +39,8 @@ _FLOOR = 1e-3
 _SYMMETRIC = 1e-6
 #: corrections of a point of a branch before its step is shortened, which is better than many
 _ITERATIONS, _HALVINGS = 8, 3
+#: scenes and passages that are kept for the next step, which often wants them again; more would fill the memory
+_MAPS, _PASSAGES = 3, 16
 
 
 class OrbitStatus(StrEnum):
@@ -141,6 +143,7 @@ class Problem:
     span: float = 1.0
     count: Counter[str] = field(default_factory=Counter)
     _maps: dict[float, PeriodMap] = field(default_factory=dict)
+    _passages: dict[bytes, Passage | None] = field(default_factory=dict)
 
     @cached_property
     def along_parameter(self) -> np.ndarray:
@@ -162,9 +165,7 @@ class Problem:
         if math.isnan(parameter):
             return self.map
         if parameter not in self._maps:
-            made = self.map.at(parameter)
-            self._maps.clear()  # the next passage is often one of the same scene; more would fill the memory
-            self._maps[parameter] = made
+            _keep(self._maps, parameter, self.map.at(parameter), _MAPS)
         return self._maps[parameter]
 
     def parameter(self, y: np.ndarray) -> float:
@@ -180,14 +181,25 @@ class Problem:
         """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
         return self._passage(y[:-1] * self.weight, self.parameter(y))
 
-    def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
+    def motion(self, y: np.ndarray) -> Passage | None:
+        """Return the passage of y without its derivative; None if its parameter makes no scene, or it has no end."""
+        return self._passage(y[:-1] * self.weight, self.parameter(y), False)
+
+    def _passage(self, state: np.ndarray, parameter: float, derivative: bool = True) -> Passage | None:
+        key = np.append(state, (parameter, derivative)).tobytes()
+        if key not in self._passages:
+            _keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
+        return self._passages[key]
+
+    def _walked(self, state: np.ndarray, parameter: float, derivative: bool) -> Passage | None:
         self.count["passages"] += 1
         try:
-            passage = self.at(parameter)(state)
+            passage = self.at(parameter)(state, derivative)
         except InputError:
             return None
         known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
-        return passage if known and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+        known = known and bool(np.isfinite(passage.state).all())
+        return passage if known and not (derivative and not np.isfinite(passage.derivative).all()) else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -205,7 +217,7 @@ class Problem:
         found = None
         for shrink in _SHRINKS:
             h = shrink * _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
-            sides = [self._passage(state, parameter + way * h) for way in (1, -1)]
+            sides = [self._passage(state, parameter + way * h, False) for way in (1, -1)]
             above, below = (side.state if side and side.sequence == passage.sequence else None for side in sides)
             if above is not None and below is not None:
                 found = (above - below) / (2 * h)
@@ -214,6 +226,13 @@ class Problem:
             elif found is None and (above is not None or below is not None):
                 found = (above - here) / h if above is not None else (here - below) / h
         return np.zeros(self.size) if found is None else np.asarray(found / self.weight * self.span)
+
+
+def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+    """Keep a value in place of the oldest of many."""
+    kept[key] = value
+    if len(kept) > most:
+        del kept[next(iter(kept))]
 
 
 def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
@@ -277,9 +296,9 @@ def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.nda
     """Return the orbit in the plane through a point; with the slope there, if the one given does not serve."""
     for renewed in (False, True):
         if renewed:
-            if (passage := problem.passage(predicted)) is None:
+            given, passage = slope, problem.passage(predicted)
+            if passage is None or np.array_equal(given, slope := problem.slope(predicted, passage)):
                 return None
-            slope = problem.slope(predicted, passage)
         orbit = solve(problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
         problem.count["iterations"] += orbit.iterations
         if orbit.status is OrbitStatus.OK:

@@ -169,7 +169,7 @@ class OtherSide:
 
         def part(at: float) -> float:
             y = base + at * last.tangent
-            passage = self.problem.passage(y)
+            passage = self.problem.motion(y)
             return np.nan if passage is None else float(residual @ self.problem.residual(y, passage))
 
         for _ in range(_WIDENINGS):

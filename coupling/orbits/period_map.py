@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.derivative import Before, Derivative, Guard, begins
@@ -48,8 +48,8 @@ class PeriodMap:
     periods: int
     scale: np.ndarray
     speed: float | None = None
-    #: the last run, whose subsystems the next one reuses
-    _earlier: list[EventRun] = field(default_factory=list, init=False)
+    #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
+    _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -68,21 +68,25 @@ class PeriodMap:
         """Names (k,) of the coordinates, such as "mode 0", "mode 0 rate", "body 0 slip"."""
         return self._frame.names
 
-    def __call__(self, state: np.ndarray) -> Passage:
-        """Return the passage that begins with a state (k,)."""
+    def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
+        """Return the passage that begins with a state (k,).
+
+        Without the derivative, in less than half of the time, the derivative, the speeds of crossings and the clearance
+        are unknown, and the status is OK or STOPPED.
+        """
         if not np.all(np.isfinite(state)):
             return Passage.stopped(state, self.periods)
-        return self._walk(state, self.periods)[0]
+        return self._walk(state, self.periods, derivative)[0]
 
-    def _walk(self, state: np.ndarray, periods: int) -> tuple[Passage, np.ndarray | None]:
+    def _walk(self, state: np.ndarray, periods: int, derivative: bool) -> tuple[Passage, np.ndarray | None]:
         """Return a passage from a state (k,), and the state half a period after the start."""
         system = self._frame.system
         start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
         for earlier in self._earlier:
-            run.reuse(earlier)
+            reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
-        walk = _PassageWalk(self._frame, self._dynamics, self._event_names, state)
+        walk = _PassageWalk(self._frame, self._dynamics, self._event_names, state, derivative)
         return walk.passage(run, periods), walk.half_way
 
     def at(self, value: float) -> PeriodMap:
@@ -133,18 +137,20 @@ class PeriodMap:
         image = self._frame.image
         if image is None:
             return None
-        passage, half = self._walk(state, 1)
+        passage, half = self._walk(state, 1, False)
         return None if half is None or passage.status is PassageStatus.STOPPED else image @ half
 
 
 class _PassageWalk:
-    """One passage from a state (k,).
+    """One passage from a state (k,), with its derivative or without.
 
     half_way: (k,) the state half a period after the start, None if the engine has not come so far.
     """
 
-    def __init__(self, frame: Frame, dynamics: Dynamics, names: EventNames, state: np.ndarray) -> None:
-        self._frame, self._dynamics, self._names = frame, dynamics, names
+    def __init__(
+        self, frame: Frame, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool
+    ) -> None:
+        self._frame, self._dynamics, self._names, self._whole = frame, dynamics, names, derivative
         self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: np.ndarray | None = None
@@ -160,7 +166,8 @@ class _PassageWalk:
                 made.worsen(PassageStatus.STOPPED)
             else:
                 state = self._frame.state_of(final)
-                derivative = made.end(before, state, periods * self._frame.system.period)
+                if self._whole:
+                    derivative = made.end(before, state, periods * self._frame.system.period)
         peaks = run.records.peak[:periods].copy()
         return Passage(state, derivative, tuple(self._crossings), self._clearance, made.status, peaks)
 
@@ -176,6 +183,9 @@ class _PassageWalk:
             if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
                 middle, _ = flow.after(z, half - segment.time)
                 self.half_way = dynamics.to_state @ middle[: dynamics.one]
+            if not self._whole:
+                before = Before(segment, segment.event, flow, z, M)
+                continue
             least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
             if least < self._clearance[0]:
                 self._clearance = least, self._names.possible(unit, what)
@@ -184,13 +194,16 @@ class _PassageWalk:
         return before
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
-        """Return the derivative as a segment begins, nan where it is not known, and keep the event before it."""
+        """Return the derivative as a segment begins, nan where it is unknown, and keep the event before it."""
         made, guards = self._derivative, list[Guard]()
         if before is not None and before.event.unit >= 0:
-            guards = made.guards(before, segment)
+            guards = made.guards(before, segment) if self._whole else []
             name = self._names.event(before.flow.named, flow.named, before.event.struck)
             if name and (before.event.impulse.any() or not begins(segment)):
-                self._crossings.append(Crossing(segment.start, name, guards[0].rate, before.event.loss))
+                speed = guards[0].rate if guards else np.nan
+                self._crossings.append(Crossing(segment.start, name, speed, before.event.loss))
+        if not self._whole:
+            return self._dynamics.from_state
         try:
             if before is None:
                 return made.begin(walk.start, segment, flow, u)

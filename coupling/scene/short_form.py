@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from vanedamp.coupling.scene.paths import Range, axis_values
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.toml_input import InputError, validate
 
 #: values of an axis from which on a range is shorter
 _FEW = 4
@@ -16,7 +18,7 @@ _FEW = 4
 
 def short_form(scene: Scene) -> dict[str, Any]:
     """Return the least plain data that are read as this very scene."""
-    data = scene.to_dict()
+    data, whole = scene.to_dict(), _even(scene)
     for path, values in data.get("sweep", {}).items():
         data["sweep"][path] = _range(values)
     for place in list(_places(data)):
@@ -28,7 +30,7 @@ def short_form(scene: Scene) -> dict[str, Any]:
             del table[place[-1]]
         except (KeyError, IndexError):  # its table is gone already
             continue
-        if _reads_as(without, scene):
+        if _reads_as(without, whole):
             data = without
     if "law" in (contact := data.get("contact", {})):  # determines the other keys
         data["contact"] = {"law": contact["law"]} | contact
@@ -46,11 +48,16 @@ def _places(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
             yield from _places(value, (*place, index))
 
 
-def _reads_as(data: dict[str, Any], scene: Scene) -> bool:
-    try:
-        return _even(validate(Scene, data, "scene")) == _even(scene)
-    except InputError:
+def _reads_as(data: dict[str, Any], whole: dict[str, Any]) -> bool:
+    try:  # without the explanation of an error, which takes longer
+        return _even(_reader().validate_python(data)) == whole
+    except ValidationError:
         return False
+
+
+@cache
+def _reader() -> TypeAdapter[Scene]:
+    return TypeAdapter(Scene)
 
 
 def _even(scene: Scene) -> dict[str, Any]:

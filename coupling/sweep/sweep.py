@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -30,6 +31,7 @@ from vanedamp.coupling.sweep.worker import (
     SweepTable,
     width_of,
 )
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
@@ -107,6 +109,10 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     )
 
 
+#: keys of bodies that linear curves do not depend on
+_UNFELT = re.compile(r"damper(\.\d+)?\.(friction|restitution)")
+
+
 def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     """Return the peaks of the linear curves over the swept frequencies; nan where there is none."""
     swept = resonance_axis(grid.base, grid.axes)[0]
@@ -114,11 +120,16 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
         return {}
     others = {path: values for path, values in grid.axes.items() if path != swept}
     low, high = min(grid.axes[swept]), max(grid.axes[swept])
-    points, found = Points(grid.base, grid.choices), []
+    points, found, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
     for values in itertools.product(*others.values()):
+        felt = tuple(value for path, value in zip(others, values, strict=True) if not _UNFELT.fullmatch(path))
         try:
             scene = points.scene({**dict(zip(others, values, strict=True)), swept: low})
-            found.append(tops(*linear_peaks(scene, low * SPEEDS.get(swept, 1.0), high * SPEEDS.get(swept, 1.0))))
+            if felt in known:
+                assemble(scene)  # raises where bodies do not fit together
+            else:
+                known[felt] = tops(*linear_peaks(scene, *(end * SPEEDS.get(swept, 1.0) for end in (low, high))))
+            found.append(known[felt])
         except InputError:  # the points' status, or a waveform
             found.append(dict.fromkeys(PEAKS, np.nan))
     shape = tuple(len(values) for values in others.values())

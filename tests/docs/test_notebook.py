@@ -8,6 +8,7 @@ import pytest
 from pydantic.dataclasses import rebuild_dataclass
 
 import vanedamp as vd
+from tests.tools.small_structures import truss
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.interface import InterfaceCoordinate, InterfaceError
 
@@ -183,10 +184,10 @@ def test_a_saved_scene_finds_its_reduced_model(tmp_path):
     assert vd.Scene.load(tmp_path / "scene.toml") == made
 
 
-def test_a_list_of_coordinates_is_an_interface(cluster):
-    coordinates = [InterfaceCoordinate("shroud", "shroud", (0.0, 1.0, 0.0))]
-    listed = vd.reduce(cluster, coordinates, modes=2)
-    made = vd.reduce(cluster, vd.Interface.on_patches(cluster, coordinates), modes=2)
+def test_a_list_of_coordinates_is_an_interface():
+    matrices, coordinates = truss(), [InterfaceCoordinate("a", "a", (0.0, 1.0, 0.0))]
+    listed = vd.reduce(matrices, coordinates, modes=2)
+    made = vd.reduce(matrices, vd.Interface.on_patches(matrices, coordinates), modes=2)
     np.testing.assert_array_equal(listed.stiffness, made.stiffness)
     with pytest.raises(InterfaceError, match="no coordinates"):
-        vd.reduce(cluster, [], modes=2)
+        vd.reduce(matrices, [], modes=2)

@@ -31,7 +31,7 @@ class ClosedMap:
     def names(self) -> tuple[str, ...]:
         return tuple(f"x{place}" for place in range(len(self.scale)))
 
-    def __call__(self, state: np.ndarray) -> Passage:
+    def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         derivative, crossings, clearance, peaks = np.eye(len(state)), [], (math.inf, ""), []
         for _ in range(self.periods):
             peaks.append(abs(state[0]))
@@ -150,7 +150,7 @@ class ImpactOscillator:
     def rate(self, x: np.ndarray, t: float) -> np.ndarray:
         return np.array([x[1], self.value * math.cos(t) - self.damping * x[1] - x[0]])
 
-    def __call__(self, state: np.ndarray) -> Passage:
+    def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         end, now, x, derivative = 2 * math.pi * self.periods, 0.0, np.asarray(state, float), np.eye(2)
         crossings, top = [], -math.inf
         while len(crossings) < 50:

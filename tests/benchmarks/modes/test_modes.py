@@ -1,6 +1,8 @@
 """The benchmark of the modes: every solver finds the same frequencies, trouble is told, files are whole."""
 
+import contextlib
 import csv
+import io
 import json
 from pathlib import Path
 
@@ -86,21 +88,26 @@ def faked(calls, stop_at=None):
     return process
 
 
-@pytest.fixture
-def three(monkeypatch, tmp_path):
-    """Run the benchmark of three solvers at two sizes on given measurements, in a folder of that name."""
-    monkeypatch.setattr(bench_modal, "_solvers", lambda: (SOLVERS, {}))
-    monkeypatch.setattr(bench_modal, "build", lambda *_: None)
-
-    def run(process, folder):
-        monkeypatch.setattr(bench_modal, "apart", process)
-        return Modal((0.004, 0.003), 3, 100.0).run(tmp_path / folder)
-
-    return run
+def run_three(process, folder):
+    """Run the benchmark of three solvers at two sizes on given measurements, in a folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench_modal, "_solvers", lambda: (SOLVERS, {}))
+        patch.setattr(bench_modal, "build", lambda *_: None)
+        patch.setattr(bench_modal, "apart", process)
+        return Modal((0.004, 0.003), 3, 100.0).run(folder)
 
 
-def test_solvers_that_have_lost_by_far_are_left_out(three, capsys, tmp_path):
-    result = three(faked(calls := []), "out")
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder, the results, the calls and the output of a run that nothing stops."""
+    folder, out = tmp_path_factory.mktemp("three") / "whole", io.StringIO()
+    with contextlib.redirect_stdout(out):
+        result = run_three(faked(calls := []), folder)
+    return folder, result, calls, out.getvalue()
+
+
+def test_solvers_that_have_lost_by_far_are_left_out(whole):
+    folder, result, calls, out = whole
     # the loser has one round; who fails has none after it
     assert calls == ["assemble", *SOLVERS, *(2 * SOLVERS[:2]), "assemble", *SOLVERS[:2], OURS, OURS]
     first, second = result["sizes"]
@@ -108,23 +115,23 @@ def test_solvers_that_have_lost_by_far_are_left_out(three, capsys, tmp_path):
     assert second["solvers"]["superlu_default"]["status"].startswith("dropped: 5.4 times the best's time at 10,000")
     assert result["dropped"]["superlu"] == "ended by signal 9 (out of memory?) at 10,000 degrees of freedom"
     assert first["solvers"][OURS]["modes"]["cpu_s"] == 1.25 and first["solvers"][OURS]["solves"] == 20
-    assert "0.004 m, eigsh, SuperLU (default), round 2: left out, 5.4 times" in capsys.readouterr().out
-    assert (tmp_path / "out" / "bench_modal.png").is_file()
+    assert "0.004 m, eigsh, SuperLU (default), round 2: left out, 5.4 times" in out
+    assert (folder / "bench_modal.png").is_file()
 
 
 @pytest.mark.parametrize("stop_at", [1, 4, 9, 12])
-def test_stopped_it_goes_on_to_the_same_results(stop_at, three, tmp_path):
-    three(faked([]), "whole")
+def test_stopped_it_goes_on_to_the_same_results(stop_at, whole, tmp_path):
+    stopped = tmp_path / "stopped"
     with pytest.raises(KeyboardInterrupt):
-        three(faked(calls := [], stop_at), "stopped")
+        run_three(faked(calls := [], stop_at), stopped)
     calls.pop()
-    three(faked(calls), "stopped")
-    made = {name: json.loads((tmp_path / name / "bench_modal.json").read_text()) for name in ("whole", "stopped")}
-    for result in made.values():
+    run_three(faked(calls), stopped)
+    made = [json.loads((folder / "bench_modal.json").read_text()) for folder in (whole[0], stopped)]
+    for result in made:
         del result["wall_time_s"], result["machine"]["load"]
-    assert made["whole"] == made["stopped"]
+    assert made[0] == made[1]
     assert calls.count(OURS) == 6
-    assert sorted(file.name for file in (tmp_path / "stopped").iterdir()) == [
+    assert sorted(file.name for file in stopped.iterdir()) == [
         f"bench_modal.{ending}" for ending in ("csv", "json", "png")
     ]
 

@@ -31,7 +31,7 @@ def test_commands_import_nothing_that_they_do_not_use(arguments, tmp_path):
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys, pictures):
-    bench = Start(2, compile=False)
+    bench = Start(1, compile=False)
     result = bench.run(tmp_path)
     assert json.loads((tmp_path / "bench_start.json").read_text())["ratio"] == result["ratio"]
     with (tmp_path / "bench_start.csv").open(newline="") as stream:

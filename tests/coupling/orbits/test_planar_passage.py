@@ -138,7 +138,7 @@ def difference(found, x, direction, size):
     """
     best = None
     for h in (1e-3, 1e-4, 1e-5, 1e-6):
-        ends = [found(x + way * h * direction * found.scale) for way in (1, -1, 2, -2)]
+        ends = [found(x + way * h * direction * found.scale, derivative=False) for way in (1, -1, 2, -2)]
         if any(end.status is PassageStatus.STOPPED for end in ends):
             continue
         one, two, three, four = (end.state / found.scale for end in ends)
@@ -147,6 +147,8 @@ def difference(found, x, direction, size):
         apart = np.abs(fine - coarse).max() + 50 * EPS * size * np.abs(one).max() / h
         if best is None or apart < best[1]:
             best = fine, apart
+        if apart < 1e-10 * size:
+            break  # smaller steps would show nothing that the comparison resolves
     return best
 
 
