@@ -27,8 +27,8 @@ def heeding_interrupts():
     signal.signal(signal.SIGINT, before)
 
 
-# hours of work
-LONG = changed(SCENE, ("periods = 90", "periods = 2000"), ("num = 4", "num = 100_000"))
+# longer than any test waits
+LONG = changed(SCENE, ("periods = 90", "periods = 20_000"), ("num = 4", "num = 1000"))
 #: the command; it sends the signal to its process group at the n-th event of a kind
 PROGRAM = """
 import os, signal, sys
