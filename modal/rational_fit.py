@@ -72,7 +72,7 @@ class Rational:
 
         found = least_squares(
             error, parameters.ravel(), jac=jacobian, x_scale="jac",
-            bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-14, gtol=1e-14,
+            bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-12, gtol=1e-14,
         )  # fmt: skip
         return Fit(_unpacked(found.x), float(found.fun @ found.fun), found.jac)
 
@@ -179,8 +179,9 @@ class Rational:
         triangles = np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r")[:, width:, width:]
         rest = triangles.reshape(-1, 2 * count + 1)
         weights = np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0]
-        decay, frequency = np.diag(poles.real), np.diag(poles.imag)
-        rotation = np.block([[decay, frequency], [-frequency, decay]])
+        rotation = np.diag(np.tile(poles.real, 2))
+        at = np.arange(count)
+        rotation[at, count + at], rotation[count + at, at] = poles.imag, -poles.imag
         gains = np.concatenate([2.0 * np.ones(count), np.zeros(count)])
         zeros = np.linalg.eigvals(rotation - np.outer(gains, weights))
         upper = zeros[np.argsort(zeros.imag)][count:]
