@@ -1,5 +1,7 @@
 """Reduction of the shipped cluster against its finite elements: statics, frequencies, receptances at the interface."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -46,7 +48,7 @@ def references(cluster, interface, modes, frequencies):
     """
     from vanedamp.modal.eigen import factorize
 
-    undamped = full_receptance(cluster, interface, frequencies, factorize)
+    undamped = full_receptance(cluster, interface, frequencies, partial(factorize, definite=False))
     displacements = modes.shapes @ interface.vectors
     return undamped, with_modal_damping(
         undamped, frequencies, modes.frequencies_hz, displacements, cluster.damping_ratio
