@@ -1,5 +1,9 @@
 """Expensive records and working directories that several test files share; options of these tests."""
 
+import site
+import sys
+from pathlib import Path
+
 import pytest
 
 
@@ -16,6 +20,14 @@ def pytest_configure(config):
 
         begin(seed)
     import vanedamp.modal.stack  # noqa: F401
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems():
+    """Tell hypothesis, which reads the project's code for constants to draw, that Debian's packages are not a part of it."""
+    scrutineer = sys.modules.get("hypothesis.internal.scrutineer")
+    folders = getattr(scrutineer, "SITE_PACKAGES_DIRS", set())
+    folders.update(Path(folder).resolve() for folder in site.getsitepackages())
 
 
 def pytest_report_header(config):
