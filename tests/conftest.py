@@ -24,7 +24,7 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems():
-    """Tell hypothesis, which reads the project's code for constants to draw, that Debian's packages are not a part of it."""
+    """Tell hypothesis, which draws constants of the project, that Debian's packages are no part of it."""
     scrutineer = sys.modules.get("hypothesis.internal.scrutineer")
     folders = getattr(scrutineer, "SITE_PACKAGES_DIRS", set())
     folders.update(Path(folder).resolve() for folder in site.getsitepackages())
