@@ -176,8 +176,8 @@ class Rational:
         shared = np.broadcast_to(own, (len(values), *own.shape))
         rows = np.concatenate([shared, -values * common, values], axis=2)
         # the common denominator fits the rest that the response's own coefficients leave
-        triangles = np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r")[:, width:, width:]
-        rest = triangles.reshape(-1, 2 * count + 1)
+        triangles = np.asarray(np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r"))
+        rest = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
         weights = np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0]
         rotation = np.diag(np.tile(poles.real, 2))
         at = np.arange(count)

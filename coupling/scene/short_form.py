@@ -8,7 +8,7 @@ from typing import Any
 
 from vanedamp.coupling.scene.paths import Range, axis_values
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.toml_input import InputError, validate
+from vanedamp.files.toml_input import reading
 
 #: values of an axis from which on a range is shorter
 _FEW = 4
@@ -47,10 +47,8 @@ def _places(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
 
 
 def _reads_as(data: dict[str, Any], scene: Scene) -> bool:
-    try:
-        return _even(validate(Scene, data, "scene")) == _even(scene)
-    except InputError:
-        return False
+    read = reading(Scene, data)
+    return read is not None and _even(read) == _even(scene)
 
 
 def _even(scene: Scene) -> dict[str, Any]:
