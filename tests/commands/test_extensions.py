@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from tests.tools.processes import ROOT, environment
+from tests.tools.processes import ROOT, environment, without_stages
 from vanedamp.studies.cli import BAD_INPUT, main
 
 #: a command that writes a record of its own kind
@@ -254,7 +254,8 @@ def vanedamp(server, tmp_path):
 
     def run(*arguments):
         print(json.dumps([str(tmp_path), *arguments]), file=server.stdin, flush=True)
-        return subprocess.CompletedProcess(arguments, *json.loads(server.stdout.readline()))
+        status, out, error = json.loads(server.stdout.readline())
+        return subprocess.CompletedProcess(arguments, status, out, without_stages(error))
 
     return run
 
