@@ -2,8 +2,8 @@
 # interpreter instead: make test PYTHON=python
 
 PYTHON = .venv/bin/python
-# one worker a core, each with one thread
-TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
+# one worker a core, each with one thread; what Python compiles is kept for the other worker and for commands in tests
+TESTS = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -q -n auto --dist worksteal
 
 # an interpreter that is named has what it needs
 SETUP = $(if $(filter file,$(origin PYTHON)),scripts/setup.sh,:)

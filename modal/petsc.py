@@ -84,6 +84,11 @@ class Factorization:
         """Free the memory of the factors."""
         self._factor.destroy()
 
+    def __del__(self) -> None:
+        # PETSc keeps an object that Python drops, for ranks that have not dropped it yet: here there are no others
+        if hasattr(self, "_factor") and not PETSc.Sys.isFinalized():
+            self.destroy()
+
     def __enter__(self) -> Factorization:
         return self
 

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, special
+from scipy import special
 from scipy.optimize import least_squares
 
 _RELOCATIONS = 30
+# fraction of their decay: relocations end when poles move by less, least squares find the rest
+_SETTLED = 1e-3
 # a fit may try bandwidths down to this fraction of the least line spacing; a pole that ends there is rejected
 _NARROWEST = 1e-3
 # fraction of the responses' norm that round-off of the fit stays below; smaller misfits count as noise
@@ -58,9 +60,19 @@ class Rational:
         least = [max(2 * low - high, 1e-3 * low), np.log(_NARROWEST * spacing / 2)]
         most = [2 * high - low, np.log(high)]
         parameters = np.clip(np.column_stack([start.imag, np.log(-start.real)]), least, most)
+        kept: list[np.ndarray] = [np.empty(0)] * 2
+
+        def error(parameters: np.ndarray) -> np.ndarray:
+            value, kept[1] = self._derived(parameters)
+            kept[0] = parameters.copy()
+            return value
+
+        def jacobian(parameters: np.ndarray) -> np.ndarray:
+            return kept[1] if np.array_equal(parameters, kept[0]) else self._derived(parameters)[1]
+
         found = least_squares(
-            lambda p: self._derived(p)[0], parameters.ravel(), jac=lambda p: self._derived(p)[1], x_scale="jac",
-            bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-14, gtol=1e-14,
+            error, parameters.ravel(), jac=jacobian, x_scale="jac",
+            bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-12, gtol=1e-14,
         )  # fmt: skip
         return Fit(_unpacked(found.x), float(found.fun @ found.fun), found.jac)
 
@@ -99,23 +111,31 @@ class Rational:
         low, high = np.abs(self.s[0]), np.abs(self.s[-1])
         poles: np.ndarray = (-0.01 + 1j) * (low + (high - low) * (np.arange(count) + 0.5) / max(count, 1))
         for _ in range(_RELOCATIONS if count else 0):
-            poles = self._relocate(poles)
+            before, poles = poles, self._relocate(poles)
+            if np.all(np.abs(poles - before) < _SETTLED * np.abs(poles.real)):
+                break
         return poles
 
     @cached_property
     def _target(self) -> np.ndarray:
         return _real(self.values.T)
 
+    @cached_property
+    def _outside(self) -> np.ndarray:
+        """Functions (n, 2) of the stiffness of modes above the band and of the mass of those below."""
+        return np.column_stack([np.ones_like(self.s), self.s**-2.0])
+
+    @cached_property
+    def _weight(self) -> np.ndarray:
+        weight: np.ndarray = self.s[:, None] ** self.power
+        return weight
+
     def _basis(self, poles: np.ndarray, terms: bool = True) -> np.ndarray:
         """Return functions (n, 2 m + 2) of the real coefficients: two a pole pair, two for modes outside the band."""
         first, second = 1.0 / (self.s[:, None] - poles), 1.0 / (self.s[:, None] - poles.conj())
         columns = [first + second, 1j * (first - second)]
-        if not terms:
-            return np.concatenate(columns, axis=1)
-        # stiffness of the modes above, mass of the modes below
-        outside = np.column_stack([np.ones_like(self.s), self.s**-2.0])
-        functions: np.ndarray = np.concatenate([*columns, outside], axis=1) * self.s[:, None] ** self.power
-        return functions
+        functions: np.ndarray = np.concatenate([*columns, self._outside] if terms else columns, axis=1)
+        return functions * self._weight if terms else functions
 
     def _projected(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the orthonormal span (2 n, r) of the functions, and the coefficients (2 m + 2, k) of the best fit."""
@@ -135,9 +155,9 @@ class Rational:
         poles = _unpacked(parameters)
         span, coefficients = self._projected(poles)
         error = span @ (span.T @ self._target) - self._target
-        count, weight = poles.size, self.s[:, None] ** self.power
-        first = weight / (self.s[:, None] - poles) ** 2
-        second = weight / (self.s[:, None] - poles.conj()) ** 2
+        count = poles.size
+        first = self._weight / (self.s[:, None] - poles) ** 2
+        second = self._weight / (self.s[:, None] - poles.conj()) ** 2
         one, two = coefficients[:count], coefficients[count : 2 * count]
         plus, minus = first + second, 1j * (first - second)
         columns = np.empty((*self._target.shape, count, 2))
@@ -151,19 +171,17 @@ class Rational:
     def _relocate(self, poles: np.ndarray) -> np.ndarray:
         """Return the zeros of the denominator that makes the fit linear, flipped into the left half plane."""
         own, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
-        blocks, targets = [], []
-        for values in self.values:
-            # the common denominator fits the rest that the response's own coefficients leave
-            rows = _real(np.concatenate([own, -values[:, None] * common], axis=1))
-            triangle = linalg.qr(np.column_stack([rows, _real(values[:, None])]), mode="r")[0][: rows.shape[1] + 1]
-            width = own.shape[1]
-            blocks.append(triangle[width:, width:-1])
-            targets.append(triangle[width:, -1])
-        weights = np.linalg.lstsq(np.concatenate(blocks), np.concatenate(targets), rcond=None)[0]
-        rotation = np.zeros((2 * count, 2 * count))
-        for index, pole in enumerate(poles):
-            at = [index, count + index]
-            rotation[np.ix_(at, at)] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
+        width = own.shape[1]
+        values = self.values[:, :, None]
+        shared = np.broadcast_to(own, (len(values), *own.shape))
+        rows = np.concatenate([shared, -values * common, values], axis=2)
+        # the common denominator fits the rest that the response's own coefficients leave
+        triangles = np.asarray(np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r"))
+        rest = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
+        weights = np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0]
+        rotation = np.diag(np.tile(poles.real, 2))
+        at = np.arange(count)
+        rotation[at, count + at], rotation[count + at, at] = poles.imag, -poles.imag
         gains = np.concatenate([2.0 * np.ones(count), np.zeros(count)])
         zeros = np.linalg.eigvals(rotation - np.outer(gains, weights))
         upper = zeros[np.argsort(zeros.imag)][count:]

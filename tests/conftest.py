@@ -1,5 +1,9 @@
 """Expensive records and working directories that several test files share; options of these tests."""
 
+import site
+import sys
+from pathlib import Path
+
 import pytest
 
 
@@ -16,6 +20,14 @@ def pytest_configure(config):
 
         begin(seed)
     import vanedamp.modal.stack  # noqa: F401
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems():
+    """Tell hypothesis, which draws constants of the project, that Debian's packages are no part of it."""
+    scrutineer = sys.modules.get("hypothesis.internal.scrutineer")
+    folders = getattr(scrutineer, "SITE_PACKAGES_DIRS", set())
+    folders.update(Path(folder).resolve() for folder in site.getsitepackages())
 
 
 def pytest_report_header(config):
@@ -43,26 +55,31 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def cluster_solid():
-    """The shipped cluster in degree 2, with the material of the reference case."""
+def cluster_analysis(tmp_path_factory):
+    """ModalAnalysis of the demo's case: the shipped cluster in degree 2, held at the casing, with ten modes."""
+    import shutil
+
     from vanedamp.meshes.vane_cluster import SHIPPED
-    from vanedamp.modal.elasticity import Material, Solid
+    from vanedamp.studies.case.stages import assemble, modal_analysis
+    from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.demo.figure_file import FOLDER
 
-    return Solid(SHIPPED, {"default": Material(young=2.0e11, poisson=0.3, density=8190.0)}, degree=2)
+    folder = tmp_path_factory.mktemp("cluster")
+    for source in (FOLDER / "case.toml", SHIPPED):
+        shutil.copy(source, folder)
+    return modal_analysis(assemble(Case.load(folder / "case.toml")))
 
 
 @pytest.fixture(scope="session")
-def cluster(cluster_solid):
-    """SystemMatrices of the shipped cluster, held at the casing."""
-    return cluster_solid.assemble(clamped={"clamp": "xyz"}, damping_ratio=0.002)
+def cluster(cluster_analysis):
+    """SystemMatrices of the shipped cluster."""
+    return cluster_analysis.structure.matrices
 
 
 @pytest.fixture(scope="session")
-def cluster_modes(cluster):
+def cluster_modes(cluster_analysis):
     """The ten lowest modes of the shipped cluster."""
-    from vanedamp.modal.eigen import solve_modes
-
-    return solve_modes(cluster, count=10)
+    return cluster_analysis.modes
 
 
 @pytest.fixture(scope="session")

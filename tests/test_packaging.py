@@ -9,30 +9,20 @@ from pathlib import Path
 import pytest
 
 from tests.tools.input_files import DAMPED_BLOCK
-from vanedamp.studies.case.stages import assemble, modal_analysis
-from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.demo import run_demo
-from vanedamp.studies.demo.figure_file import FOLDER, Structure
+from vanedamp.studies.demo.figure_file import Structure
 
 ROOT = Path(__file__).parent.parent
 PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
 SUFFIXES = {".py", ".toml", ".html", ".js", ".css", ".msh"}
 
 
-def test_shipped_rigid_model_is_that_of_the_shipped_mesh(cluster_modes_file):
-    modes = Structure.load(cluster_modes_file, Path("rom.h5"))
+def test_shipped_rigid_model_is_that_of_the_shipped_mesh(cluster_analysis, tmp_path):
+    cluster_analysis.save(tmp_path / "modes.h5")
+    modes = Structure.load(tmp_path / "modes.h5", Path("rom.h5"))
     shipped = Structure.shipped()
     for name in ("mass", "stiffness", "damping_ratio", "frequency", "amplitude"):
         assert getattr(shipped, name) == pytest.approx(getattr(modes, name), rel=1e-7)
-
-
-@pytest.fixture(scope="module")
-def cluster_modes_file(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("cluster")
-    for source in (FOLDER / "case.toml", ROOT / "meshes" / "vane_cluster.msh"):
-        shutil.copy(source, folder)
-    modal_analysis(assemble(Case.load(folder / "case.toml"))).save(folder / "modes.h5")
-    return folder / "modes.h5"
 
 
 def test_rigid_demo_needs_no_finite_elements(tmp_path):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from functools import cache
 from typing import Any
-
-from pydantic import TypeAdapter, ValidationError
 
 from vanedamp.coupling.scene.paths import Range, axis_values
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validated_or_none
 
 #: values of an axis from which on a range is shorter
 _FEW = 4
@@ -49,15 +47,8 @@ def _places(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
 
 
 def _reads_as(data: dict[str, Any], whole: dict[str, Any]) -> bool:
-    try:  # without the explanation of an error, which takes longer
-        return _even(_reader().validate_python(data)) == whole
-    except ValidationError:
-        return False
-
-
-@cache
-def _reader() -> TypeAdapter[Scene]:
-    return TypeAdapter(Scene)
+    read = validated_or_none(Scene, data)
+    return read is not None and _even(read) == whole
 
 
 def _even(scene: Scene) -> dict[str, Any]:

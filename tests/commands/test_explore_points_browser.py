@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -22,8 +21,6 @@ from vanedamp.coupling.sweep.sweep import sweep
 pytest.importorskip("dash", reason="the page is made with dash")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium: apt install chromium")
 #: ms, on a machine that does much else
 PATIENCE = 120_000
 GAPS = [4e-4, 1e-4, 2e-4]
@@ -34,7 +31,7 @@ AXES = f"""
 
 
 @contextmanager
-def opened(folder, *words):
+def opened(browser, folder, *words):
     """Open the page of `vanedamp explore`; at its end nothing came from elsewhere and nothing was complained of."""
     server = subprocess.Popen(
         [sys.executable, "-m", "vanedamp", "explore", *words, "--no-browser", "--workers", "1"], cwd=folder,
@@ -42,19 +39,17 @@ def opened(folder, *words):
     )  # fmt: skip
     try:
         address = server.stdout.readline().strip()
-        with playwright.sync_playwright() as started:
-            browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            page = browser.new_page(viewport={"width": 1300, "height": 1000})
-            page.set_default_timeout(PATIENCE)
-            requests, complaints = [], []
-            page.on("request", lambda request: requests.append(request.url))
-            page.on("console", lambda message: complaints.append(message.text))
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.goto(address)
-            yield page
-            assert all(url.startswith((address.split("?")[0], "data:", "blob:", "about:")) for url in requests)
-            assert complaints == []
-            browser.close()
+        page = browser.new_page(viewport={"width": 1300, "height": 1000})
+        page.set_default_timeout(PATIENCE)
+        requests, complaints = [], []
+        page.on("request", lambda request: requests.append(request.url))
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(address)
+        yield page
+        assert all(url.startswith((address.split("?")[0], "data:", "blob:", "about:")) for url in requests)
+        assert complaints == []
+        page.close()
     finally:
         server.send_signal(signal.SIGINT)
         server.communicate(timeout=60.0)
@@ -72,9 +67,9 @@ def click(page, points, number):
     page.mouse.click(x, y)
 
 
-def test_click_shows_history_phase_planes_and_motion(tmp_path):
+def test_click_shows_history_phase_planes_and_motion(tmp_path, browser):
     (tmp_path / "scene.toml").write_text(SCENE)
-    with opened(tmp_path, "scene.toml") as page:
+    with opened(browser, tmp_path, "scene.toml") as page:
         says(page, "#message", "60 frequencies")
         click(page, "#curve .scatterlayer .trace:nth-child(4) .points path", 25)
         says(page, "#point-status", "mean of peaks")
@@ -110,7 +105,7 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path):
         playwright.expect(page.locator("#point-stale")).to_be_empty(timeout=PATIENCE)
 
 
-def test_sliders_move_through_a_sweep(tmp_path):
+def test_sliders_move_through_a_sweep(tmp_path, browser):
     long = changed(SCENE, ("periods = 90", "periods = 150"), ("transient = 80", "transient = 100"))
     (tmp_path / "scene.toml").write_text(long.split("[sweep]")[0] + "[sweep]" + AXES)
     sweep(Scene.load(tmp_path / "scene.toml")).save(tmp_path / "gaps.h5")
@@ -118,7 +113,7 @@ def test_sliders_move_through_a_sweep(tmp_path):
     (tmp_path / "scene.toml").write_text(short)
     sweep(Scene.load(tmp_path / "scene.toml")).save(tmp_path / "one.h5")
     record = Sweep.load(tmp_path / "gaps.h5")
-    with opened(tmp_path, "gaps.h5", "one.h5") as page:
+    with opened(browser, tmp_path, "gaps.h5", "one.h5") as page:
         says(page, "#sweep-best", "Best of 3 designs")
         slider = page.get_by_role("slider").first
         for place, gap in enumerate(sorted(GAPS)):

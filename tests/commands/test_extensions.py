@@ -8,13 +8,12 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from tests.tools.processes import ROOT, environment, without_stages
 from vanedamp.studies.cli import BAD_INPUT, main
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 #: a command that writes a record of its own kind
 COMMAND = '''
 """Masses of the bodies of a scene over that of the structure."""
@@ -219,17 +218,44 @@ def site(tmp_path_factory):
     return folder
 
 
+#: runs command lines, each in its folder, as they come
+SERVER = """
+import contextlib, io, json, os, sys
+from vanedamp.studies.cli import main
+for line in sys.stdin:
+    folder, *arguments = json.loads(line)
+    os.chdir(folder)
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        try:
+            status = main(arguments)
+        except SystemExit as end:
+            status = end.code
+    print(json.dumps([status, out.getvalue(), error.getvalue()]), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def server(site):
+    """A process that finds the package."""
+    with subprocess.Popen(
+        [sys.executable, "-c", SERVER], env=environment() | {"PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])},
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        yield process
+        process.stdin.close()
+    assert process.returncode == 0
+
+
 @pytest.fixture
-def vanedamp(site, tmp_path):
-    """The command line in a process that finds the package, in a folder with a scene."""
+def vanedamp(server, tmp_path):
+    """The command line in that process, in a folder with a scene."""
     (tmp_path / "scene.toml").write_text(SCENE)
 
     def run(*arguments):
-        path = os.pathsep.join([str(site), str(ROOT)])
-        return subprocess.run(
-            [sys.executable, "-m", "vanedamp", *arguments], cwd=tmp_path, env=os.environ | {"PYTHONPATH": path},
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+        print(json.dumps([str(tmp_path), *arguments]), file=server.stdin, flush=True)
+        status, out, error = json.loads(server.stdout.readline())
+        return subprocess.CompletedProcess(arguments, status, out, without_stages(error))
 
     return run
 

@@ -13,7 +13,7 @@ import pytest
 from tests.tools.input_files import BLOCK, CLUSTER, DAMPED_BLOCK, SCENE
 from tests.tools.processes import ROOT
 from tests.tools.random_scenes import random_scene
-from tests.tools.schemas import faults, kind_of, shipped_schema
+from tests.tools.schemas import faults, kind_of, shipped_schemas
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.reference import options
 from vanedamp.files.toml_input import InputError, validate
@@ -48,7 +48,7 @@ def is_quantity(schema: dict[str, Any], node: dict[str, Any]) -> bool:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_key_is_described_and_every_quantity_has_a_unit(kind):
-    schema = shipped_schema(kind)
+    schema = shipped_schemas()[kind]
     keys = {f"{name}.{key}": node for name, table in tables_of(schema) for key, node in table["properties"].items()}
     assert len(keys) > 10
     assert not [key for key, node in keys.items() if not node.get("description")]

@@ -20,7 +20,7 @@ from docs._ext import commands, pages, python_api, toml_keys
 from docs.check_site import faults
 from tests.tools.input_files import SCENE
 from tests.tools.processes import ROOT, environment
-from tests.tools.schemas import shipped_schema
+from tests.tools.schemas import shipped_schemas
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -39,7 +39,7 @@ CHROMIUM = Path("/usr/bin/chromium")
 
 def keys_of(kind: str) -> set[str]:
     """Dotted names of all keys and tables in a schema, found otherwise than the reference does."""
-    schema, found = shipped_schema(kind), set()
+    schema, found = shipped_schemas()[kind], set()
 
     def descend(node: dict, path: str) -> None:
         for option in options(schema, node):
@@ -60,7 +60,7 @@ def keys_of(kind: str) -> set[str]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_reference_has_every_key(kind):
     written = set()
-    for table in toml_keys.tables(shipped_schema(kind)):
+    for table in toml_keys.tables(shipped_schemas()[kind]):
         written |= {table.path, table.path.removesuffix(".<name>"), *(table.dotted(key.name) for key in table.keys)}
     assert keys_of(kind) - written == set()
     assert len(keys_of(kind)) > {"scene": 90, "case": 60, "study": 100, "external": 8, "pipeline": 15}[kind]
@@ -68,12 +68,12 @@ def test_reference_has_every_key(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_keys_have_meanings_units_and_defaults(kind):
-    for table in toml_keys.tables(shipped_schema(kind)):
+    for table in toml_keys.tables(shipped_schemas()[kind]):
         for key in table.keys:
             assert key.meaning, (table.heading, key.name)
             assert not re.search(r"\[(m|N|kg|s|Hz|-)\]", key.meaning), key
     gap, mass = (
-        next(key for table in toml_keys.tables(shipped_schema("scene")) if table.path == path for key in table.keys
+        next(key for table in toml_keys.tables(shipped_schemas()["scene"]) if table.path == path for key in table.keys
              if key.name == name)
         for path, name in (("cavity", "gap"), ("damper", "mass"))
     )  # fmt: skip
@@ -83,7 +83,7 @@ def test_keys_have_meanings_units_and_defaults(kind):
 
 def test_anchors_of_keys_differ():
     for kind in KINDS:
-        anchors = [t.anchor(key.name) for t in toml_keys.tables(shipped_schema(kind)) for key in t.keys]
+        anchors = [t.anchor(key.name) for t in toml_keys.tables(shipped_schemas()[kind]) for key in t.keys]
         assert len(anchors) == len(set(anchors))
 
 

@@ -1,5 +1,8 @@
 """The shipped cluster: the mode it was drawn for, and the same frequencies from an independent finite element code."""
 
+import os
+from pathlib import Path
+
 import gmsh
 import numpy as np
 import pytest
@@ -91,6 +94,18 @@ def test_free_cluster_has_six_rigid_modes(coarse):
     assert modes.shapes @ (matrices.mass @ modes.shapes.T) == pytest.approx(np.eye(8), abs=1e-9)
     rotation = np.cross([1.0, 2.0, 3.0], matrices.coordinates).ravel()
     assert modes.shapes[:6].T @ (modes.shapes[:6] @ (matrices.mass @ rotation)) == pytest.approx(rotation, abs=1e-6)
+
+
+def test_factors_that_are_dropped_are_freed(coarse):
+    statistics = Path("/proc/self/statm")
+    if not statistics.exists():
+        pytest.skip("needs Linux's /proc")
+    matrix, held = coarse[1].of_free(coarse[1].stiffness), []
+    for _ in range(6):
+        factorize(matrix).solve(np.ones(len(coarse[1].free)))
+        held.append(int(statistics.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+    # the factors are twice as large as the matrix
+    assert held[-1] - held[0] < 2 * matrix.data.nbytes
 
 
 def independent_frequencies(path, count):

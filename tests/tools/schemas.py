@@ -13,14 +13,20 @@ from jsonschema import Draft202012Validator
 from tests.tools.processes import ROOT, environment
 from vanedamp.studies.file_kinds import KINDS
 
+PROGRAM = """
+import json
+from vanedamp.studies.file_kinds import KINDS
+print(json.dumps({name: kind.schema for name, kind in KINDS.items()}))
+"""
+
 
 @cache
-def shipped_schema(kind: str) -> dict[str, Any]:
-    """The schema of a kind of files in a process of its own, without the records that tests have registered here."""
-    command = [sys.executable, "-m", "vanedamp", "schema", kind]
+def shipped_schemas() -> dict[str, dict[str, Any]]:
+    """The schemas by kinds of files in a process of its own, without the records that tests have registered here."""
+    command = [sys.executable, "-c", PROGRAM]
     printed = subprocess.run(command, cwd=ROOT, env=environment(), capture_output=True, text=True, check=True)
-    schema: dict[str, Any] = json.loads(printed.stdout)
-    return schema
+    schemas: dict[str, dict[str, Any]] = json.loads(printed.stdout)
+    return schemas
 
 
 @cache
