@@ -148,8 +148,9 @@ def add_flow(
         if 2 * room > ROOM:
             flows = empty_flows(system, size)
         else:
-            more = empty_flows(system, size)
-            flows = Flows._make(np.concatenate(pair) for pair in zip(flows, more, strict=True))
+            earlier, flows = flows, empty_flows(system, 2 * size)
+            for part, filled in zip(flows, earlier, strict=True):
+                part[:size] = filled  # the rest takes no memory before it is filled
         free = np.flatnonzero(flows.modes == 0)
     place, key = free[0], closed.tobytes()
     subsystem = None if known is None else known.get(key)
