@@ -71,6 +71,21 @@ def test_linear_curves_are_the_receptance(result):
     )
 
 
+def test_linear_peaks_are_those_of_each_line():
+    """Masses move the peak with the body fixed; friction and restitution do not, in any order of the axes."""
+    frequencies = {"start": 0.95 * RESONANCE, "stop": 1.02 * RESONANCE, "num": 2}
+    axes = {"damper.0.friction": [0.1, 0.3], "damper.0.mass": [BODY, 2 * BODY], "damper.0.restitution": [0.4, 0.8]}
+    short = {"time.periods": 4, "time.transient": 1}
+    peaks = sweep(scene().replace({"sweep": axes | {"excitation.frequency": frequencies}, **short})).peaks
+    for i, mass in enumerate(axes["damper.0.mass"]):
+        alone = sweep(
+            scene().replace({"damper.0.mass": mass, "sweep": {"excitation.frequency": frequencies}, **short})
+        ).peaks
+        for name, values in peaks.items():
+            assert (values[:, i] == alone[name]).all(), name
+    assert (peaks["fixed_peak_frequency"][:, 0] > peaks["fixed_peak_frequency"][:, 1]).all()
+
+
 def test_bodies_in_a_closed_gap_are_fixed():
     frequencies = {"start": 0.9 * RESONANCE, "stop": RESONANCE, "num": 3}
     tight = scene(
