@@ -33,6 +33,13 @@ class IllConditioned(ArithmeticError):
     """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
+def grown(flows: Any, larger: Any) -> Any:
+    """Return a larger stack of flows, all zeros, with these at its beginning: what is not filled takes no memory."""
+    for part, filled in zip(larger, flows, strict=True):
+        part[: len(filled)] = filled
+    return larger
+
+
 class EventDrivenRun(ABC):
     """The mutable state of one run of an engine, and the flows of the subsystems that it has met.
 

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import expm, null_space
+from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.orbits.frame import Frame
@@ -87,10 +88,7 @@ class Dynamics:
         system = self.system
         bound = np.vstack([system.J, system.elongation]) != 0.0
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T @ bound)
-        joined = joined | joined.T | np.eye(len(joined), dtype=bool)
-        while not np.array_equal(joined, wider := joined @ joined):
-            joined = wider
-        return np.asarray(joined.argmax(axis=1))  # by the first coordinate of each
+        return np.asarray(connected_components(joined, directed=False)[1])
 
     def state(self, segment: Segment) -> np.ndarray:
         """Return u (2N,) at the start of a segment."""

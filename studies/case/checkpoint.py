@@ -41,7 +41,8 @@ class CaseCheckpoint(CheckpointFile):
                     self._solutions[int(number)] |= {name: values}
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        if self._path is not None and kind is not None and issubclass(kind, VanedampError) and kind is not StoreError:
+        of_the_case = kind is not None and issubclass(kind, VanedampError) and not issubclass(kind, StoreError)
+        if self._path is not None and of_the_case:
             clear(self._path)  # the case must be changed, and the solutions belong to no other
         else:
             super().__exit__(kind, *rest)

@@ -26,6 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.engine.line.peaks import GRIDS
 from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MOVES_ALIKE, SLOW, UNFELT
+from vanedamp.coupling.engine.run import grown
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
@@ -145,12 +146,7 @@ def add_flow(
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
         size, room = len(flows.modes), sum(part.nbytes for part in flows)
-        if 2 * room > ROOM:
-            flows = empty_flows(system, size)
-        else:
-            earlier, flows = flows, empty_flows(system, 2 * size)
-            for part, filled in zip(flows, earlier, strict=True):
-                part[:size] = filled  # the rest takes no memory before it is filled
+        flows = empty_flows(system, size) if 2 * room > ROOM else grown(flows, empty_flows(system, 2 * size))
         free = np.flatnonzero(flows.modes == 0)
     place, key = free[0], closed.tobytes()
     subsystem = None if known is None else known.get(key)

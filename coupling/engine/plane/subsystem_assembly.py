@@ -28,7 +28,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
     SQUARED,
     STIFFEST,
 )
-from vanedamp.coupling.engine.run import IllConditioned
+from vanedamp.coupling.engine.run import IllConditioned, grown
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
@@ -91,9 +91,8 @@ def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
     """
     flow = _flow(system, state)
     if flows.modes.all():
-        more = empty_flows(system, len(flows.modes))
-        full = sum(part.nbytes for part in flows) > _ROOM
-        flows = more if full else Flows(*(np.concatenate(pair) for pair in zip(flows, more, strict=True)))
+        size, full = len(flows.modes), sum(part.nbytes for part in flows) > _ROOM
+        flows = empty_flows(system, size) if full else grown(flows, empty_flows(system, 2 * size))
     s = int(np.argmin(flows.modes != 0))
     for name, value in flow.items():
         getattr(flows, name)[(s, *map(slice, np.shape(value)))] = value

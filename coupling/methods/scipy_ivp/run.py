@@ -126,17 +126,9 @@ class IvpRun:
         numbers = {"impacts": record.impacts, "changes": self.events, "evaluations": self.evaluations}
         log, bound = [np.array(record.log)] if record.log else [], _OPEN_LEDGER * max(self.options.rtol, _LEAST)
         return Outcome(
-            system,
-            record.records,
-            record.period,
-            record.impacts,
-            bound,
-            numbers,
-            log,
-            rows,
-            max(record.deep, 0.0),
+            system, record.records, record.period, record.impacts, bound, numbers, log, rows, max(record.deep, 0.0),
             plane,
-        )
+        )  # fmt: skip
 
     def final(self) -> None:
         """Return None: the states of contacts are no part of a motion that another run could begin with."""
