@@ -26,16 +26,16 @@ setup-%: ## install one group: product, tests, checks, browser, peers (VTK, Sico
 demo: setup-product ## the whole pipeline on the shipped mesh; the report is out/report.html
 	$(PYTHON) -m vanedamp demo -o out
 
-test: setup-tests ## the tests, fast tier; its end says what was skipped, and which command brings it
+test: setup-tests setup-docs ## the tests, fast tier; its end says what was skipped, and which command brings it
 	$(TESTS)
 
 test-all: setup ## the tests with the slow verification tier
 	$(TESTS) -m "slow or not slow"
 
-test-arithmetic: setup-tests ## the fast tier under the arithmetic of other processors, with a table (ARGUMENTS="generic TEST ...")
+test-arithmetic: setup-tests setup-docs ## the fast tier under the arithmetic of other processors, with a table (ARGUMENTS="generic TEST ...")
 	PYTHON=$(PYTHON) scripts/test_arithmetic.sh $(ARGUMENTS)
 
-test-last-bits: setup-tests ## the fast tier with other last bits of the libraries, under three new seeds (ARGUMENTS="SEED ... TEST ...")
+test-last-bits: setup-tests setup-docs ## the fast tier with other last bits of the libraries, under three new seeds (ARGUMENTS="SEED ... TEST ...")
 	PYTHON=$(PYTHON) scripts/test_last_bits.sh $(ARGUMENTS)
 
 test-versions: ## the finite element tests on Debian 13 (PyPI's dolfinx and apt's) and unstable, in root folders of their own
