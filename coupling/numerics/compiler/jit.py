@@ -34,7 +34,7 @@ _OPTIONS: dict[str, Any] = {
 _NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
-_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@intrinsic", "(NamedTuple)")
+_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@strict", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[3]
 
 
@@ -48,6 +48,9 @@ inlined: _Decorator = njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)
 summing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
 #: a kernel that compares many numbers, several at once; what it returns for NaN is anything
 comparing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS)
+
+#: a kernel whose results do not depend on where it is compiled into: no two operations become one
+strict: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": False}, pipeline_class=KERNEL)
 
 
 class CacheError(VanedampError):
