@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -47,11 +47,11 @@ class Columns(NamedTuple):
     free_travel: Annotated[np.ndarray, "k r"]
     limit: Annotated[np.ndarray, "k r"]
     restitution: Annotated[np.ndarray, "k r"]
-    # the start, as in response.restart_state: modal coordinates and their rates, slips and their rates, elongations
-    p: Annotated[np.ndarray, "k n"]
-    p_rate: Annotated[np.ndarray, "k n"]
+    # the start, as in response.restart_state.RestartState
+    displacement: Annotated[np.ndarray, "k n"]
+    velocity: Annotated[np.ndarray, "k n"]
     slip: Annotated[np.ndarray, "k b"]
-    slip_rate: Annotated[np.ndarray, "k b"]
+    slip_velocity: Annotated[np.ndarray, "k b"]
     elongation: Annotated[np.ndarray, "k d"]
 
 
@@ -105,13 +105,8 @@ def columns(
 
     whole, system, start: of the scene itself.
     """
-    size = len(next(iter(values.values())))
-    found = Columns(*(_repeated(size, value) for value in (
-        system.omega, system.period, system.frequency, system.load, system.rest, system.free_travel, system.limit,
-        system.restitution, start.displacement / system.scale, start.velocity / system.scale, start.slip,
-        start.slip_velocity, start.elongation,
-    )))  # fmt: skip
-    restitution = _repeated(size, np.array([damper.restitution for damper in scene.damper]))
+    found = repeated(system, start, len(next(iter(values.values()))))
+    restitution = np.tile([damper.restitution for damper in scene.damper], (len(found.omega), 1))
     for path, numbers in values.items():
         place = entries_of(scene, path)
         assert place is not None
@@ -123,7 +118,7 @@ def columns(
         elif table == "excitation":
             _set_level(scene, found, numbers if key == "force" else numbers / chosen_resonance(scene).flexibility)
         elif table == "initial":
-            (found.p if key == "displacement" else found.p_rate)[:] = (numbers / system.scale)[:, None]
+            getattr(found, key)[:] = numbers[:, None]
         elif key == "gap":
             rows = _rows(whole, system, np.isin(whole.cavity, entries))
             walls = rows[np.isin(whole.surface[rows - system.friction_rows], (LEFT, RIGHT))]
@@ -135,14 +130,19 @@ def columns(
         elif key == "restitution":
             restitution[:, entries] = numbers[:, None]
         else:
-            (found.slip if key == "position" else found.slip_rate)[:, entries] = numbers[:, None]
+            (found.slip if key == "position" else found.slip_velocity)[:, entries] = numbers[:, None]
     if any(path.endswith(".restitution") for path in values):
         _set_restitution(scene, whole, system, found, restitution)
     return found
 
 
-def _repeated(size: int, value: Any) -> np.ndarray:
-    return np.repeat(np.asarray(value)[None], size, axis=0)
+def repeated(system: LineSystem, start: RestartState, size: int = 1) -> Columns:
+    """Return the columns of as many equal scenes."""
+    row = (
+        system.omega, system.period, system.frequency, system.load, system.rest, system.free_travel, system.limit,
+        system.restitution, start.displacement, start.velocity, start.slip, start.slip_velocity, start.elongation,
+    )  # fmt: skip
+    return Columns(*(np.repeat(np.asarray(value)[None], size, axis=0) for value in row))
 
 
 def _rows(whole: System, system: LineSystem, bodies: np.ndarray) -> np.ndarray:
@@ -167,7 +167,7 @@ def _set_restitution(
         unit = row - system.friction_rows
         own, other = restitution[:, whole.body[unit]], whole.other[unit]
         found.restitution[:, row] = own if other < 0 else [
-            scene.contact.pair_restitution(*pair) for pair in zip(own.tolist(), restitution[:, other].tolist())
+            scene.contact.pair_restitution(*pair) for pair in zip(own.tolist(), restitution[:, other].tolist(), strict=True)
         ]  # fmt: skip
 
 

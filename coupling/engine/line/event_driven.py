@@ -6,8 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.line import automaton
+from vanedamp.coupling.engine.line.columns import repeated
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.engine.line.scenes import JOB, run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.engine.line.subsystem_assembly import Subsystem, add_flow, empty_flows
 from vanedamp.coupling.engine.run import EventDrivenRun
@@ -27,7 +28,6 @@ from vanedamp.coupling.numerics.codes import (
     SPRUNG,
     STICK,
     TOUCHING,
-    UNDECIDED,
 )
 from vanedamp.coupling.numerics.tolerances import RESOLUTION
 from vanedamp.coupling.response.event_log import rows_of_line
@@ -66,13 +66,14 @@ class EngineRun(EventDrivenRun):
         self.known: dict[bytes, Subsystem] = {}
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.state = new_state(system, modes, start)
+        self.state, self.columns = new_state(system, modes), repeated(system, start)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
-        self._advance_compiled = automaton.advance
-        if is_common(system, modes) and hasattr(automaton.advance, "sized"):
-            self._advance_compiled = automaton.advance.sized(
-                system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
+        self.job = np.zeros(JOB, np.int64)
+        self._run = run
+        if is_common(system, modes) and hasattr(run, "sized"):
+            self._run = run.sized(
+                self.job, self.columns, system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
             )
 
     def reuse(self, earlier: EngineRun) -> None:
@@ -94,13 +95,12 @@ class EngineRun(EventDrivenRun):
                 complex_modes(np.sqrt(modes.stiffness), modes.damping)
             except IllConditioned as error:
                 raise InputError(f"structure: {error}; change its damping slightly") from None
-        if not automaton.begin(self.system, self.state, self.records, self.scratch):
-            return UNDECIDED
         return self.advance(0, max_events)
 
     def _advance(self, periods: int, max_events: int) -> int:
-        return int(self._advance_compiled(
-            self.system, self.flows, self.state, self.event_functions, self.records, self.scratch, periods, max_events
+        return int(self._run(
+            self.job, self.columns, self.system, self.flows, self.state, self.event_functions, self.records,
+            self.scratch, periods, max_events,
         ))  # fmt: skip
 
     def _add_flow(self) -> None:

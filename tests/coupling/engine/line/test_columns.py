@@ -39,8 +39,7 @@ def _row(scene: Scene) -> list[np.ndarray]:
         np.asarray(value)
         for value in (
             system.omega, system.period, system.frequency, system.load, system.rest, system.free_travel, system.limit,
-            system.restitution, start.displacement / system.scale, start.velocity / system.scale, start.slip,
-            start.slip_velocity, start.elongation,
+            system.restitution, start.displacement, start.velocity, start.slip, start.slip_velocity, start.elongation,
         )
     ]  # fmt: skip
 
