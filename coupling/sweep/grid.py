@@ -206,7 +206,7 @@ def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
     grid are scenes, so is what lies between. A frequency is good or bad whatever the other values are.
     """
     known = [path for path in columned(points.base, axes) if _ordered(axes[path])]
-    ends = axes | {path: (min(axes[path]), max(axes[path])) for path in known}
+    ends = dict(axes) | {path: (min(axes[path]), max(axes[path])) for path in known}
     with suppress(InputError):  # raised below, at the first point that is no scene
         return [points.raw(dict(zip(axes, values, strict=True))) for values in itertools.product(*ends.values())]
     first = {path: values[0] for path, values in axes.items()}
