@@ -8,9 +8,11 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import repeated
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
 from vanedamp.coupling.engine.line.scenes import JOB, run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.line.subsystem_assembly import Subsystem, add_flow, empty_flows
+from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.engine.line.subsystems import Known
 from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import (
     ACTIVE,
@@ -40,8 +42,10 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: parts of a system that decide its subsystems (line.subsystem_assembly.Subsystem)
-_OF_SUBSYSTEMS = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
+#: parts of a system that decide its subsystems (line.subsystems.Subsystems)
+_OF_SUBSYSTEMS = (
+    "stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot", "response",
+)  # fmt: skip
 
 
 def is_common(system: LineSystem, modes: int) -> bool:
@@ -63,7 +67,7 @@ class EngineRun(EventDrivenRun):
     ) -> None:  # fmt: skip
         super().__init__(whole, records, events, max_events)
         self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
-        self.known: dict[bytes, Subsystem] = {}
+        self.known, self.assembly_scratch = Known(system), new_assembly_scratch(system)
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.columns = new_state(system, modes), repeated(system, start)
@@ -104,7 +108,7 @@ class EngineRun(EventDrivenRun):
         ))  # fmt: skip
 
     def _add_flow(self) -> None:
-        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
+        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known, self.assembly_scratch)
 
     def _segment(self) -> Segment:
         # roots of other segments do not apply
