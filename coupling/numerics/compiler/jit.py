@@ -134,21 +134,28 @@ def _sources(file: Path) -> str:
 
     The imports of other files are data: they do not enter the code.
     """
-    texts: dict[Path, str] = {}
+    found: set[Path] = set()
     waiting = [file]
     while waiting:
         path = waiting.pop()
-        if path in texts:
-            continue
-        texts[path] = path.read_text(encoding="utf-8")
-        if any(mark in texts[path] for mark in _MARKS):
-            names = re.findall(r"^from vanedamp\.([\w.]+) import", texts[path], re.MULTILINE)
-            files = [_PACKAGE / f"{name.replace('.', '/')}.py" for name in names]
-            waiting += [name for name in files if name.is_file()]
+        if path not in found:
+            found.add(path)
+            waiting += _read(path)[1]
     digest = hashlib.sha256()
-    for path in sorted(texts):
-        digest.update(texts[path].encode())
+    for path in sorted(found):
+        digest.update(_read(path)[0])
     return digest.hexdigest()
+
+
+@cache
+def _read(path: Path) -> tuple[bytes, list[Path]]:
+    """Return the text of a file, and the imports that it has as a file of functions or records."""
+    text = path.read_text(encoding="utf-8")
+    if not any(mark in text for mark in _MARKS):
+        return text.encode(), []
+    names = re.findall(r"^from vanedamp\.([\w.]+) import", text, re.MULTILINE)
+    files = [_PACKAGE / f"{name.replace('.', '/')}.py" for name in names]
+    return text.encode(), [name for name in files if name.is_file()]
 
 
 class NotCompiled(Exception):
