@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,15 +31,30 @@ from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.system import System
 
 
+#: bytes that the subsystems of one run may take
+ROOM = 2**29
+
+
 class IllConditioned(ArithmeticError):
     """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
-def grown(flows: Any, larger: Any) -> Any:
-    """Return a larger stack of flows, all zeros, with these at its beginning: what is not filled takes no memory."""
-    for part, filled in zip(larger, flows, strict=True):
-        part[: len(filled)] = filled
-    return larger
+def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any]) -> tuple[Any, int]:
+    """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
+
+    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory. Many
+    bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    """
+    free = np.flatnonzero(filled == 0)
+    if len(free):
+        return stack, int(free[0])
+    size = len(filled)
+    if 2 * sum(part.nbytes for part in stack) > ROOM:
+        return empty(size), 0
+    larger = empty(2 * size)
+    for part, old in zip(larger, stack, strict=True):
+        part[:size] = old
+    return larger, size
 
 
 class EventDrivenRun(ABC):

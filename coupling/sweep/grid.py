@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
@@ -144,14 +146,11 @@ def grid(scene: Scene) -> Grid:
         if path.split(".")[0] in _OF_OTHERS:
             raise InputError(f"sweep: {path} changes no run of a sweep; its table is for another command")
     points = Points(replace(scene, sweep={}))
-    first, linked, undecided = None, False, False
-    for values in _telling(axes):
-        made = points.raw(values)
-        first = first or made
+    first, linked, undecided = points.raw({path: values[0] for path, values in axes.items()}), False, False
+    for made in _telling(points, axes):
         linked = linked or made.continuation.direction != "independent"
         undecided = undecided or leaves_open(made)
         _check_method(made)
-    assert first is not None
     along = _along(scene, axes) if linked else None
     base = base_scene(scene)
     points = Points(base)
@@ -200,14 +199,21 @@ def _check_speeds(points: Points, axes: Mapping[str, Sequence[Any]]) -> None:
             structure_basis(structure, fastest.speed)
 
 
-def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
-    """Yield points that decide whether all are scenes: a frequency is good or bad whatever the other values are."""
+def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
+    """Return scenes that decide whether all points are scenes. Raises InputError for a point that is none.
+
+    What has a column (engine.line.columns) has bounds that are linear in all such numbers: where the corners of the
+    grid are scenes, so is what lies between. A frequency is good or bad whatever the other values are.
+    """
+    known = [path for path in columned(points.base, axes) if _ordered(axes[path])]
+    ends = dict(axes) | {path: (min(axes[path]), max(axes[path])) for path in known}
+    with suppress(InputError):  # raised below, at the first point that is no scene
+        return [points.raw(dict(zip(axes, values, strict=True))) for values in itertools.product(*ends.values())]
     first = {path: values[0] for path, values in axes.items()}
     others = {path: values for path, values in axes.items() if path != FREQUENCY}
-    for values in itertools.product(*others.values()):
-        yield first | dict(zip(others, values, strict=True))
-    for frequency in axes.get(FREQUENCY, ()):
-        yield first | {FREQUENCY: frequency}
+    told = [dict(zip(others, values, strict=True)) for values in itertools.product(*others.values())]
+    told += [{FREQUENCY: frequency} for frequency in axes.get(FREQUENCY, ())]
+    return [points.raw(first | values) for values in told]
 
 
 def _check_method(scene: Scene) -> None:

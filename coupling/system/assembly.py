@@ -240,13 +240,18 @@ def _with_scales(system: System) -> System:
     return system._replace(moment=_MOMENT * shortest, speed=float(speed))
 
 
+def pressing(scene: Scene, loads: BodyLoads | None = None) -> list[float]:
+    """Return the force (b,) that presses each body on its floor, N; negative: off it."""
+    across = (body_loads(scene, basis_of(scene)) if loads is None else loads).across
+    return [
+        damper.mass * float(pull) if damper.normal_load is None else damper.normal_load
+        for damper, pull in zip(scene.damper, across, strict=True)
+    ]
+
+
 def _holding(scene: Scene, loads: BodyLoads) -> np.ndarray:
     """Return the friction (b,) that holds each body on its floor under its weight, at most, N."""
-    pressed = [
-        damper.mass * float(across) if damper.normal_load is None else damper.normal_load
-        for damper, across in zip(scene.damper, loads.across, strict=True)
-    ]
-    bodies = zip(scene.damper, pressed, strict=True)
+    bodies = zip(scene.damper, pressing(scene, loads), strict=True)
     return np.array([coefficient(damper.friction) * max(force, 0.0) for damper, force in bodies])
 
 

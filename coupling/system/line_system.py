@@ -136,23 +136,3 @@ def _body_of(moved: np.ndarray) -> np.ndarray:
     """Return which body (k,) widens each gap as it moves on, of rows (k, b) of the bodies; -1: none."""
     return np.where((moved > 0.0).any(axis=1), (moved > 0.0).argmax(axis=1) if moved.shape[1] else -1, -1)
 
-
-def row_motion(
-    system: LineSystem, slip: np.ndarray, slip_velocity: np.ndarray, p: np.ndarray, p_rate: np.ndarray,
-    elongation: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
-
-    elongation: (friction dampers,) of the springs before the sliders, m.
-    """
-    b, friction = system.bodies, system.friction_rows
-    # slips are relative to the floor, so that a body at relative rest is known to be so
-    on_structure, on_bodies = system.of_structure.J, system.of_bodies.J
-    displacement = on_bodies @ slip + system.rest
-    speed = on_structure @ p_rate + on_bodies @ (slip_velocity + system.floor @ p_rate)
-    moved = on_structure @ p + on_bodies @ (system.floor @ p)
-    speed[:b], moved[:b] = slip_velocity, 0.0
-    displacement += moved
-    springs = np.isfinite(system.spring[b:friction])
-    displacement[b:friction][springs] = elongation[springs]
-    return displacement, speed

@@ -55,27 +55,31 @@ class LinearResponse:
     table: np.ndarray
     order: np.ndarray
 
-    def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
+    def amplitude(self, frequencies: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
         """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak per period.
 
-        Infinite at a frequency that is, to the last bit, a resonance without damping.
+        load: (f, e, n) at each of them in place of its own. Infinite at a frequency that is, to the last bit, a
+        resonance without damping. The same digits for one frequency as for many.
         """
-        waves = np.array([self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))])
+        frequencies = np.asarray(frequencies, float)
+        loads = np.broadcast_to(self.load if load is None else load, (len(frequencies), *self.load.shape))
+        waves = np.array([self._wave(h, frequencies, loads[:, h]) for h in range(len(self.order))])
         finite = np.isfinite(waves).all(axis=0)
         amplitude = np.full(len(finite), np.inf)
         amplitude[finite] = np.abs(waves[0, finite]) if len(waves) == 1 else peaks(waves[:, finite], self.order)
         return amplitude
 
-    def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
-        """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
+    def _wave(self, h: int, frequencies: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,), Hz; load: (f, n)."""
         omega = 2 * np.pi * self.order[h] * frequencies
         try:
-            motion = steady_motion(self.stiffness, self.damping, self.mass, self.load[h], omega)
+            motion = steady_motion(self.stiffness, self.damping, self.mass, load, omega)
         except np.linalg.LinAlgError:
             if len(frequencies) == 1:
                 return np.array([complex(np.inf)])
-            return np.concatenate([self._wave(h, half) for half in np.array_split(frequencies, 2)])
-        wave: np.ndarray = motion @ self.response + self.table[h]
+            halves = (np.array_split(part, 2) for part in (frequencies, load))
+            return np.concatenate([self._wave(h, *half) for half in zip(*halves, strict=True)])
+        wave: np.ndarray = (motion * self.response).sum(axis=1) + self.table[h]
         return wave
 
     def peak(self, low: float, high: float) -> LinearPeak:

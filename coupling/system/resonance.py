@@ -71,13 +71,13 @@ def force_shapes(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.nd
 def steady_motion(
     stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, force: np.ndarray, omega: np.ndarray
 ) -> np.ndarray:
-    """Return the complex modal coordinates (f, n) under modal forces (n,) at angular frequencies (f,).
+    """Return the complex modal coordinates (f, n) under modal forces (n,), or (f, n), at angular frequencies (f,).
 
     Raises LinAlgError at a resonance without damping.
     """
     omega = omega[:, None, None]
     dynamic = np.diag(stiffness) + 1j * omega * damping - omega**2 * mass
-    loads = np.broadcast_to(force[:, None], (len(omega), len(force), 1))
+    loads = np.broadcast_to(force[..., None], (len(omega), force.shape[-1], 1))
     return np.asarray(np.linalg.solve(dynamic, loads)[:, :, 0])
 
 

@@ -211,8 +211,10 @@ def later(data: dict) -> tuple[float, Callable] | None:
 
     def change(run):
         run.system = turned(np.exp(1j * system.omega * time))(run.system)
-        run.state.displacement[:], run.state.velocity[:] = moment.gap, moment.speed
-        run.state.coordinates[:] = np.r_[moment.p, moment.p_rate]
+        start, b = run.columns, system.bodies
+        start.displacement[0], start.velocity[0] = system.scale * moment.p, system.scale * moment.p_rate
+        start.slip[0], start.slip_velocity[0] = moment.gap[:b], moment.speed[:b]
+        start.elongation[0] = moment.gap[b : system.friction_rows]
 
     return time / system.period, change
 

@@ -65,7 +65,7 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
     VELOCITY,
 )
-from vanedamp.coupling.numerics.compiler.jit import comparing, entry, inlined, kernel, summing
+from vanedamp.coupling.numerics.compiler.jit import comparing, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import (
     exp_minus_line,
     exp_minus_one,
@@ -81,7 +81,7 @@ from vanedamp.coupling.response.records import FRICTION
 _SLICE = 4096
 
 
-@entry
+@kernel
 def advance(system, flows, st, watched, rec, scratch, periods, max_events):
     """Run until all periods are done or something is needed. Return the code (numerics.codes) of why it returns."""
     deciding, segments = False, 0
@@ -174,7 +174,7 @@ def _end_period(system, flows, st, watched, rec, scratch, tau):
     align_gaps(system, st, scratch.coordinates)
 
 
-@entry
+@kernel
 def begin(system, st, rec, scratch):
     """Decide the contact states of the initial state. Return False if that fails."""
     hit = False

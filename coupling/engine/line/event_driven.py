@@ -6,10 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.line import automaton
+from vanedamp.coupling.engine.line.columns import repeated
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
+from vanedamp.coupling.engine.line.scenes import JOB, run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.line.subsystem_assembly import Subsystem, add_flow, empty_flows
+from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.engine.line.subsystems import Known
 from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import (
     ACTIVE,
@@ -27,7 +30,6 @@ from vanedamp.coupling.numerics.codes import (
     SPRUNG,
     STICK,
     TOUCHING,
-    UNDECIDED,
 )
 from vanedamp.coupling.numerics.tolerances import RESOLUTION
 from vanedamp.coupling.response.event_log import rows_of_line
@@ -40,8 +42,10 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: parts of a system that decide its subsystems (line.subsystem_assembly.Subsystem)
-_OF_SUBSYSTEMS = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
+#: parts of a system that decide its subsystems (line.subsystems.Subsystems)
+_OF_SUBSYSTEMS = (
+    "stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot", "response",
+)  # fmt: skip
 
 
 def is_common(system: LineSystem, modes: int) -> bool:
@@ -63,16 +67,17 @@ class EngineRun(EventDrivenRun):
     ) -> None:  # fmt: skip
         super().__init__(whole, records, events, max_events)
         self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
-        self.known: dict[bytes, Subsystem] = {}
+        self.known, self.assembly_scratch = Known(system), new_assembly_scratch(system)
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.state = new_state(system, modes, start)
+        self.state, self.columns = new_state(system, modes), repeated(system, start)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
-        self._advance_compiled = automaton.advance
-        if is_common(system, modes) and hasattr(automaton.advance, "sized"):
-            self._advance_compiled = automaton.advance.sized(
-                system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
+        self.job = np.zeros(JOB, np.int64)
+        self._run = run
+        if is_common(system, modes) and hasattr(run, "sized"):
+            self._run = run.sized(
+                self.job, self.columns, system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
             )
 
     def reuse(self, earlier: EngineRun) -> None:
@@ -94,17 +99,16 @@ class EngineRun(EventDrivenRun):
                 complex_modes(np.sqrt(modes.stiffness), modes.damping)
             except IllConditioned as error:
                 raise InputError(f"structure: {error}; change its damping slightly") from None
-        if not automaton.begin(self.system, self.state, self.records, self.scratch):
-            return UNDECIDED
         return self.advance(0, max_events)
 
     def _advance(self, periods: int, max_events: int) -> int:
-        return int(self._advance_compiled(
-            self.system, self.flows, self.state, self.event_functions, self.records, self.scratch, periods, max_events
+        return int(self._run(
+            self.job, self.columns, self.system, self.flows, self.state, self.event_functions, self.records,
+            self.scratch, periods, max_events,
         ))  # fmt: skip
 
     def _add_flow(self) -> None:
-        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
+        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known, self.assembly_scratch)
 
     def _segment(self) -> Segment:
         # roots of other segments do not apply

@@ -11,12 +11,11 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine.root_search import Expansion, new_expansion
-from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
+from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.system.line_system import LineSystem, row_motion
+from vanedamp.coupling.system.line_system import LineSystem
 
 
 @record
@@ -31,18 +30,18 @@ class State(NamedTuple):
     amplitude: Annotated[np.ndarray, "m", complex]
     # real and imaginary parts of their changes since the interval began (line.energy_balance)
     change: Annotated[np.ndarray, "2m"]
-    displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation
+    displacement: Annotated[np.ndarray, "r"]  # of each row, m; of a friction row's spring: its elongation
     low_word: Annotated[np.ndarray, "r"]  # of slips, sums of two doubles: the part beyond `displacement`, m
-    velocity: np.ndarray  # (r,) of each row, m/s
+    velocity: Annotated[np.ndarray, "r"]  # of each row, m/s
     contact_impulse: Annotated[np.ndarray, "r"]  # impulse of a compliant contact since it began, N s
     ledger: Annotated[np.ndarray, "energies"]  # energies since the start, J
 
     # changes at impacts and at the start of a period
     largest_speed: Annotated[np.ndarray, "1"]  # bound of the structure's speeds, m/s: scale of their round-off
-    last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
+    last_impact: Annotated[np.ndarray, "r"]  # time of the last impact, counted from the period's start, s
 
     # changes with the contact states, or is set with their event functions
-    state: np.ndarray  # (r,) int: state of each row
+    state: Annotated[np.ndarray, "r", int]  # state of each row
     active_set: Annotated[np.ndarray, "r", bool]  # the counters[CLOSED_ROWS] closed rows, which name the subsystem
     # bound at which a row's force was when it released at this instant, otherwise 0; -bound: a spring that starts to
     # carry load at that bound
@@ -51,7 +50,7 @@ class State(NamedTuple):
     capture_speed: Annotated[np.ndarray, "r"]  # rebounds slower than this are completed as a plastic impact, m/s
 
     # set when a subsystem begins
-    coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
+    coordinates: Annotated[np.ndarray, "2n"]  # p and p' of the structure at that time
     constant: Annotated[np.ndarray, "n"]  # constant part of p
     offset: Annotated[np.ndarray, "1"]  # of the response, m
     slip_constant: Annotated[np.ndarray, "b"]  # constant part of the displacements of bodies on springs, m
@@ -131,18 +130,9 @@ class Scratch(NamedTuple):
     problem: Problem
 
 
-def new_state(system: LineSystem, modes: int, start: RestartState) -> State:
-    """Return the state at time zero; `modes` is the number of complex modes that fit."""
-    p, rate = (structure / system.scale for structure in (start.displacement, start.velocity))
-    displacement, velocity = row_motion(system, start.slip, start.slip_velocity, p, rate, start.elongation)
-    friction = np.arange(len(displacement)) < system.friction_rows
-    state = room(
-        State, _sizes(system, modes), displacement=displacement, velocity=velocity,
-        last_impact=np.full(len(displacement), -np.inf), state=np.where(friction, COAST, OPEN),
-        coordinates=np.r_[p, rate],
-    )  # fmt: skip
-    state.amplitude[: len(system.frequency)] = 1.0
-    return state
+def new_state(system: LineSystem, modes: int) -> State:
+    """Return storage for a state, which a scene's start sets (line.scenes); `modes` complex modes fit."""
+    return room(State, _sizes(system, modes))
 
 
 def new_event_functions(system: LineSystem, modes: int) -> EventFunctions:

@@ -28,14 +28,11 @@ from vanedamp.coupling.engine.plane.tolerances import (
     SQUARED,
     STIFFEST,
 )
-from vanedamp.coupling.engine.run import IllConditioned, grown
+from vanedamp.coupling.engine.run import IllConditioned, with_free_place
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
 from vanedamp.coupling.system.system import System
-
-#: bytes that the flows of one run may take
-_ROOM = 2**28
 
 
 @record
@@ -90,10 +87,7 @@ def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
     Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
     """
     flow = _flow(system, state)
-    if flows.modes.all():
-        size, full = len(flows.modes), sum(part.nbytes for part in flows) > _ROOM
-        flows = empty_flows(system, size) if full else grown(flows, empty_flows(system, 2 * size))
-    s = int(np.argmin(flows.modes != 0))
+    flows, s = with_free_place(flows, flows.modes, lambda size: empty_flows(system, size))
     for name, value in flow.items():
         getattr(flows, name)[(s, *map(slice, np.shape(value)))] = value
     return flows

@@ -57,6 +57,9 @@ comparing: _Decorator = njit(
     **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS
 )
 
+#: a kernel whose results do not depend on where it is compiled into: no two operations become one
+strict: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": False}, pipeline_class=KERNEL)
+
 
 class CacheError(VanedampError):
     """Compiled functions have no folder to be kept in: every process would compile them again, for a minute."""

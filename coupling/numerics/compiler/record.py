@@ -24,6 +24,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
+    intrinsic,
     lower_getattr_generic,
     models,
     register_model,
@@ -186,6 +187,30 @@ def _load(builder: Any, place: Any, never: Any) -> Any:
         part = _load(builder, cgutils.gep_inbounds(builder, place, 0, i), never)
         whole = builder.insert_value(whole, part, i)
     return whole
+
+
+@intrinsic
+def changed(typing_context, record, name, number):
+    """Return a record with another number in a field: `changed(system, "period", 0.5)`, in compiled functions.
+
+    It stays as it is until the next change at the same place in the code.
+    """
+
+    def code(context, builder, signature, values):
+        kind = context.get_value_type(record).pointee
+        copy = cgutils.alloca_once(builder, kind)
+        builder.store(builder.load(values[0]), copy)
+        place = list(record.fields).index(name.literal_value)
+        builder.store(values[2], cgutils.gep_inbounds(builder, copy, 0, place))
+        # loads from a record are marked as those of what never changes: none may be taken from before this point
+        pointer = cgutils.alloca_once(builder, copy.type)
+        builder.store_atomic(copy, pointer, "seq_cst", 8)
+        builder.fence("seq_cst")
+        return builder.load_atomic(pointer, "seq_cst", 8)
+
+    if not (isinstance(record, Record) and isinstance(name, types.StringLiteral)):
+        return None
+    return record(record, name, record.fields[name.literal_value]), code
 
 
 @unbox(Record)

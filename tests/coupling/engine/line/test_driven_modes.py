@@ -11,7 +11,7 @@ import pytest
 
 from tests.reference.comparison import follow
 from tests.tools.laws_by_event import check_events
-from vanedamp.coupling.engine.line import subsystem_assembly as flow
+from vanedamp.coupling.engine.line import subsystem_assembly, subsystems
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
@@ -92,13 +92,14 @@ SCENES = {
 @pytest.fixture
 def driven(monkeypatch):
     """Numbers of driven modes in the subsystems that runs have met."""
-    found, fill = [], flow._fill
+    found, fill = [], subsystem_assembly.fill
 
-    def watched(flows, system, s, subsystem):
-        fill(flows, system, s, subsystem)
+    def watched(system, stack, k, flows, s, scratch):
+        resolved = fill(system, stack, k, flows, s, scratch)
         found.append(int(np.ptp(flows.driven[s])))
+        return resolved
 
-    monkeypatch.setattr(flow, "_fill", watched)
+    monkeypatch.setattr(subsystem_assembly, "fill", watched)
     return found
 
 
@@ -124,7 +125,7 @@ def test_first_impact(damping_ratio):
     """Where the structure from rest reaches half the gap, to 1e-14 periods near resonance and 1e-12 further off.
 
     A root is the time's round-off away from the truth, some 1e-16 periods a period; where the mode is not driven, the
-    response in step with the excitation and the free one cancel by up to 2 pi/flow.NEAR.
+    response in step with the excitation and the free one cancel by up to 2 pi/DRIVEN.
     """
     mpmath = pytest.importorskip("mpmath")
     for detuning in (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 2.5e-3, 1e-2):
@@ -190,7 +191,7 @@ def test_driven_or_not_is_the_same(name, monkeypatch, driven, tmp_path):
     one = simulate(case, events=True, samples_per_period=16)
     assert any(driven)
     driven.clear()
-    monkeypatch.setattr(flow, "DRIVEN", 0.0)
+    monkeypatch.setattr(subsystems, "DRIVEN", 0.0)
     two = simulate(case, events=True, samples_per_period=16)
     assert not any(driven)
     assert len(one.event_list) == len(two.event_list) > 10

@@ -77,7 +77,7 @@ def resting():
 
 def test_runs_of_sliders_return_now_and_then(resting):
     calls = []
-    resting._advance_compiled = counted(resting._advance_compiled, calls)
+    resting._run = counted(resting._run, calls)
     assert resting.advance_to(10_000) is Status.OK
     assert resting.state.counters[SEGMENTS] >= 10_000
     assert len(calls) >= 3

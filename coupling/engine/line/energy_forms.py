@@ -1,0 +1,284 @@
+"""The energies of a flow as forms of its amplitudes: antiderivatives of line.subsystem_assembly.Flows."""
+
+from __future__ import annotations
+
+from vanedamp.coupling.engine.line.tolerances import SLOW
+from vanedamp.coupling.numerics.codes import (
+    CALM,
+    DIFFERENCE,
+    FREE_MOMENTUM_MAP,
+    HARMONIC_MAP,
+    MEAN_MAP,
+    MOMENTUM_MAP,
+    SINGLE,
+    SUM,
+    WORK_MAP,
+)
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.elimination import reciprocal
+
+
+@kernel
+def set_energies(system, flows, s, m, scratch):
+    """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
+    n, e, rows = system.modes, len(system.frequency), len(system.spring)
+    left, right, span = scratch.left, scratch.right, scratch.span
+    _set_linear(system, flows, s, m, scratch)
+    pairs = _invert_rates(flows, s, m, system.period, scratch)
+    for j in range(m):
+        span[j, 0], span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
+    _split(flows.shape[s, :m, n:], left)
+    _damp(system.damping, left, right, span, m, n, system.proportional)
+    _set_form(flows, s, m, scratch, flows.loss[s], flows.slow_loss[s], pairs)
+    if flows.damped[s]:
+        width = 0
+        for r in range(rows):
+            if flows.active_set[s, r] and system.dashpot[r] > 0.0:
+                for j in range(m):
+                    push = flows.velocity[s, r, j]
+                    left[0, j, width], left[1, j, width] = push.real, push.imag
+                    right[0, j, width], right[1, j, width] = push.real * system.dashpot[r], push.imag * system.dashpot[r]
+                width += 1
+        for j in range(m):
+            span[j, 0], span[j, 1] = 0, width
+        _set_form(flows, s, m, scratch, flows.dashpot[s], flows.slow_dashpot[s], pairs)
+    for j in range(m):
+        span[j, 0], span[j, 1], part = 0, 1, flows.response[s, j]
+        left[0, j, 0], left[1, j, 0], right[0, j, 0], right[1, j, 0] = part.real, part.imag, part.real, part.imag
+    _set_form(flows, s, m, scratch, flows.square[s], flows.slow_square[s], pairs)
+    flows.slow_count[s] = _list_single(flows, s, m, e, system.period, pairs)
+    for r in range(rows):
+        change = flows.impulse_response[s, r, :m]
+        _kick(change, flows.loss[s], flows.kick[s, r, 0])
+        _kick(change, flows.square[s], flows.kick[s, r, 1])
+        if flows.damped[s]:
+            _kick(change, flows.dashpot[s], flows.kick[s, r, 2])
+        for c in range(flows.kick_maps.shape[2]):
+            total = 0.0
+            for j in range(m):
+                total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
+            flows.kick_maps[s, r, c] = total
+
+
+@inlined
+def _is_slow(rate, period):
+    """Whether a product with this rate hardly changes over a period."""
+    return rate.real * rate.real + rate.imag * rate.imag < (SLOW / period) * (SLOW / period)
+
+
+@kernel
+def _set_linear(system, flows, s, m, scratch):
+    """Set the linear maps, by the columns of numerics.codes."""
+    n, e, linear, driven, load = system.modes, len(system.frequency), flows.linear[s], flows.driven[s], flows.load[s]
+    along, against, part = scratch.along, scratch.against, scratch.integral
+    for j in range(m):
+        rate = flows.eigenvalue[s, j]
+        along[j] = 0.0j if _is_slow(rate, system.period) else scratch.inverse_rate[j]
+        part[0, j], free = flows.response[s, j], 0.0j
+        for b in range(system.bodies):
+            if flows.body_acceleration[s, b, b] != 0.0:
+                free += system.mass[n + b] * flows.velocity[s, b, j]
+        linear[j, FREE_MOMENTUM_MAP], linear[j, FREE_MOMENTUM_MAP + 1] = free.real, -free.imag
+    _integrate(part[0], along, driven, load, m)
+    for j in range(m):
+        linear[j, MEAN_MAP], linear[j, MEAN_MAP + 1] = 2.0 * part[0, j].real, -2.0 * part[0, j].imag
+    for h in range(e):
+        turn = flows.eigenvalue[s, h]
+        for j in range(m):
+            rate, with_load, with_conjugate = flows.eigenvalue[s, j], 0.0j, 0.0j
+            sum_, difference = rate + turn, rate - turn
+            along[j] = 0.0j if _is_slow(sum_, system.period) else reciprocal(sum_)
+            # a harmonic and the modes that it drives turn together: a product of one with a conjugate one is slow
+            slow = scratch.frame[j] == h or _is_slow(difference, system.period)
+            against[j] = 0.0j if slow else reciprocal(difference)
+            for i in range(n + system.bodies):
+                speed = flows.shape[s, j, n + i] if i < n else scratch.body_rate[j, i - n]
+                with_load += system.load[h, i] * speed
+                with_conjugate += system.load[h, i].conjugate() * speed
+            flows.work[s, h, j], part[0, j], part[1, j] = with_conjugate, with_load, with_conjugate
+        _integrate(part[0], along, driven, load, m)
+        _integrate(part[1], against, driven, load, m)
+        for j in range(m):
+            on_x, on_y = 0.5 * (part[0, j] + part[1, j]), 0.5j * (part[0, j] - part[1, j])
+            first = WORK_MAP + 4 * h
+            linear[j, first], linear[j, first + 1] = on_x.real, -on_x.imag
+            linear[j, first + 2], linear[j, first + 3] = on_y.real, -on_y.imag
+        if h == 0:
+            for j in range(m):
+                part[0, j], part[1, j] = flows.response[s, j], flows.response[s, j]
+                part[2, j], part[3, j] = flows.momentum[s, j], flows.momentum[s, j]
+            for i in range(4):
+                _integrate(part[i], against if i % 2 == 0 else along, driven, load, m)
+            for j in range(m):
+                _set_map(linear[j], HARMONIC_MAP, 0.5 * part[0, j], 0.5 * part[1, j].conjugate())
+                _set_map(linear[j], MOMENTUM_MAP, 0.5 * part[2, j], 0.5 * part[3, j].conjugate())
+
+
+@inlined
+def _set_map(row, first, a, b):
+    """Set the map a c + b conj(c): its real part by Re c and Im c, and its imaginary part."""
+    row[first], row[first + 1] = (a + b).real, (b - a).imag
+    row[first + 2], row[first + 3] = (a + b).imag, (a - b).real
+
+
+@kernel
+def _integrate(values, reciprocals, driven, load, m):
+    """Replace a functional of the amplitudes by the one with this rate; `reciprocals` of the rates of its terms.
+
+    By parts: a driven mode's rate has a term in its harmonic.
+    """
+    for j in range(m):
+        values[j] *= reciprocals[j]
+    for h in range(len(driven) - 1):
+        for j in range(driven[h], driven[h + 1]):
+            values[h] -= values[j] * load[j] * reciprocals[h]
+
+
+@kernel
+def _invert_rates(flows, s, m, period, scratch):
+    """Set the reciprocals of the rates of products of modes k <= j, 0 for slow ones. List these, return their number."""
+    e, count, frame = flows.driven.shape[1] - 1, 0, scratch.frame
+    for kind in range(2):
+        sign = 1.0 if kind == SUM else -1.0
+        for j in range(m):
+            for k in range(j + 1):
+                one, other = flows.eigenvalue[s, j], flows.eigenvalue[s, k]
+                rate = complex(one.real + other.real, one.imag + sign * other.imag)
+                together = kind == DIFFERENCE and frame[j] == frame[k] and frame[j] >= 0
+                if not (together or _is_slow(rate, period)):
+                    scratch.reciprocals[kind, j, k] = reciprocal(rate)
+                    continue
+                scratch.reciprocals[kind, j, k] = 0.0
+                flows.slow[s, count, 0], flows.slow[s, count, 1], flows.slow[s, count, 2] = j, k, kind
+                # a mode that is slow relative to a harmonic, or to modes that it drives, is seen from its frame
+                flows.slow[s, count, 3] = frame[k] if kind == DIFFERENCE and j >= e else -1
+                flows.slow_loss[s, count], flows.slow_dashpot[s, count] = 0.0, 0.0
+                count += 1
+    return count
+
+
+@kernel
+def _list_single(flows, s, m, e, period, count):
+    """List the modes that are left out of means, and calm modes, behind the pairs. Return the number of all."""
+    # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
+    # is taken at once (line.energy_balance)
+    for i in range(count):
+        j, k = flows.slow[s, i, 0], flows.slow[s, i, 1]
+        if _is_slow(2.0 * flows.eigenvalue[s, j], period) and _is_slow(2.0 * flows.eigenvalue[s, k], period):
+            flows.slow_square[s, i] = 0.0
+    for kind in (SINGLE, CALM):
+        for j in range(m):
+            rate = flows.eigenvalue[s, j]
+            calm = _is_slow(2.0 * rate, period)
+            if calm or (kind == SINGLE and _is_slow(rate, period)):
+                flows.slow[s, count, 0], flows.slow[s, count, 1] = j, 0
+                flows.slow[s, count, 2], flows.slow[s, count, 3] = kind, -1
+                flows.slow_loss[s, count], flows.slow_dashpot[s, count] = 0.0, 0.0
+                flows.slow_square[s, count] = 0.0j if calm else 2.0 * flows.response[s, j]
+                count += 1
+    return count
+
+
+@summing
+def _split(values, parts):
+    """Set the real and imaginary parts (2, m, n) of numbers (m, n)."""
+    for j in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            parts[0, j, i], parts[1, j, i] = values[j, i].real, values[j, i].imag
+
+
+@summing
+def _damp(damping, left, right, span, m, n, proportional):
+    """Set the damping forces of speeds, real and imaginary parts (2, m, n)."""
+    for part in range(2):
+        for j in range(m):
+            first, last = span[j, 0], span[j, 1]
+            for i in range(n):
+                total = damping[i, i] * left[part, j, i]
+                if not proportional:
+                    total = 0.0
+                    for l in range(first, last):
+                        total += damping[i, l] * left[part, j, l]
+                right[part, j, i] = total
+
+
+@kernel
+def _set_form(flows, s, m, scratch, form, slow, pairs):
+    """Set the form of a product of modes (scratch.left, right), and the parts of the listed slow pairs."""
+    products, reciprocals = scratch.products, scratch.reciprocals
+    _multiply(scratch.left, scratch.right, scratch.span, m, products[0], products[1])
+    if flows.driven[s, flows.driven.shape[1] - 1] > flows.driven[s, 0]:
+        for kind in range(2):
+            _integrate_by_parts(products[kind], reciprocals[kind], flows.driven[s], flows.load[s], m, kind == SUM)
+    for i in range(pairs):
+        j, k, kind = flows.slow[s, i, 0], flows.slow[s, i, 1], flows.slow[s, i, 2]
+        slow[i] = products[kind, j, k] * (0.5 if j == k else 1.0)
+    _compose(products[0], products[1], reciprocals[0], reciprocals[1], form, m)
+
+
+@summing
+def _multiply(left, right, span, m, both, mixed):
+    """Set the products of modes k <= j, left_j right_k and left_j conj(right_k), summed over their factors."""
+    for j in range(m):
+        first, last = span[j, 0], span[j, 1]
+        for k in range(j + 1):
+            rr, ii, ri, ir = 0.0, 0.0, 0.0, 0.0
+            for i in range(first, last):
+                rr += left[0, j, i] * right[0, k, i]
+                ii += left[1, j, i] * right[1, k, i]
+                ri += left[0, j, i] * right[1, k, i]
+                ir += left[1, j, i] * right[0, k, i]
+            both[j, k], mixed[j, k] = complex(rr - ii, ri + ir), complex(rr + ii, ir - ri)
+
+
+@kernel
+def _integrate_by_parts(product, reciprocals, driven, load, m, plain):
+    """Take what driven modes add to the products of their harmonics; plain: symmetric products, otherwise Hermitian."""
+    e = len(driven) - 1
+    for j in range(m - 1, -1, -1):  # harmonics, with which these products are summed, last
+        for h in range(min(j + 1, e)):
+            for k in range(driven[h], driven[h + 1]):
+                product[j, h] -= _integral(product, reciprocals, j, k, plain) * _kept(load[k], plain)
+            if j < e:
+                for k in range(driven[j], driven[j + 1]):
+                    product[j, h] -= load[k] * (product[k, h] * reciprocals[k, h])
+
+
+@inlined
+def _kept(value, plain):
+    """Return a number, or its conjugate."""
+    return value if plain else value.conjugate()
+
+
+@inlined
+def _integral(product, reciprocals, j, k, plain):
+    """Return the integral of a product of two modes."""
+    if k <= j:
+        return product[j, k] * reciprocals[j, k]
+    return _kept(product[k, j] * reciprocals[k, j], plain)
+
+
+@summing
+def _compose(both, mixed, of_both, of_mixed, form, m):
+    """Set the matrix of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts, integrated."""
+    for j in range(m):
+        for k in range(j + 1):
+            a, b = both[j, k] * of_both[j, k], mixed[j, k] * of_mixed[j, k]
+            form[2 * j, 2 * k], form[2 * j, 2 * k + 1] = 0.5 * (a.real + b.real), 0.5 * (b.imag - a.imag)
+            form[2 * j + 1, 2 * k], form[2 * j + 1, 2 * k + 1] = -0.5 * (a.imag + b.imag), 0.5 * (b.real - a.real)
+    for j in range(2 * m):
+        for k in range(j + 1, 2 * m):
+            form[j, k] = form[k, j]
+
+
+@summing
+def _kick(change, form, kick):
+    """Set the product (2m,) of the changes (m,) by a unit impulse with a form."""
+    m = len(change)
+    for i in range(2 * m):
+        kick[i] = 0.0
+    for j in range(m):
+        x, y = change[j].real, change[j].imag
+        if x != 0.0 or y != 0.0:
+            for i in range(2 * m):
+                kick[i] += x * form[2 * j, i] + y * form[2 * j + 1, i]
