@@ -35,10 +35,10 @@ def at_rest(measured, section, first, done):
                 held[one] = True
             if other >= 0 and (one < 0 or held[one]) and _keeps_place(measured, section, first, done, other):
                 held[other] = True
+    stands = True
     for body in range(b):
-        if not held[body]:
-            return False
-    return True
+        stands = stands and held[body]
+    return stands
 
 
 @strict

@@ -20,7 +20,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import strict
 from vanedamp.coupling.numerics.compiler.record import record
-from vanedamp.coupling.numerics.complex_equations import quotient, solve
+from vanedamp.coupling.numerics.elimination import reciprocal, solve
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.body_loads import binding, body_loads
 from vanedamp.coupling.system.modal_basis import basis_of
@@ -226,9 +226,9 @@ def _set_wave(parts, modes, load, omega):
                 )
         if parts.diagonal:
             regular = regular and (matrix[i, i].real != 0.0 or matrix[i, i].imag != 0.0)
-            wave[i] = quotient(wave[i], matrix[i, i])
+            wave[i] *= reciprocal(matrix[i, i])
     if not parts.diagonal:
-        regular = solve(matrix, wave)
+        regular = solve(matrix, wave, len(wave))
     for i in range(len(wave)):
         wave[i] = wave[i] if regular else complex(np.inf, 0.0)
 

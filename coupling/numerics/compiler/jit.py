@@ -46,9 +46,9 @@ _Decorator = Callable[[Callable[..., Any]], Any]
 kernel: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: the same into its callers: for functions that every segment runs
 inlined: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=INLINED)
-#: a kernel with the same results, bit for bit, in all its callers: for decisions and figures of single runs and batches.
-#: It calls no part of numba that is written in Python (complex division, abs of a complex number), which would have
-#: the freedoms of its first caller
+#: a kernel with the same results, bit for bit, in all its callers: for figures of single runs and of batches. It calls
+#: no part of numba that is written in Python (complex division, abs of a complex number): that would have the freedoms
+#: of its first caller
 strict: _Decorator = njit(**_STRICT | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: a kernel whose sums may be taken in any order, several terms at once
 summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
@@ -56,9 +56,6 @@ summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contra
 comparing: _Decorator = njit(
     **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS
 )
-
-#: a kernel whose results do not depend on where it is compiled into: no two operations become one
-strict: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": False}, pipeline_class=KERNEL)
 
 
 class CacheError(VanedampError):
