@@ -22,7 +22,8 @@ from vanedamp.coupling.numerics.codes import (
     SEGMENTS,
 )
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.plane import Plane
 from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState

@@ -14,7 +14,7 @@ from vanedamp.coupling.numerics.codes import COUNTERS, DONE, IMPACTS, LOGGED, PE
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
-from vanedamp.coupling.response.recorder import plane_of
+from vanedamp.coupling.response.plane import plane_of
 from vanedamp.coupling.response.records import ENERGIES, IMPACT, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of

@@ -247,7 +247,7 @@ def _error(slider: Run, settled: int, blocks: Sequence[Run], tolerance: float) -
 def _peaks(run: Run, first: int, done: int) -> np.ndarray:
     """Return the largest distances of the periods from first to done from the static deflection, m."""
     outcome = run.outcome()
-    return about_mean(outcome.records, slice(first, done), outcome.system.period)[1]
+    return about_mean(outcome.records, first, done, outcome.system.period)[1]
 
 
 def _compared(slider: Run, own: int, blocks: Sequence[Run], done: int, dropped: int) -> tuple[float, float]:

@@ -43,10 +43,12 @@ HARMONIC_MAP, MOMENTUM_MAP, MEAN_MAP, FREE_MOMENTUM_MAP, WORK_MAP = 0, 4, 8, 10,
 STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 
 # why a compiled run returns: all periods are done, it needs something, it lets Python empty the log and see interrupts
-# (PAUSED), or it has ended (response.evaluation.STATUS_OF)
+# (PAUSED), or it has ended (response.evaluation.STATUS_OF); of a run whose periods are done: whether it is not steady,
+# or is to be made longer
 (
     DONE, NEEDS_FLOW, PAUSED, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
-) = range(40, 49)  # fmt: skip
+    NOT_STEADY, LONGER,
+) = range(40, 51)  # fmt: skip
 
 # counters of a run, of any method
 (

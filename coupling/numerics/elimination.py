@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.compiler.jit import inlined, summing
+from vanedamp.coupling.numerics.compiler.jit import strict
 
 
-@inlined
+@strict
 def reciprocal(z):
     """Return 1/z of a number whose square neither overflows nor underflows."""
     scale = 1.0 / (z.real * z.real + z.imag * z.imag)
     return complex(z.real * scale, -z.imag * scale)
 
 
-@summing
+@strict
 def solve(matrix, x, k):
     """Solve matrix y = x for the first k unknowns in place, by elimination with the largest pivot of each column.
 

@@ -2,39 +2,64 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.numerics.compiler.jit import strict
 
 #: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
-#: scales, and motions of floors relative to the response's, that count as zero
-_CLOSED, _STILL, _ROUND_OFF = 1e-3, 1e-6, 1e-12
+#: scales that count as zero
+_CLOSED, _STILL = 1e-3, 1e-6
 
 
-def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray) -> bool:
-    """Return whether all bodies are at rest in their cavities, from the sections (periods + 1, 3 + 2b) of a window.
+@strict
+def at_rest(measured, section, first, done):
+    """Return whether all bodies are at rest in their cavities at the sections from first to done.
 
-    scale: (3 + 2b,) of the states. The window has no impacts, and friction took no energy. A body that friction holds
-    is at rest then: it would lose energy if it slid; a disc, though, rolls. Others have to keep their place at all
-    sections, and a reason to stay: a wall or a body at rest on which they lie, or a floor that does not move along the
-    cavity. A section does not suffice: at a resonance the motion turns round at the start of every period.
+    The window has no impacts, and friction took no energy. A body that friction holds is at rest then: it would lose
+    energy if it slid; a disc, though, rolls. Others have to keep their place at all sections, and a reason to stay: a
+    wall or a body at rest on which they lie, or a floor that does not move along the cavity. A section does not
+    suffice: at a resonance the motion turns round at the start of every period.
     """
-    b = system.bodies
-    slip, speed = section[:, 3 : 3 + b], section[:, 3 + b :]
-    still = np.abs(speed).max(axis=0) <= _STILL * (scale[1] + scale[3 + b :])
-    same = still & (np.ptp(slip, axis=0) <= _STILL * scale[3 : 3 + b])
-    rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
-    held = (system.holds > 0.0) & ~rolls
-    moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.response).max(initial=0.0)
-    held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
-    c = system.contacts
-    gaps = (system.rest[:c] + slip @ system.of_bodies.J[:c].T).max(axis=0)
-    along = ~system.across & ~system.without_body[:c] & np.isinf(system.spring[:c])
-    contacts = np.flatnonzero(along & (gaps <= _CLOSED * system.play[:c]))
+    b, held, load = len(measured.along), measured.held, measured.load
+    for body in range(b):
+        loaded = False
+        for h in range(len(load)):
+            loaded = loaded or load[h, measured.along[body]] != 0.0
+        held[body] = (measured.holds[body] > 0.0 and not measured.rolls[body]) or (
+            _keeps_place(measured, section, first, done, body) and measured.fixed[body] and not loaded
+        )
     for _ in range(b):  # from the walls inwards
-        for unit in contacts:
-            pair = [body for body in (system.body[unit], system.other[unit]) if body >= 0]
-            for body in pair:
-                held[body] |= bool(same[body] and all(held[other] for other in pair if other != body))
-    return bool(held.all())
+        for unit in range(len(measured.lies)):
+            one, other = measured.body[unit], measured.other[unit]
+            if not measured.lies[unit] or not _closed(measured, section, first, done, unit):
+                continue
+            if one >= 0 and (other < 0 or held[other]) and _keeps_place(measured, section, first, done, one):
+                held[one] = True
+            if other >= 0 and (one < 0 or held[one]) and _keeps_place(measured, section, first, done, other):
+                held[other] = True
+    stands = True
+    for body in range(b):
+        stands = stands and held[body]
+    return stands
+
+
+@strict
+def _keeps_place(measured, section, first, done, body):
+    """Whether a body has no speed and the same slip at all sections."""
+    b = len(measured.along)
+    slip, speed, scale = 3 + body, 3 + b + body, measured.scale
+    low, high, fastest = section[first, slip], section[first, slip], 0.0
+    for i in range(first, done + 1):
+        low, high = min(low, section[i, slip]), max(high, section[i, slip])
+        fastest = max(fastest, abs(section[i, speed]))
+    return fastest <= _STILL * (scale[1] + scale[speed]) and high - low <= _STILL * scale[slip]
+
+
+@strict
+def _closed(measured, section, first, done, unit):
+    """Whether the gap of a contact is closed at all sections, but for what is small against its free travel."""
+    for i in range(first, done + 1):
+        gap = measured.rest[unit]
+        for body in range(len(measured.along)):
+            gap += measured.J[unit, measured.along[body]] * section[i, 3 + body]
+        if not gap <= _CLOSED * measured.play[unit]:
+            return False
+    return True

@@ -13,26 +13,30 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.response.at_rest import at_rest
 from vanedamp.coupling.response.event_log import Rows, events_of
-from vanedamp.coupling.response.records import ENERGIES, EXCITATION, STORED, VISCOUS, Records
-from vanedamp.coupling.response.response import PlanarSamples, Response, Status, classify
+from vanedamp.coupling.response.figures import (
+    FIGURES,
+    NO_CONTACT,
+    NON_PERIODIC,
+    STUCK,
+    imbalance,
+    lent_energy,
+    measure,
+    measured_of,
+)
+from vanedamp.coupling.response.plane import Plane
+from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
-from vanedamp.coupling.response.steadiness import judge
-from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
+from vanedamp.coupling.response.steadiness import judge, run_ends
+from vanedamp.coupling.response.steady_state import transient_length
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
 
 #: periods between two checks of whether the response is steady
 _CHUNK = 100
-#: relaxations within the longest run below which an open one ends
-_HOPELESS = 3.0
-#: fraction of the energy there is that counts as flow in any case
-_CARRIED = 1e-3
-#: fraction of the largest order's load below which order 1 counts as unexcited
-_NO_SHARE = 1e-9
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -45,6 +49,7 @@ STATUS_OF = {
     codes.ILL_CONDITIONED: Status.ILL_CONDITIONED,
     codes.DIVERGED: Status.DIVERGED,
     codes.PENETRATION: Status.PENETRATION,
+    codes.NOT_STEADY: Status.NOT_STEADY,
 }
 
 
@@ -59,22 +64,6 @@ class Run(Protocol):
 
     def final(self) -> RestartState | None:
         """Return the state that another run can begin with; None if the run ended within a period, or keeps none."""
-
-
-class Plane(NamedTuple):
-    """Further results of a run with bodies in the plane, of all its periods; b bodies.
-
-    tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
-    shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; samples: in the plane, from the response's samples; walls: (periods, b) impacts on walls.
-    """
-
-    tilt: np.ndarray
-    lifted: np.ndarray
-    neglected: np.ndarray
-    bound: float
-    samples: Callable[[np.ndarray], PlanarSamples]
-    walls: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -126,10 +115,9 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
             if progress is not None:
                 progress(done, periods)
         found = judge(transient, run.outcome().records, dropped, periods)
-        if found.steady or not dropped:
-            return Ended(Status.OK, dropped, found.confidence)
-        if 2 * periods > most or found.rate * most < _HOPELESS:
-            return Ended(Status.NOT_STEADY, dropped, found.confidence)
+        code = run_ends(found.steady, found.rate, dropped, periods, most)
+        if code != codes.LONGER:
+            return Ended(STATUS_OF[code], dropped, found.confidence)
         dropped, periods = periods, 2 * periods
 
 
@@ -145,7 +133,7 @@ def _run_until_known(
         if progress is not None:
             progress(done, periods)
         outcome = run.outcome()
-        records, (_, peaks) = outcome.records, about_mean(outcome.records, slice(0, done), outcome.system.period)
+        records, (_, peaks) = outcome.records, about_mean(outcome.records, 0, done, outcome.system.period)
         dropped = transient_length(peaks)
         if dropped is None:
             ended = Ended(Status.NOT_STEADY, transient.scene.time.dropped)
@@ -164,59 +152,34 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
     """Return the response of a run that began at `started` (time.perf_counter)."""
     system, records, done, status = run.system, run.records, run.periods, ended.status
     first = min(ended.transient, max(done - 1, 0))
-    window = slice(first, done)
-    span = max(done - first, 1) * system.period
-    ledger = records.ledger[: done + 1] - records.ledger[first]
-    section = records.section[: done + 1]
-    harmonic = 2 / span * records.harmonic[window].sum()
-    evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
-    peaks = records.peak[window]
-    static, dynamic = about_mean(records, window, system.period)
-    scale = _state_scale(system, section[first:])
-    balance = residual(
-        records.ledger[: done + 1], records.parts[: done + 1], exchanged_energy(system, records.collided)
-    )
-    if not balance <= run.open_ledger and status in _USABLE:
+    row = np.empty(len(FIGURES))
+    confidence = np.nan if ended.confidence is None else ended.confidence
+    kind = measure(measured_of(scene, system), records, first, done, confidence, row)
+    figures: dict[str, Any] = dict(zip(FIGURES, row.tolist(), strict=True))
+    energy = {name: figures.pop(name) for name in ENERGIES}
+    for name in ("amplitude_mean_confidence", "attached_mass_fraction"):
+        figures[name] = None if np.isnan(figures[name]) else figures[name]
+    if not figures["energy_residual"] <= run.open_ledger and status in _USABLE:
         status = Status.ENERGY
     extent: dict[str, Any] = {}
     if run.plane is not None:
-        extent, tilted = _in_plane(run.plane, window, span)
+        extent, tilted = _in_plane(run.plane, slice(first, done), max(done - first, 1) * system.period)
         status = Status.TILTED if tilted and status in _USABLE else status
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     return Response(
         status=status,
         frequency=scene.frequency,
-        amplitude_max=float(peaks.max(initial=0.0)),
-        amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
-        amplitude_mean_confidence=mean_confidence(peaks) if ended.confidence is None else ended.confidence,
-        static_deflection=static,
-        amplitude_max_dynamic=float(dynamic.max(initial=0.0)),
-        amplitude_mean_dynamic=float(dynamic.mean()) if len(dynamic) else 0.0,
-        amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
-        amplitude_harmonic=float(abs(harmonic)),
-        phase=float(np.angle(1j * harmonic)),
-        impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
         events=run.events,
-        classification=classify(
-            section[first:],
-            scale,
-            records.impacts[window],
-            not evaluated["friction"] > 0.0 and at_rest(scene, system, section[first:], scale),
-        ),
-        energy=evaluated,
-        energy_residual=balance,
-        attached_mass_fraction=(
-            None
-            if _without_first_order(scene, system)
-            else _attached(system, section, records.momentum[window].sum(), harmonic, first, span)
-        ),
+        classification=class_name(kind),
+        energy=energy,
         wall_time_s=time.perf_counter() - started,
         periods=done,
         transient=first,
         counters=run.counters,
         event_list=events_of(run.rows, run.log),
         penetration=run.penetration,
+        **figures,
         **_series(system, records, done),
         **extent,
     )
@@ -252,59 +215,16 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
-    """Return the imbalance of the energies (periods + 1, 6), relative to the energy that flowed.
-
-    That flow is the largest term, with stored energy by its parts (periods + 1, 1 + b): energy that moves with a heavy
-    body, and no further, is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy
-    always counts: below it the imbalance would measure the round-off of energy that only moves with a body.
-    """
-    change = ledger - ledger[0]
-    imbalance = change[-1, EXCITATION] - change[-1, VISCOUS:].sum()
-    swing = np.ptp(parts, axis=0).sum()
-    flowed = max(np.abs(change[:, :STORED]).max(), swing, exchanged, _CARRIED * np.abs(parts).sum(axis=1).max())
-    return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
+    """Return the imbalance (figures.imbalance) of the energies (periods + 1, 6) of a whole run."""
+    return float(imbalance(ledger, parts, len(ledger) - 1, float(exchanged)))
 
 
 def exchanged_energy(system: System, collided: np.ndarray) -> float:
     """Return the energy that comes and goes within a period, J: in collisions (periods,), and lent by the loads."""
-    rate = np.maximum(system.frequency, system.omega)[:, None]  # the mean of a waveform counts as a slow load
-    modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
-    bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
-    return float(max(collided.max(), (modes.sum() + bodies.sum()) / 2))
+    lent = lent_energy(system.load, system.along, system.squares, system.mass, system.frequency, system.omega)
+    return max(float(collided.max()), float(lent))
 
 
-def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
-    """Return the scale (states,) of each state of the section.
-
-    A displacement and its velocity have one scale, because either may vanish at the period's start. The scale of the
-    bodies' momentum is that at the largest speed: of a heavy body, which almost rests, it is a small difference of
-    the slip's speed and the structure's, and its slow drift does not act on the motion in the cavity.
-    """
-    largest, b = np.abs(section).max(axis=0), system.bodies
-    x = max(largest[0], largest[1] / system.omega)
-    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / system.omega)
-    momentum = system.of_bodies.mass.sum() * system.omega * max(x, slips.max(initial=0.0))
-    return np.array([x, system.omega * x, momentum, *slips, *(system.omega * slips)]) + np.finfo(float).tiny
-
-
-def _without_first_order(scene: Scene, system: System) -> bool:
-    """Whether a waveform or loads have sines of higher orders only, by which no attached mass is measured."""
-    if scene.excitation.waveform is None and not scene.excitation.distributed:
-        return False
-    sizes = np.abs(np.column_stack([system.load, system.table])).max(axis=1)
-    return bool(sizes[0] <= _NO_SHARE * sizes.max())
-
-
-def _attached(
-    system: System, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
-) -> float | None:
-    """Return the attached mass over the bodies' mass, Re(F / (omega^2 X)) / sum m; F: all contact forces on it.
-
-    Of several harmonics, order 1 counts.
-    """
-    # a structure that does not move feels no mass: its harmonic is 0, or the remainder of a decayed start
-    if not system.bodies or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
-        return None
-    change = section[-1, 2] - section[first, 2]
-    on_bodies = 2 / span * (change + 1j * system.omega * momentum) - system.of_bodies.load[0].sum()
-    return float((-on_bodies / (system.omega**2 * harmonic)).real / system.of_bodies.mass.sum())
+def class_name(kind: int) -> str:
+    """Return "periodic-k", "non-periodic", "no-contact" or "stuck" (figures.repetition)."""
+    return {NON_PERIODIC: "non-periodic", NO_CONTACT: "no-contact", STUCK: "stuck"}.get(kind, f"periodic-{kind}")

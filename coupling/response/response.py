@@ -160,7 +160,7 @@ class Response(Plotted):
     (methods other than "exact": impacts); `solver.max_events` bounds `counters.changes`, or the impacts of methods with
     steps"""
     classification: str
-    """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
+    """"periodic-k", "non-periodic", "no-contact" or "stuck" (evaluation.class_name)"""
     energy: dict[str, float]
     """over the evaluated time: work of the `excitation`; `viscous`, `friction`, `impact` and `contact` loss; change of
     what is `stored` [J]"""
@@ -292,23 +292,3 @@ class Response(Plotted):
         """Return the names of the fields of events; some apply to planar bodies only."""
         planar = {"corner", "tangential_impulse", "loss"}
         return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
-
-
-def classify(section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, at_rest: bool, longest: int = 16) -> str:
-    """Return "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a run.
-
-    A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
-    state's scale (states,), over at least 8 repetitions or half of the section. at_rest: whether no body moves
-    relative to its cavity.
-    """
-    if not impacts.any():
-        return "stuck" if at_rest else "no-contact"
-    available = len(section) - 1
-    for k in range(1, longest + 1):
-        span = min(8 * k, available - k)
-        if span < k:
-            break
-        late, early = section[-span:], section[-span - k : -k]
-        if np.all(np.abs(late - early) < 1e-6 * scale):
-            return f"periodic-{k}"
-    return "non-periodic"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
@@ -26,8 +27,8 @@ def deflects(scene: Scene, system: System) -> bool:
     return bool(static > _ROUND_OFF * (yields @ np.abs(modes.load).sum(axis=0)))
 
 
-def about_mean(records: Records, window: slice, period: float) -> tuple[float, np.ndarray]:
-    """Return the static deflection over a window of periods, m, and the periods' peaks (n,) about it, m.
+def about_mean(records: Records, first: int, done: int, period: float) -> tuple[float, np.ndarray]:
+    """Return the static deflection over periods from first to done, m, and their peaks (n,) about it, m.
 
     The static deflection is the motion's own mean position over the window. Over many periods the mean force of a body
     on the structure is its load, whether the body is stuck, rests on a wall or strikes both; only where the force acts
@@ -36,9 +37,32 @@ def about_mean(records: Records, window: slice, period: float) -> tuple[float, n
     such loads the deflection is zero by definition, and the peaks are those of |x|, also where stops or the excitation
     shift the mean.
     """
-    peaks = records.peak[window]
-    if not len(records.swing) or not len(peaks):
-        return 0.0, peaks
-    swing = records.swing[window]
-    mean = float(swing[:, 2].sum() / (len(peaks) * period))
-    return mean, np.maximum(swing[:, 0] - mean, mean - swing[:, 1])
+    peaks = np.empty(done - first)
+    return float(peaks_about_mean(records, first, done, period, peaks)), peaks
+
+
+@strict_entry
+def peaks_about_mean(records, first, done, period, peaks):
+    """Set peaks (n,) of the periods from first to done about their static deflection, and return that (about_mean)."""
+    mean = static_deflection(records, first, done, period)
+    for i in range(first, done):
+        peaks[i - first] = distance(records, i, mean)
+    return mean
+
+
+@strict
+def static_deflection(records, first, done, period):
+    """Return the static deflection over periods from first to done, m."""
+    integral = 0.0
+    if len(records.swing) > 0:
+        for i in range(first, done):
+            integral += records.swing[i, 2]
+    return integral / (max(done - first, 1) * period)
+
+
+@strict
+def distance(records, i, mean):
+    """Return the peak of period i about a static deflection, m."""
+    if len(records.swing) == 0:
+        return records.peak[i]
+    return max(records.swing[i, 0] - mean, mean - records.swing[i, 1])

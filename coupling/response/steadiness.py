@@ -7,19 +7,21 @@ enough: it forgets its past at the rate at which it loses energy, loss/(2 energy
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import DONE, LONGER, NOT_STEADY
+from vanedamp.coupling.numerics.compiler.jit import ZERO, strict, strict_entry
 from vanedamp.coupling.response.records import CONTACT, FRICTION, IMPACT_LOSS, STORED, VISCOUS, Records
-from vanedamp.coupling.response.static_deflection import about_mean
-from vanedamp.coupling.response.steady_state import batch_means, lag_correlation, mean_confidence
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.transient import Transient
+from vanedamp.coupling.response.static_deflection import peaks_about_mean
+from vanedamp.coupling.response.steady_state import batch_deviation, confidence_of, lag_correlation, mean_of
+from vanedamp.coupling.system.transient import Transient, remainder, slowest
 
 #: batches of each half of a window with impacts, their fewest periods, and standard errors beyond which the halves'
 #: means differ: of windows of chaotic responses without a transient, 7 in 1000 do
-_BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
+_BATCHES, _SHORTEST, _CERTAIN = np.int64(10), 25, 5.0
 #: how often a motion that does not repeat must have forgotten its past within the window
 _RELAXATIONS = 3.0
 #: the same of a window that was given, where the linear transient is over; and how many tolerances its mean may move
@@ -28,6 +30,10 @@ _GIVEN, _ROOM = 1.0, 5.0
 _SLOW = 0.7
 #: longest period, in excitation periods, with which a motion is seen to repeat
 _LONGEST = 16
+#: relaxations within the longest run below which an open one ends
+_HOPELESS = 3.0
+#: smallest fraction of a decay
+_TINY = float(np.finfo(float).tiny)
 
 
 class Judgement(NamedTuple):
@@ -43,89 +49,120 @@ class Judgement(NamedTuple):
 
 def judge(transient: Transient, records: Records, first: int, done: int) -> Judgement:
     """Judge the periods from `first` to `done` of a run, whose scene's linear transient is known."""
-    scene, (_, peaks) = transient.scene, about_mean(records, slice(first, done), transient.system.period)
-    n, mean, tolerance = len(peaks), float(peaks.mean()), scene.time.tolerance
-    touched = _touched(scene, records, 0, done)
-    left = transient.left_over(first)
+    steady, rate, confidence = judged(*transient.numbers, records, first, done, np.empty(done - first))
+    return Judgement(bool(steady), float(rate), None if np.isnan(confidence) else float(confidence))
+
+
+@strict_entry
+def judged(known, free, stuck, records, first, done, peaks):
+    """Return a Judgement, of unknown confidence nan. known, free, stuck: Transient.numbers; peaks: room for (n,)."""
+    n, tolerance = done - first, known.tolerance
+    peaks_about_mean(records, first, done, known.clock[1], peaks)
+    mean, left = mean_of(peaks, ZERO, n), remainder(known, free, stuck, float(first))
+    moves = False
+    for i in range(n):
+        moves = moves or peaks[i] != 0.0
     # a motion that nothing excites is what was asked for, whatever is left of it
-    if not peaks.any() or not transient.driven or (not touched and left <= tolerance):
-        own = mean_confidence(peaks)
-        return Judgement(True, np.inf, None if own is None else own + left * mean)
+    if (
+        not (moves and (known.driven or known.excited[0]))
+        or (left <= tolerance and not _touched(known, records, ZERO, done))
+    ):  # fmt: skip
+        return True, np.inf, confidence_of(peaks, ZERO, n, np.inf, known.quantile_at) + left * mean
     if n < 2:
-        return Judgement(False, 0.0, None)
-    quiet = not _touched(scene, records, first, done)
-    rate, beat = transient.slowest(n)
+        return False, 0.0, np.nan
+    quiet = not _touched(known, records, first, done)
+    rate, beat = slowest(known, free, stuck, n)
     if not quiet:
-        rate, beat = _energy_rate(transient, records, first, done), 0.0
-    remaining, allowed = _remaining(peaks, rate, tolerance), tolerance * mean
+        rate, beat = _energy_rate(known, records, first, done), 0.0
+    remaining, allowed = _remaining(peaks, n, rate, tolerance), tolerance * mean
     # where the start is forgotten, a window that was given may be short: its confidence shows its value
-    given = left <= tolerance and not scene.time.open
-    repeats = bool(remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat))
+    given = left <= tolerance and not known.open
+    repeats = remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat)
     relaxations = rate * n
-    own = mean_confidence(peaks, np.inf if repeats else relaxations)
-    if own is not None and repeats:
-        own += remaining
+    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations, known.quantile_at)
     if quiet or repeats:
-        return Judgement(repeats, rate, own)
-    mixed = relaxations >= (_GIVEN if given else _RELAXATIONS) and (given or not _moves_slowly(peaks, own, allowed))
-    known = left <= tolerance or n >= 2 * _BATCHES * _SHORTEST
-    return Judgement(mixed and known and not _drifts(peaks, allowed), rate, own)
+        return repeats, rate, own + (remaining if repeats else 0.0)
+    # neighbouring parts of the window must not be too much alike for statistics, beyond the tolerance of its mean
+    slow = own > allowed and lag_correlation(peaks, ZERO, n) > _SLOW
+    mixed = relaxations >= (_GIVEN if given else _RELAXATIONS) and (given or not slow)
+    enough = left <= tolerance or n >= 2 * _BATCHES * _SHORTEST
+    return mixed and enough and not _drifts(peaks, n, allowed), rate, own
 
 
-def _moves_slowly(peaks: np.ndarray, confidence: float | None, allowed: float) -> bool:
-    """Whether neighbouring parts of a window are too much alike for statistics, beyond the tolerance of its mean."""
-    return confidence is not None and confidence > allowed and lag_correlation(peaks) > _SLOW
+@strict_entry
+def run_ends(steady, rate, dropped, periods, most):
+    """Return how a run goes on that was judged after its periods: DONE, NOT_STEADY or LONGER, for as long again."""
+    if steady or dropped == 0:
+        return DONE
+    return NOT_STEADY if 2 * periods > most or rate * most < _HOPELESS else LONGER
 
 
-def _touched(scene: Scene, records: Records, first: int, done: int) -> bool:
+@strict
+def _touched(known, records, first, done):
     """Whether something else than linear motion acts within some periods: impacts, slip, stops of rigid friction."""
-    lost = records.ledger[done] - records.ledger[first]
-    return bool(
-        records.impacts[first:done].any()
-        or lost[[FRICTION, IMPACT_LOSS, CONTACT]].any()
-        or any(damper.stiffness is None for damper in scene.friction_damper)
-    )
+    before, after = records.ledger[first], records.ledger[done]
+    for entry in (FRICTION, IMPACT_LOSS, CONTACT):
+        if after[entry] != before[entry]:
+            return True
+    for i in range(first, done):
+        if records.impacts[i] != 0:
+            return True
+    return known.rigid
 
 
-def _energy_rate(transient: Transient, records: Records, first: int, done: int) -> float:
+@strict
+def _energy_rate(known, records, first, done):
     """Return how fast an amplitude would decay by the losses of some periods, per period."""
-    lost = records.ledger[done] - records.ledger[first]
-    parts = records.parts[first : done + 1]
-    # bodies that nothing holds count from where they have least: their height is only known within the cavity
-    free = np.r_[False, [not damper.sprung for damper in transient.scene.damper]].astype(bool)
-    energy = parts[:, ~free].sum(axis=1).mean() + transient.weight_energy()
-    energy += (parts[:, free] - parts[:, free].min(axis=0, initial=np.inf)).mean(axis=0).sum()
-    loss = float(lost[VISCOUS:STORED].sum()) / (done - first)
-    return max(loss, 0.0) / (2 * energy) if energy > 0.0 else np.inf
+    loss, energy, parts = 0.0, known.weight_energy, records.parts
+    for entry in range(VISCOUS, STORED):
+        loss += records.ledger[done, entry] - records.ledger[first, entry]
+    for part in range(len(known.free)):
+        total, least = 0.0, 0.0
+        if known.free[part]:
+            # counts from where it has least: its height is only known within the cavity
+            least = np.inf
+            for i in range(first, done + 1):
+                least = min(least, parts[i, part])
+        for i in range(first, done + 1):
+            total += parts[i, part] - least
+        energy += total / (done + 1 - first)
+    return max(loss / (done - first), 0.0) / (2.0 * energy) if energy > 0.0 else np.inf
 
 
-def _remaining(peaks: np.ndarray, rate: float, tolerance: float) -> float:
+@strict
+def _remaining(peaks, n, rate, tolerance):
     """Return how far the mean of peaks that repeat, but for a decay at some rate per period, may still move, m.
 
     By the means of four parts of the window, or by what changes from one repetition to the next, whichever says less.
     """
-    n = len(peaks)
     parts = min(4, n)
     size = n // parts
-    found = [np.ptp(batch_means(peaks, parts)) / _gone(rate * (n - size), tolerance)]
+    least, most = np.inf, -np.inf
+    for i in range(n - parts * size, n, size):
+        mean = mean_of(peaks, i, i + size)
+        least, most = min(least, mean), max(most, mean)
+    found = (most - least) / _gone(rate * (n - size), tolerance)
     for period in range(1, min(_LONGEST, n // 2) + 1):
-        change = np.abs(peaks[period:] - peaks[:-period]).max()
-        with np.errstate(over="ignore"):
-            found.append(change / _gone(rate * period, 0.0))
-    return float(min(found))
+        gone, change = _gone(rate * period, 0.0), 0.0
+        for i in range(period, n):
+            change = max(change, abs(peaks[i] - peaks[i - period]))
+            if change >= found * gone:
+                break
+        found = min(found, change / gone)
+    return found
 
 
-def _gone(decayed: float, least: float) -> float:
+@strict
+def _gone(decayed, least):
     """Return the fraction of a decay that is over after exp(-decayed), at least a bound; tiny at none."""
-    return max(-np.expm1(-decayed), least, np.finfo(float).tiny)
+    return max(-math.expm1(-decayed), least, _TINY)
 
 
-def _drifts(peaks: np.ndarray, allowed: float) -> bool:
+@strict
+def _drifts(peaks, n, allowed):
     """Whether the means of both halves of a window differ by too much; False where their scatter is not known."""
-    half = len(peaks) // 2
-    size = half // _BATCHES
-    if size < _SHORTEST:
+    half = n // 2
+    if half // _BATCHES < _SHORTEST:
         return False
-    before, after = peaks[:half].mean(), peaks[-half:].mean()
-    late = batch_means(peaks[-half:], _BATCHES)
-    return bool(abs(after - before) > max(allowed, _CERTAIN * np.sqrt(2 / _BATCHES) * late.std(ddof=1)))
+    drift = abs(mean_of(peaks, n - half, n) - mean_of(peaks, ZERO, half))
+    return drift > max(allowed, _CERTAIN * math.sqrt(2.0 / _BATCHES) * batch_deviation(peaks, n - half, n, _BATCHES))

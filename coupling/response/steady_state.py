@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from scipy.special import stdtrit
+
+from vanedamp.coupling.numerics.compiler.function_address import call, quantile_address
+from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 
 #: batches of the method of batch means
-_BATCHES = 10
+_BATCHES = np.int64(10)
 #: how much of a series may be transient before it is too short to judge
 _LONGEST_TRANSIENT = 0.5
 #: entries of a batch below which correlation between batches is not measured
@@ -38,37 +42,64 @@ def transient_length(series: np.ndarray) -> int | None:
     return cut if cut <= _LONGEST_TRANSIENT * n else None
 
 
-def mean_confidence(series: np.ndarray, relaxations: float = np.inf) -> float | None:
-    """Return the half width of the 95 % confidence interval of a steady-state series' mean; None if it is too short.
+def mean_confidence(series: np.ndarray) -> float | None:
+    """Return the half width of the 95 % confidence interval of a steady-state series' mean; None if it is too short."""
+    found = confidence_of(series, 0, len(series), np.inf, quantile_address())
+    return None if np.isnan(found) else float(found)
+
+
+@strict_entry
+def confidence_of(series, first, done, relaxations, quantile_at):
+    """Return the half width of the 95 % confidence interval of a steady state's mean from first to done; nan: unknown.
 
     Batch means (Law and Kelton, section 9.5): means of ten long batches are nearly independent even where the entries
     are not. Remaining correlation between neighbours, seen in halves of the batches, widens the interval, as for
     a first-order process does (Tafazzoli, Steiger and Wilson 2011, "N-Skart"). relaxations: how often the process
-    forgets its past within the series, which has no more independent parts than that.
+    forgets its past within the series, which has no more independent parts than that. quantile_at: Student's.
     """
-    if len(series) < 2 * _BATCHES:
-        return None
-    scatter = batch_means(series, _BATCHES).std(ddof=1) / np.sqrt(_BATCHES)
-    freedom = float(np.clip(relaxations - 1, 1, _BATCHES - 1))
-    return float(stdtrit(freedom, 0.975) * scatter / np.sqrt(1.0 - max(lag_correlation(series), 0.0)))
+    if done - first < 2 * _BATCHES:
+        return np.nan
+    scatter = batch_deviation(series, first, done, _BATCHES) / math.sqrt(_BATCHES)
+    freedom = min(max(relaxations - 1.0, 1.0), _BATCHES - 1.0)
+    correlation = max(lag_correlation(series, first, done), 0.0)
+    return call(quantile_at, freedom, 0.975) * scatter / math.sqrt(1.0 - correlation)
 
 
-def lag_correlation(series: np.ndarray) -> float:
+@strict
+def lag_correlation(series, first, done):
     """Return the correlation of neighbouring means of 20 batches, without its bias, at most 0.9; 0 of short series."""
     count = 2 * _BATCHES
-    if len(series) < _LEAST * count:
+    size = (done - first) // count
+    if size < _LEAST:
         return 0.0
-    means = batch_means(series, count)
-    means = means - means.mean()
-    square = means @ means
+    begin = done - size * count
+    middle, square, product, before = mean_of(series, begin, done), 0.0, 0.0, 0.0
+    for i in range(count):
+        own = mean_of(series, begin + i * size, begin + (i + 1) * size) - middle
+        square += own * own
+        product += own * before
+        before = own
     if not square > 0.0:
         return 0.0
     # of n independent values the estimate is -1/n on average, and 1 - 3/n of it for correlated ones (Marriott and Pope)
-    found = means[1:] @ means[:-1] / square
-    return float(np.clip((found + 1 / count) / (1 - 3 / count), -0.9, 0.9))
+    return min(max((product / square + 1.0 / count) / (1.0 - 3.0 / count), -0.9), 0.9)
 
 
-def batch_means(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the means (count,) of the last batches of a series."""
-    size = len(series) // count
-    return np.asarray(series[-size * count :].reshape(count, size).mean(axis=1))
+@strict
+def batch_deviation(series, first, done, count):
+    """Return the standard deviation of the means of the last `count` batches of a series from first to done."""
+    size, square = (done - first) // count, 0.0
+    begin = done - size * count
+    middle = mean_of(series, begin, done)
+    for i in range(count):
+        square += (mean_of(series, begin + i * size, begin + (i + 1) * size) - middle) ** 2
+    return math.sqrt(square / (count - 1))
+
+
+@strict
+def mean_of(series, first, done):
+    """Return the mean of a series from first to done."""
+    total = 0.0
+    for i in range(first, done):
+        total += series[i]
+    return total / (done - first)

@@ -7,15 +7,20 @@ can. Their complex modes decay by themselves:
     x(t) = steady + Re sum_k a_k exp(lambda_k t)
 
 with a_k from the difference of the scene's start and the steady motion (Tisseur and Meerbergen, SIAM Review 43, 2001).
+The modes are computed once (LinearParts); frequency, loads and start only change what they begin with (`set_modes`).
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.compiler.jit import strict
+from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.elimination import reciprocal, solve
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.body_loads import binding, body_loads
 from vanedamp.coupling.system.modal_basis import basis_of
@@ -27,35 +32,60 @@ _CRITICAL = 1e-6
 _FELT = 1e-2
 
 
-class LinearModes(NamedTuple):
-    """Complex modes of a linear system with its start and load; m modes, of displacements of the response.
+@record
+class LinearParts(NamedTuple):
+    """A linear system with k coordinates and 2k complex modes, whatever its frequency, loads and start.
 
-    steady: its amplitude, m (of several harmonics the root of the squares); begun: (m,) amplitudes at time zero of what
-    is not steady, m; rate: (m,) decay, 1/s; own: (m,) angular frequency, rad/s; felt: (m,) whether the response moves.
+    M q'' + C q' + K q = Re sum_h load_h exp(i omega_h t) + weight. N coordinates, n modes and b bodies of the System.
     """
 
-    steady: float
+    mass: np.ndarray  # (k, k)
+    damping: np.ndarray  # (k, k)
+    stiffness: np.ndarray  # (k, k)
+    diagonal: bool  # whether nothing couples its coordinates
+    basis: np.ndarray  # (N, k) motion of the System's coordinates
+    place: np.ndarray  # (k,) int: number of each coordinate among modes and bodies (n + b,)
+    response: np.ndarray  # (k,)
+    static: np.ndarray  # (k,) displacements under weight
+    weight_energy: float  # by which weight lowers the energy of the springs that hold bodies, J
+    value: np.ndarray  # (2k,) complex eigenvalues, 1/s; without coupling one of each oscillator, then the others
+    seen: np.ndarray  # (2k,) complex: motion of the response by the part of each mode
+    inverse: np.ndarray  # (2k, 2k) complex: takes (q, q') to the parts; (0, 0) without coupling
+
+
+@record
+class LinearModes(NamedTuple):
+    """Complex modes of a linear system with its start and load; m = 2k modes, of displacements of the response.
+
+    steady: (1,) its amplitude, m (of several harmonics the root of the squares); begun: (m,) amplitudes at time zero of
+    what is not steady, m; rate: (m,) decay, 1/s; own: (m,) angular frequency, rad/s; felt: (m,) whether the response
+    moves. matrix (k, k), wave (k,) and start (m,): room for `set_modes`.
+    """
+
+    steady: np.ndarray
     begun: np.ndarray
     rate: np.ndarray
     own: np.ndarray
     felt: np.ndarray
+    matrix: np.ndarray
+    wave: np.ndarray
+    start: np.ndarray
 
 
 class _Matrices(NamedTuple):
-    """M q'' + C q' + K q = Re sum_h load_h exp(i omega_h t) + weight, with the start of q and its rate."""
+    """The matrices of LinearParts."""
 
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
-    load: np.ndarray
     weight: np.ndarray
     response: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
+    basis: np.ndarray
+    place: np.ndarray
 
 
-def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
-    """Return the modes of the loose system of a scene and, where that is another one, of the held one."""
+def linear_systems(scene: Scene, system: System) -> list[tuple[LinearParts, LinearModes]]:
+    """Return the loose system of a scene and, where that is another one, the held one, with empty modes."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
     rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
@@ -64,16 +94,16 @@ def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
     held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
     if held.any() or np.isfinite(system.casing_spring).any():
         made.append(_matrices(scene, system, sprung & ~held, held, True))
-    return [_modes(matrices, system.frequency) for matrices in made]
+    return [_with_modes(matrices) for matrices in made]
 
 
-def weight_energy(scene: Scene, system: System) -> float:
-    """Return the energy, J, by which weight lowers the energy of the springs and tracks that hold bodies."""
-    sprung = np.array([damper.sprung for damper in scene.damper], bool)
-    if not system.of_bodies.weight[sprung].any():
-        return 0.0
-    made = _matrices(scene, system, sprung, np.zeros(len(sprung), bool))
-    return float(made.weight @ _static(made.stiffness, made.weight)) / 2
+def start_of_modes(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Return modal coordinates and positions of the bodies (n + b,) with which a scene begins, and their rates."""
+    p, rate = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
+    floor = system.floor[:, : system.modes].sum(axis=1)
+    position, speed = (np.array([getattr(body, name) for body in scene.damper]) for name in ("position", "velocity"))
+    modes = np.ones(system.modes)
+    return np.r_[p * modes, floor * p + position], np.r_[rate * modes, floor * rate + speed]
 
 
 def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray, stuck: bool = False) -> _Matrices:
@@ -101,14 +131,11 @@ def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray
         drawn = np.isfinite(system.casing_spring)
         rows = system.casing[drawn][:, free]
         stiffness += rows.T @ (system.casing_spring[drawn, None] * rows)
-    p, rate = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
-    bodies = [damper for damper, moves in zip(scene.damper, moving, strict=True) if moves]
-    position, speed = np.array([body.position for body in bodies]), np.array([body.velocity for body in bodies])
+    whole = np.zeros((len(system.mass), basis.shape[1]))
+    whole[free] = basis
     return _Matrices(
-        basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis, system.load[:, free] @ basis,
-        system.weight[free] @ basis, system.response[free] @ basis,
-        np.r_[np.full(n, p), floor[moving].sum(axis=1) * p + position],
-        np.r_[np.full(n, rate), floor[moving].sum(axis=1) * rate + speed],
+        basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis, system.weight @ whole,
+        system.response @ whole, whole, np.r_[np.arange(n), n + np.flatnonzero(moving)],
     )  # fmt: skip
 
 
@@ -128,49 +155,99 @@ def _static(stiffness: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.lstsq(stiffness, weight, rcond=None)[0])
 
 
-def _wave(made: _Matrices, omega: float, load: np.ndarray) -> np.ndarray:
-    """Return the complex displacements (k,) in steady state under a load; infinite at a resonance without damping."""
-    try:
-        return np.linalg.solve(made.stiffness - omega**2 * made.mass + 1j * omega * made.damping, load)
-    except np.linalg.LinAlgError:
-        return np.full(len(load), np.inf + 0j)
+def _with_modes(made: _Matrices) -> tuple[LinearParts, LinearModes]:
+    """Return a system with its modes."""
+    k, static = len(made.response), _static(made.stiffness, made.weight)
+    together = (made.mass, made.damping, made.stiffness)
+    diagonal = all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together)
+    if diagonal:
+        mass = np.diag(made.mass)
+        values, shapes, seen = _oscillators(np.diag(made.stiffness) / mass, np.diag(made.damping) / mass)
+        both = np.r_[made.response, made.response]
+        felt, seen, inverse = np.abs(both * shapes), both * seen, np.zeros((0, 0), complex)
+    else:
+        values, shapes, inverse = _complex(k, *(matrix.tobytes() for matrix in together))
+        seen = made.response @ shapes
+        felt = np.abs(seen)
+    parts = LinearParts(
+        *together, diagonal, made.basis, made.place, made.response, static, float(made.weight @ static) / 2, values,
+        seen, inverse,
+    )  # fmt: skip
+    return parts, LinearModes(
+        np.zeros(1), np.zeros(2 * k), -values.real, np.abs(values.imag), felt > _FELT * felt.max(initial=0.0),
+        np.zeros((k, k), complex), np.zeros(k, complex), np.zeros(2 * k),
+    )  # fmt: skip
 
 
-def _modes(made: _Matrices, frequency: np.ndarray) -> LinearModes:
-    """Return the modes of a system that is loaded at the angular frequencies (e,)."""
-    k, still = len(made.q), _static(made.stiffness, made.weight)
-    pairs = zip(frequency, made.load, strict=True)
-    wave = np.reshape([_wave(made, omega, load) for omega, load in pairs], (len(frequency), k))
-    with np.errstate(invalid="ignore"):
-        # displacements and rates beyond the steady motion
-        q, v = made.q - still - wave.real.sum(axis=0), made.v + (frequency[:, None] * wave.imag).sum(axis=0)
-        together = (made.mass, made.damping, made.stiffness)
-        if all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together):
-            mass = np.diag(made.mass)
-            values, shapes, part = _oscillators(np.diag(made.stiffness) / mass, np.diag(made.damping) / mass, q, v)
-            moved = np.r_[made.response, made.response] * shapes
+@strict
+def set_modes(parts, modes, load, frequency, q, v):
+    """Set the steady amplitude of the response, and what is not steady at time zero.
+
+    load: (e, N) complex, N; frequency: (e,) rad/s; q, v: (n + b,) the start of modes and bodies.
+    """
+    k, start, square = len(modes.wave), modes.start, 0.0
+    for i in range(k):
+        start[i], start[k + i] = q[parts.place[i]] - parts.static[i], v[parts.place[i]]
+    for h in range(len(frequency)):
+        _set_wave(parts, modes, load[h], frequency[h])
+        x = 0j
+        for i in range(k):
+            # displacements and rates beyond the steady motion
+            start[i] -= modes.wave[i].real
+            start[k + i] += frequency[h] * modes.wave[i].imag
+            x += parts.response[i] * modes.wave[i]
+        square += x.real * x.real + x.imag * x.imag
+    modes.steady[0] = math.sqrt(square)
+    for j in range(2 * k):
+        part = 0j
+        if parts.diagonal:
+            other = parts.value[j + k if j < k else j - k]
+            part = start[k + j % k] - other * start[j % k]
         else:
-            values, shapes, inverse = _complex(k, *(matrix.tobytes() for matrix in together))
-            moved, part = made.response @ shapes, inverse @ np.r_[q, v]
-        felt, begun = np.abs(moved), np.abs(moved * part)
-        steady = float(np.linalg.norm(wave @ made.response))
-    return LinearModes(steady, begun, -values.real, np.abs(values.imag), felt > _FELT * felt.max(initial=0.0))
+            for i in range(2 * k):
+                part += parts.inverse[j, i] * start[i]
+        part *= parts.seen[j]
+        modes.begun[j] = math.hypot(part.real, part.imag)
 
 
-def _oscillators(
-    square: np.ndarray, damping: np.ndarray, q: np.ndarray, v: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return eigenvalues, shapes and parts (2k,) of k modes that nothing couples, as of _complex."""
+@strict
+def _set_wave(parts, modes, load, omega):
+    """Set the complex displacements in steady state under a load; infinite at a resonance without damping."""
+    wave, matrix, regular = modes.wave, modes.matrix, True
+    for i in range(len(wave)):
+        wave[i] = 0.0
+        for c in range(len(load)):
+            wave[i] += parts.basis[c, i] * load[c]
+    for i in range(len(wave)):
+        for j in range(len(wave)):
+            if i == j or not parts.diagonal:
+                matrix[i, j] = complex(
+                    parts.stiffness[i, j] - omega * omega * parts.mass[i, j], omega * parts.damping[i, j]
+                )
+        if parts.diagonal:
+            regular = regular and (matrix[i, i].real != 0.0 or matrix[i, i].imag != 0.0)
+            wave[i] *= reciprocal(matrix[i, i])
+    if not parts.diagonal:
+        regular = solve(matrix, wave, len(wave))
+    for i in range(len(wave)):
+        wave[i] = wave[i] if regular else complex(np.inf, 0.0)
+
+
+def _oscillators(square: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return eigenvalues and shapes of one energy (2k,) of k modes that nothing couples, and displacements per part.
+
+    The parts are q' - other q, with the other eigenvalue.
+    """
     root = np.sqrt((damping / 2) ** 2 - square + 0j)
     least = _CRITICAL * np.sqrt(np.abs(square)) + np.finfo(float).tiny
     root = np.where(np.abs(root) < least, least, root)
     # the slow one of two real values would cancel
     first = -damping / 2 - root
-    second = np.where((root.imag == 0) & (first != 0), square / first, -damping / 2 + root)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        second = np.where((root.imag == 0) & (first != 0), square / first, -damping / 2 + root)
     size = np.abs(np.r_[first, second])
     size = np.maximum(size, np.finfo(float).eps * size.max(initial=0.0)) + np.finfo(float).tiny
-    part = np.r_[v - second * q, first * q - v] / np.r_[first - second, first - second]
-    return np.r_[first, second], 1 / size, part * size
+    return np.r_[first, second], 1 / size, 1 / np.r_[first - second, second - first]
 
 
 @lru_cache(maxsize=32)

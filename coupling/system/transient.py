@@ -7,16 +7,19 @@ exp(-2 pi zeta n) left after n periods.
 
 from __future__ import annotations
 
-from bisect import bisect_left
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.compiler.function_address import quantile_address
+from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_modes import LinearModes, linear_modes, weight_energy
+from vanedamp.coupling.system.linear_modes import linear_systems, set_modes, start_of_modes
 from vanedamp.coupling.system.system import System
 
 #: longest transient that is taken without being asked for, in periods
@@ -47,44 +50,74 @@ class Length(NamedTuple):
     most: int
 
 
+@record
+class Known(NamedTuple):
+    """What is known of a scene before its run. What frequency, loads and start change is in arrays.
+
+    e harmonics, N coordinates, n modes, b bodies; `begin_transient` sets `excited`.
+    """
+
+    modes: int  # n
+    clock: np.ndarray  # (2,) angular frequency of order 1, rad/s, and period, s
+    frequency: np.ndarray  # (e,) rad/s
+    load: np.ndarray  # (e, N) complex, N
+    q: np.ndarray  # (n + b,) start of modal coordinates and positions
+    v: np.ndarray  # (n + b,) their rates
+    excited: np.ndarray  # (1,) bool: whether loads act on the structure
+    driven: bool  # whether something else moves it: a base, or an excitation that is no sum of sines
+    apart: bool  # whether the held system is another one than the loose
+    free: np.ndarray  # (1 + b,) bool: of the structure False, of each body whether no spring holds it
+    weight_energy: float  # by which weight lowers the energy of the springs that hold bodies, J
+    rigid: bool  # whether friction dampers stick without a spring
+    tolerance: float
+    open: bool  # whether the length of the run is
+    suited: bool  # whether the transient decides on it
+    dropped: int  # periods that are left out unless it does
+    simulated: int
+    most: int  # longest run; 0: no longer than its length
+    quantile_at: int  # address of Student's quantile
+
+
 class Transient:
-    """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's."""
+    """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's.
+
+    numbers: what compiled functions take of it, (Known, loose and held LinearModes).
+    """
 
     def __init__(self, scene: Scene, system: System | None = None) -> None:
         self.scene, self.system = scene, assemble(scene) if system is None else system
-        self.systems = linear_modes(scene, self.system)
-        self.excited = bool(self.system.of_structure.load.any())
-        signal = scene.excitation.signal
-        self.driven = self.excited or signal is not None or isinstance(scene.structure, Prescribed)
+        systems = linear_systems(scene, self.system)
+        (loose, free), (held, stuck) = systems[0], systems[-1]
+        time, prescribed = scene.time, isinstance(scene.structure, Prescribed)
+        q, v = start_of_modes(scene, self.system)
+        known = Known(
+            modes=self.system.modes, clock=np.array([self.system.omega, self.system.period]),
+            frequency=self.system.frequency, load=self.system.load, q=q, v=v, excited=np.zeros(1, bool),
+            driven=prescribed or scene.excitation.signal is not None, apart=len(systems) > 1,
+            free=np.array([False, *(not damper.sprung for damper in scene.damper)]), weight_energy=loose.weight_energy,
+            rigid=any(damper.stiffness is None for damper in scene.friction_damper), tolerance=float(time.tolerance),
+            open=time.open, suited=time.open and not prescribed, dropped=time.dropped, simulated=time.simulated,
+            most=0 if time.steady and not prescribed else most_periods(scene),
+            quantile_at=quantile_address(),
+        )  # fmt: skip
+        self.numbers = known, free, stuck
+        begin_transient(known, loose, held, free, stuck)
 
     def left_over(self, periods: float) -> float:
         """Return the bound of the remainder, as left_over."""
-        return max(self._left(modes, periods) for modes in self.systems) if self.excited else 0.0
-
-    def _left(self, modes: LinearModes, periods: float) -> float:
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            steady = max(modes.steady, _NOTHING * modes.begun.sum())
-            share = np.sum(modes.begun * np.exp(-modes.rate * self.system.period * periods)) / steady
-        return float(share) if np.isfinite(share) else np.inf
+        return float(remainder(*self.numbers, float(periods)))
 
     def slowest(self, periods: int) -> tuple[float, float]:
         """Return the slowest decay per period that the response may show, and the longest beat, in periods.
 
         Beats, with the excitation at the same phase of each period, of modes that do not decay within `periods`.
         """
-        slowest, longest = np.inf, 0.0
-        for modes in self.systems:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                seen = modes.felt | ~(modes.begun <= self.scene.time.tolerance * modes.steady)
-                rate, turns = modes.rate[seen] * self.system.period, modes.own[seen] / self.system.omega
-                beats = 1 / np.abs(turns - np.rint(turns))[rate * periods < 1]
-            slowest = min(slowest, rate.min(initial=np.inf))
-            longest = max(longest, beats.max(initial=0.0))
-        return float(slowest), float(longest)
+        decay, beat = slowest(*self.numbers, periods)
+        return float(decay), float(beat)
 
     def weight_energy(self) -> float:
         """Return the energy, J, by which weight lowers the energy of the springs and tracks that hold bodies."""
-        return weight_energy(self.scene, self.system)
+        return self.numbers[0].weight_energy
 
     def settled_after(self, lengths: range, share: float | None = None) -> int:
         """Return the first of rising numbers of periods that leaves at most a fraction; their end where none does.
@@ -92,8 +125,7 @@ class Transient:
         share: fraction of the steady response; default: `time.tolerance`.
         """
         share = self.scene.time.tolerance if share is None else share
-        place = bisect_left(lengths, True, key=lambda periods: self.left_over(periods) <= share)
-        return lengths.start + place * lengths.step
+        return int(settled(*self.numbers, lengths.start, len(lengths), lengths.step, float(share)))
 
     def length(self) -> Length:
         """Return the length of the scene's run.
@@ -101,14 +133,82 @@ class Transient:
         Of one that leaves it open, as many periods as leave `time.tolerance` of the steady response, at least the
         default; the default too where LIMIT would not do: then nothing but the bodies can end the transient in time.
         """
-        time, most = self.scene.time, most_periods(self.scene)
-        if not time.open or isinstance(self.scene.structure, Prescribed):
-            return Length(time.dropped, time.simulated, most)
-        enough = self.settled_after(range(time.dropped, LIMIT + 1))
-        if enough == LIMIT + 1:
-            enough = time.dropped
-        periods = enough + time.simulated - time.dropped
-        return Length(enough, periods, periods if time.steady else most)
+        return Length(*run_length(*self.numbers))
+
+
+@strict_entry
+def begin_transient(known, loose, held, free, stuck):
+    """Set the modes of the loose system, `free`, and of the held one, `stuck`."""
+    known.excited[0] = False
+    for h in range(len(known.load)):
+        for i in range(known.modes):
+            if known.load[h, i] != 0.0:
+                known.excited[0] = True
+    set_modes(loose, free, known.load, known.frequency, known.q, known.v)
+    if known.apart:
+        set_modes(held, stuck, known.load, known.frequency, known.q, known.v)
+
+
+@strict_entry
+def remainder(known, free, stuck, periods):
+    """Return the bound of the remainder (Transient.left_over)."""
+    if not known.excited[0]:
+        return 0.0
+    return max(_remainder(known, free, periods), _remainder(known, stuck, periods))
+
+
+@strict
+def _remainder(known, modes, periods):
+    begun, left = 0.0, 0.0
+    for j in range(len(modes.begun)):
+        begun += modes.begun[j]
+        left += modes.begun[j] * math.exp(-modes.rate[j] * known.clock[1] * periods)
+    left /= max(modes.steady[0], _NOTHING * begun)
+    return left if math.isfinite(left) else np.inf
+
+
+@strict_entry
+def slowest(known, free, stuck, periods):
+    """Return the slowest decay and the longest beat (Transient.slowest)."""
+    one, other = _slowest(known, free, periods), _slowest(known, stuck, periods)
+    return min(one[0], other[0]), max(one[1], other[1])
+
+
+@strict
+def _slowest(known, modes, periods):
+    decay, longest = np.inf, 0.0
+    for j in range(len(modes.begun)):
+        if modes.felt[j] or not modes.begun[j] <= known.tolerance * modes.steady[0]:
+            rate, turns = modes.rate[j] * known.clock[1], modes.own[j] / known.clock[0]
+            decay = min(decay, rate)
+            if rate * periods < 1.0:
+                longest = max(longest, 1.0 / abs(turns - math.floor(turns + 0.5)))
+    return decay, longest
+
+
+@strict_entry
+def settled(known, free, stuck, start, count, step, share):
+    """Return the first of `count` rising numbers of periods that leaves at most a share; their end where none does."""
+    low, high = np.int64(0), count
+    while low < high:
+        middle = (low + high) >> 1
+        if remainder(known, free, stuck, float(start + middle * step)) <= share:
+            high = middle
+        else:
+            low = middle + 1
+    return start + low * step
+
+
+@strict_entry
+def run_length(known, free, stuck):
+    """Return the length of a run (Transient.length)."""
+    enough, periods = known.dropped, known.simulated
+    if known.suited:
+        count = LIMIT + 1 - known.dropped
+        enough = settled(known, free, stuck, known.dropped, count, np.int64(1), known.tolerance)
+        enough = known.dropped if enough == LIMIT + 1 else enough
+        periods += enough - known.dropped
+    return enough, periods, max(periods, known.most)
 
 
 def most_periods(scene: Scene) -> int:

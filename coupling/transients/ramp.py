@@ -216,7 +216,7 @@ class _Run:
         self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
         self.ledger[k + 1, STORED] -= self.rotation
         self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
-        self.dynamic[k] = about_mean(records, slice(0, 1), self.system.period)[1][0]
+        self.dynamic[k] = about_mean(records, 0, 1, self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
         self.stuck[k] = slow.all(axis=0) & same & ~named_bodies(outcome.rows, outcome.log, b)

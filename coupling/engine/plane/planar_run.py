@@ -12,9 +12,8 @@ from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratc
 from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import BOUNDED, DONE, FLOW, LOGGED, PERIOD, REDUCED, ROOT, UNDECIDED
-from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
-from vanedamp.coupling.response.recorder import plane_of
+from vanedamp.coupling.response.plane import Plane, plane_of
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, Records
 from vanedamp.coupling.response.restart import state_at
 from vanedamp.coupling.response.restart_state import RestartState

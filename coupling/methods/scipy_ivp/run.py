@@ -32,7 +32,7 @@ from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
-from vanedamp.coupling.response.recorder import plane_of
+from vanedamp.coupling.response.plane import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import Motion as InitialMotion

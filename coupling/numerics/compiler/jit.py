@@ -31,7 +31,9 @@ ZERO = np.int64(0)
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}, "no_cfunc_wrapper": True,
 }  # fmt: skip
-_NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
+_NOT_FROM_PYTHON = {"no_cpython_wrapper": True}
+# no sum and product become one: results do not depend on what a function is compiled into
+_STRICT = _OPTIONS | {"fastmath": False}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@strict", "@intrinsic", "(NamedTuple)")
@@ -41,16 +43,19 @@ _PACKAGE = Path(__file__).parents[3]
 _Decorator = Callable[[Callable[..., Any]], Any]
 
 #: compiles a function that only compiled functions call, as a part of them
-kernel: _Decorator = njit(**_NOT_FROM_PYTHON, pipeline_class=KERNEL)
+kernel: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: the same into its callers: for functions that every segment runs
-inlined: _Decorator = njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)
+inlined: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=INLINED)
+#: a kernel with the same results, bit for bit, in all its callers: for figures of single runs and of batches. It calls
+#: no part of numba that is written in Python (complex division, abs of a complex number): that would have the freedoms
+#: of its first caller
+strict: _Decorator = njit(**_STRICT | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: a kernel whose sums may be taken in any order, several terms at once
-summing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
+summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
 #: a kernel that compares many numbers, several at once; what it returns for NaN is anything
-comparing: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS)
-
-#: a kernel whose results do not depend on where it is compiled into: no two operations become one
-strict: _Decorator = njit(**_NOT_FROM_PYTHON | {"fastmath": False}, pipeline_class=KERNEL)
+comparing: _Decorator = njit(
+    **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS
+)
 
 
 class CacheError(VanedampError):
@@ -60,10 +65,10 @@ class CacheError(VanedampError):
 class Entry:
     """A compiled function that Python calls, kept on disk; as a kernel, in `kernel`, compiled functions call it."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.kernel = kernel(function)
-        self._compiled = _kept(function)
+        self.kernel = njit(**options | _NOT_FROM_PYTHON, pipeline_class=KERNEL)(function)
+        self._compiled = _kept(function, options)
         self._sized: dict[Any, Callable[..., Any]] = {}
 
     def __call__(self, *arguments: Any) -> Any:
@@ -89,13 +94,18 @@ def entry(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that Python calls, and compiled functions may."""
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return function
-    return Entry(function)
+    return Entry(function, _OPTIONS)
 
 
-def _kept(function: Callable[..., Any]) -> Any:
+def strict_entry(function: Callable[..., Any]) -> Any:
+    """Compile a function as `strict` that Python calls, and compiled functions may."""
+    return function if config.DISABLE_JIT else Entry(function, _STRICT)  # type: ignore[attr-defined]
+
+
+def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Compile a function that Python calls, and keep it on disk."""
     try:
-        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)
+        compiled = njit(**options, cache=True, pipeline_class=ENTRY)(function)
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(
@@ -124,21 +134,28 @@ def _sources(file: Path) -> str:
 
     The imports of other files are data: they do not enter the code.
     """
-    texts: dict[Path, str] = {}
+    found: set[Path] = set()
     waiting = [file]
     while waiting:
         path = waiting.pop()
-        if path in texts:
-            continue
-        texts[path] = path.read_text(encoding="utf-8")
-        if any(mark in texts[path] for mark in _MARKS):
-            names = re.findall(r"^from vanedamp\.([\w.]+) import", texts[path], re.MULTILINE)
-            files = [_PACKAGE / f"{name.replace('.', '/')}.py" for name in names]
-            waiting += [name for name in files if name.is_file()]
+        if path not in found:
+            found.add(path)
+            waiting += _read(path)[1]
     digest = hashlib.sha256()
-    for path in sorted(texts):
-        digest.update(texts[path].encode())
+    for path in sorted(found):
+        digest.update(_read(path)[0])
     return digest.hexdigest()
+
+
+@cache
+def _read(path: Path) -> tuple[bytes, list[Path]]:
+    """Return the text of a file, and the imports that it has as a file of functions or records."""
+    text = path.read_text(encoding="utf-8")
+    if not any(mark in text for mark in _MARKS):
+        return text.encode(), []
+    names = re.findall(r"^from vanedamp\.([\w.]+) import", text, re.MULTILINE)
+    files = [_PACKAGE / f"{name.replace('.', '/')}.py" for name in names]
+    return text.encode(), [name for name in files if name.is_file()]
 
 
 class NotCompiled(Exception):

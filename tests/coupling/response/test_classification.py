@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vanedamp.coupling.response.response import classify
+from vanedamp.coupling.response.figures import NON_PERIODIC, repetition
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
@@ -47,11 +47,11 @@ def test_a_motion_without_period_keeps_its_name(mass, ratio):
 
 def test_states_are_measured_by_their_scales():
     """A state that all but vanishes beside its scale says nothing; one that changes by 1e-5 of its scale does."""
-    period, hits = np.arange(40), np.ones(40)
+    period = np.arange(40)
     steady = np.column_stack([np.ones(40), 1e-9 * np.sin(period)])
-    assert classify(steady, np.array([1.0, 1.0]), hits, True) == "periodic-1"
-    assert classify(steady, np.array([1.0, 1e-4]), hits, True) == "non-periodic"
+    assert repetition(steady, 0, 39, np.array([1.0, 1.0])) == 1
+    assert repetition(steady, 0, 39, np.array([1.0, 1e-4])) == NON_PERIODIC
     alternating = np.column_stack([1.0 + 1e-5 * (-1.0) ** period, np.zeros(40)])
-    assert classify(alternating, np.array([1.0, 1.0]), hits, True) == "periodic-2"
-    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, True) == "stuck"
-    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, False) == "no-contact"
+    assert repetition(alternating, 0, 39, np.array([1.0, 1.0])) == 2
+    # of too few periods nothing repeats often enough
+    assert repetition(alternating, 37, 39, np.array([1.0, 1.0])) == NON_PERIODIC

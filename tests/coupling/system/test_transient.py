@@ -42,6 +42,26 @@ def test_overdamped_mode_goes_by_its_slower_part():
     assert left_over(structure, 3) / left_over(structure, 2) == pytest.approx(math.exp(-slower), rel=1e-9)
 
 
+def test_a_resonance_without_damping_never_ends():
+    assert left_over(scene(0.0, excitation={"frequency": FIRST, "force": 1.0}), LIMIT) == math.inf
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_steady_amplitude_of_coupled_modes(tmp_path, seed):
+    """Modes near each other, coupled by their damping, against a solution of numpy's."""
+    draw = np.random.default_rng(seed)
+    root, row = draw.normal(size=(4, 4)), draw.normal(size=4)
+    squares, damping = (2 * np.pi * FIRST * draw.uniform(0.99, 1.01, 4)) ** 2, root @ root.T
+    model = ReducedModel.from_matrices(np.eye(4), np.diag(squares), {"tip": row}, damping=damping)
+    model.save(tmp_path / "rom.h5")
+    structure = {"model": "rom", "file": str(tmp_path / "rom.h5")}
+    excitation = {"frequency": FIRST, "force": 3.0, "at": "tip"}
+    made = validate(Scene, {"structure": structure, "excitation": excitation}, "coupled")
+    omega = 2 * np.pi * FIRST
+    x = np.linalg.solve(np.diag(squares - omega**2) + 1j * omega * damping, 3.0 * row) @ row
+    assert Transient(made).numbers[1].steady[0] == pytest.approx(abs(x), rel=1e-9)
+
+
 def test_modes_count_as_they_are_excited(tmp_path):
     """A mode that the force does not drive has no transient, however little it is damped."""
     squares = (2 * np.pi * np.array([50.0, FIRST])) ** 2

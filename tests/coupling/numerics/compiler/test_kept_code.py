@@ -12,7 +12,7 @@ import pytest
 
 from tests.tools.processes import environment
 from vanedamp.coupling.numerics.compiler import jit
-from vanedamp.coupling.numerics.compiler.jit import _sources
+from vanedamp.coupling.numerics.compiler.jit import _read, _sources
 
 
 @pytest.fixture
@@ -32,6 +32,7 @@ def digest(tmp_path, monkeypatch):
         for name, text in texts.items():
             (tmp_path / f"{name}.py").write_text(text + ("\n# edited\n" if name == edited else ""))
         _sources.cache_clear()
+        _read.cache_clear()
         return _sources(tmp_path / f"{file}.py")
 
     yield after
