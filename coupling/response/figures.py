@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.function_address import quantile_address
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.response.at_rest import at_rest
 from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, STORED, VISCOUS
 from vanedamp.coupling.response.static_deflection import distance, static_deflection
@@ -40,30 +40,30 @@ _ROUND_OFF = 1e-12
 _TINY = float(np.finfo(float).tiny)
 
 
-@record
+@record_with(free_axes=2)
 class Measured(NamedTuple):
     """What the figures need of a system (System, whose arrays these are); b bodies, c contacts, e harmonics."""
 
-    clock: np.ndarray  # (2,) angular frequency of order 1, rad/s, and period, s
-    frequency: np.ndarray  # (e,) rad/s
-    load: np.ndarray  # (e, N) complex, N
-    table: np.ndarray  # (e,) complex displacements of a prescribed base, m
-    squares: np.ndarray  # (n,) squared angular frequencies of the structure
-    mass: np.ndarray  # (N,) kg
-    along: np.ndarray  # (b,) coordinate of each body
-    holds: np.ndarray  # (b,) friction that holds a body on its floor, N
-    rest: np.ndarray  # (u,) gaps at rest, m
-    play: np.ndarray  # (u,) m
-    J: np.ndarray  # (2u, N)
-    body: np.ndarray  # (u,) body of a contact
-    other: np.ndarray  # (u,) the body to its right, -1: none
-    lies: np.ndarray  # (c,) bool: whether a body can lie on the contact: a rigid one along its cavity
-    rolls: np.ndarray  # (b,) bool: whether friction makes the body roll
-    fixed: np.ndarray  # (b,) bool: whether the structure does not move its floor
+    clock: Annotated[np.ndarray, "2"]  # angular frequency of order 1, rad/s, and period, s
+    frequency: Annotated[np.ndarray, "e"]  # rad/s
+    load: Annotated[np.ndarray, "e N", complex]  # N
+    table: Annotated[np.ndarray, "e", complex]  # displacements of a prescribed base, m
+    squares: Annotated[np.ndarray, "n"]  # squared angular frequencies of the structure
+    mass: Annotated[np.ndarray, "N"]  # kg
+    along: Annotated[np.ndarray, "b", int]  # coordinate of each body
+    holds: Annotated[np.ndarray, "b"]  # friction that holds a body on its floor, N
+    rest: Annotated[np.ndarray, "u"]  # gaps at rest, m
+    play: Annotated[np.ndarray, "u"]  # m
+    J: Annotated[np.ndarray, "2u N"]
+    body: Annotated[np.ndarray, "u", int]  # body of a contact
+    other: Annotated[np.ndarray, "u", int]  # the body to its right, -1: none
+    lies: Annotated[np.ndarray, "c", bool]  # whether a body can lie on the contact: a rigid one along its cavity
+    rolls: Annotated[np.ndarray, "b", bool]  # whether friction makes the body roll
+    fixed: Annotated[np.ndarray, "b", bool]  # whether the structure does not move its floor
     orders: bool  # whether order 1 may be missing among the loads
     quantile_at: int  # address of Student's quantile
-    scale: np.ndarray  # (3 + 2b,) room for the scale of each state
-    held: np.ndarray  # (b,) bool, room for which bodies are at rest
+    scale: Annotated[np.ndarray, "s"]  # (3 + 2b,) room for the scale of each state
+    held: Annotated[np.ndarray, "b", bool]  # room for which bodies are at rest
 
 
 def measured_of(scene: Scene, system: System) -> Measured:
@@ -116,7 +116,7 @@ def measure(measured, records, first, done, confidence, figures):
     for entry in range(len(ENERGIES)):
         figures[ENERGY + entry] = records.ledger[done, entry] - records.ledger[first, entry]
     exchanged = lent_energy(measured.load, measured.along, measured.squares, measured.mass, measured.frequency, omega)
-    for i in range(len(records.collided)):
+    for i in range(done + 1):
         exchanged = max(exchanged, records.collided[i])
     figures[RESIDUAL] = imbalance(records.ledger, records.parts, done, exchanged)
     change = records.section[done, 2] - records.section[first, 2]

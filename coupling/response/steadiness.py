@@ -54,32 +54,32 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
 
 
 @strict_entry
-def judged(known, free, stuck, records, first, done, peaks):
-    """Return a Judgement, of unknown confidence nan. known, free, stuck: Transient.numbers; peaks: room for (n,)."""
-    n, tolerance = done - first, known.tolerance
-    peaks_about_mean(records, first, done, known.clock[1], peaks)
-    mean, left = mean_of(peaks, ZERO, n), remainder(known, free, stuck, float(first))
+def judged(setup, free, stuck, records, first, done, peaks):
+    """Return a Judgement, of unknown confidence nan. setup, free, stuck: Transient.numbers; peaks: room for (n,)."""
+    n, tolerance = done - first, setup.tolerance
+    peaks_about_mean(records, first, done, setup.clock[1], peaks)
+    mean, left = mean_of(peaks, ZERO, n), remainder(setup, free, stuck, float(first))
     moves = False
     for i in range(n):
         moves = moves or peaks[i] != 0.0
     # a motion that nothing excites is what was asked for, whatever is left of it
     if (
-        not (moves and (known.driven or known.excited[0]))
-        or (left <= tolerance and not _touched(known, records, ZERO, done))
+        not (moves and (setup.driven or setup.excited[0]))
+        or (left <= tolerance and not _touched(setup, records, ZERO, done))
     ):  # fmt: skip
-        return True, np.inf, confidence_of(peaks, ZERO, n, np.inf, known.quantile_at) + left * mean
+        return True, np.inf, confidence_of(peaks, ZERO, n, np.inf, setup.quantile_at) + left * mean
     if n < 2:
         return False, 0.0, np.nan
-    quiet = not _touched(known, records, first, done)
-    rate, beat = slowest(known, free, stuck, n)
+    quiet = not _touched(setup, records, first, done)
+    rate, beat = slowest(setup, free, stuck, n)
     if not quiet:
-        rate, beat = _energy_rate(known, records, first, done), 0.0
+        rate, beat = _energy_rate(setup, records, first, done), 0.0
     remaining, allowed = _remaining(peaks, n, rate, tolerance), tolerance * mean
     # where the start is forgotten, a window that was given may be short: its confidence shows its value
-    given = left <= tolerance and not known.open
+    given = left <= tolerance and not setup.open
     repeats = remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat)
     relaxations = rate * n
-    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations, known.quantile_at)
+    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations, setup.quantile_at)
     if quiet or repeats:
         return repeats, rate, own + (remaining if repeats else 0.0)
     # neighbouring parts of the window must not be too much alike for statistics, beyond the tolerance of its mean
@@ -98,7 +98,7 @@ def run_ends(steady, rate, dropped, periods, most):
 
 
 @strict
-def _touched(known, records, first, done):
+def _touched(setup, records, first, done):
     """Whether something else than linear motion acts within some periods: impacts, slip, stops of rigid friction."""
     before, after = records.ledger[first], records.ledger[done]
     for entry in (FRICTION, IMPACT_LOSS, CONTACT):
@@ -107,18 +107,18 @@ def _touched(known, records, first, done):
     for i in range(first, done):
         if records.impacts[i] != 0:
             return True
-    return known.rigid
+    return setup.rigid
 
 
 @strict
-def _energy_rate(known, records, first, done):
+def _energy_rate(setup, records, first, done):
     """Return how fast an amplitude would decay by the losses of some periods, per period."""
-    loss, energy, parts = 0.0, known.weight_energy, records.parts
+    loss, energy, parts = 0.0, setup.weight_energy, records.parts
     for entry in range(VISCOUS, STORED):
         loss += records.ledger[done, entry] - records.ledger[first, entry]
-    for part in range(len(known.free)):
+    for part in range(len(setup.free)):
         total, least = 0.0, 0.0
-        if known.free[part]:
+        if setup.free[part]:
             # counts from where it has least: its height is only known within the cavity
             least = np.inf
             for i in range(first, done + 1):

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import strict
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.elimination import reciprocal, solve
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.body_loads import binding, body_loads
@@ -32,44 +32,43 @@ _CRITICAL = 1e-6
 _FELT = 1e-2
 
 
-@record
+@record_with(free_axes=2)
 class LinearParts(NamedTuple):
     """A linear system with k coordinates and 2k complex modes, whatever its frequency, loads and start.
 
     M q'' + C q' + K q = Re sum_h load_h exp(i omega_h t) + weight. N coordinates, n modes and b bodies of the System.
     """
 
-    mass: np.ndarray  # (k, k)
-    damping: np.ndarray  # (k, k)
-    stiffness: np.ndarray  # (k, k)
     diagonal: bool  # whether nothing couples its coordinates
-    basis: np.ndarray  # (N, k) motion of the System's coordinates
-    place: np.ndarray  # (k,) int: number of each coordinate among modes and bodies (n + b,)
-    response: np.ndarray  # (k,)
-    static: np.ndarray  # (k,) displacements under weight
     weight_energy: float  # by which weight lowers the energy of the springs that hold bodies, J
-    value: np.ndarray  # (2k,) complex eigenvalues, 1/s; without coupling one of each oscillator, then the others
-    seen: np.ndarray  # (2k,) complex: motion of the response by the part of each mode
-    inverse: np.ndarray  # (2k, 2k) complex: takes (q, q') to the parts; (0, 0) without coupling
+    mass: Annotated[np.ndarray, "k k"]
+    damping: Annotated[np.ndarray, "k k"]
+    stiffness: Annotated[np.ndarray, "k k"]
+    basis: Annotated[np.ndarray, "N k"]  # motion of the System's coordinates
+    place: Annotated[np.ndarray, "k", int]  # number of each coordinate among modes and bodies (n + b,)
+    response: Annotated[np.ndarray, "k"]
+    static: Annotated[np.ndarray, "k"]  # displacements under weight
+    # eigenvalues, 1/s; without coupling one of each oscillator, then the others
+    value: Annotated[np.ndarray, "2k", complex]
+    seen: Annotated[np.ndarray, "2k", complex]  # motion of the response by the part of each mode
+    inverse: Annotated[np.ndarray, "2k 2k", complex]  # takes (q, q') to the parts; (0, 0) without coupling
 
 
-@record
+@record_with(free_axes=2)
 class LinearModes(NamedTuple):
     """Complex modes of a linear system with its start and load; m = 2k modes, of displacements of the response.
 
-    steady: (1,) its amplitude, m (of several harmonics the root of the squares); begun: (m,) amplitudes at time zero of
-    what is not steady, m; rate: (m,) decay, 1/s; own: (m,) angular frequency, rad/s; felt: (m,) whether the response
-    moves. matrix (k, k), wave (k,) and start (m,): room for `set_modes`.
+    matrix, wave and start: room for `set_modes`.
     """
 
-    steady: np.ndarray
-    begun: np.ndarray
-    rate: np.ndarray
-    own: np.ndarray
-    felt: np.ndarray
-    matrix: np.ndarray
-    wave: np.ndarray
-    start: np.ndarray
+    steady: Annotated[np.ndarray, "1"]  # its amplitude, m (of several harmonics the root of the squares)
+    begun: Annotated[np.ndarray, "m"]  # amplitudes at time zero of what is not steady, m
+    rate: Annotated[np.ndarray, "m"]  # decay, 1/s
+    own: Annotated[np.ndarray, "m"]  # angular frequency, rad/s
+    felt: Annotated[np.ndarray, "m", bool]  # whether the response moves
+    matrix: Annotated[np.ndarray, "k k", complex]
+    wave: Annotated[np.ndarray, "k", complex]
+    start: Annotated[np.ndarray, "m"]
 
 
 class _Matrices(NamedTuple):
@@ -170,12 +169,12 @@ def _with_modes(made: _Matrices) -> tuple[LinearParts, LinearModes]:
         seen = made.response @ shapes
         felt = np.abs(seen)
     parts = LinearParts(
-        *together, diagonal, made.basis, made.place, made.response, static, float(made.weight @ static) / 2, values,
+        diagonal, float(made.weight @ static) / 2, *together, made.basis, made.place, made.response, static, values,
         seen, inverse,
     )  # fmt: skip
-    return parts, LinearModes(
-        np.zeros(1), np.zeros(2 * k), -values.real, np.abs(values.imag), felt > _FELT * felt.max(initial=0.0),
-        np.zeros((k, k), complex), np.zeros(k, complex), np.zeros(2 * k),
+    return parts, room(
+        LinearModes, {"k": k, "m": 2 * k}, rate=-values.real, own=np.abs(values.imag),
+        felt=felt > _FELT * felt.max(initial=0.0),
     )  # fmt: skip
 
 

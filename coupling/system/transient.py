@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.function_address import quantile_address
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.assembly import assemble
@@ -50,23 +50,23 @@ class Length(NamedTuple):
     most: int
 
 
-@record
-class Known(NamedTuple):
+@record_with(free_axes=2)
+class Setup(NamedTuple):
     """What is known of a scene before its run. What frequency, loads and start change is in arrays.
 
     e harmonics, N coordinates, n modes, b bodies; `begin_transient` sets `excited`.
     """
 
     modes: int  # n
-    clock: np.ndarray  # (2,) angular frequency of order 1, rad/s, and period, s
-    frequency: np.ndarray  # (e,) rad/s
-    load: np.ndarray  # (e, N) complex, N
-    q: np.ndarray  # (n + b,) start of modal coordinates and positions
-    v: np.ndarray  # (n + b,) their rates
-    excited: np.ndarray  # (1,) bool: whether loads act on the structure
+    clock: Annotated[np.ndarray, "2"]  # angular frequency of order 1, rad/s, and period, s
+    frequency: Annotated[np.ndarray, "e"]  # rad/s
+    load: Annotated[np.ndarray, "e N", complex]  # N
+    q: Annotated[np.ndarray, "N"]  # (n + b,) start of modal coordinates and positions
+    v: Annotated[np.ndarray, "N"]  # (n + b,) their rates
+    excited: Annotated[np.ndarray, "1", bool]  # whether loads act on the structure
     driven: bool  # whether something else moves it: a base, or an excitation that is no sum of sines
     apart: bool  # whether the held system is another one than the loose
-    free: np.ndarray  # (1 + b,) bool: of the structure False, of each body whether no spring holds it
+    free: Annotated[np.ndarray, "N", bool]  # (1 + b,) of the structure False, of each body whether no spring holds it
     weight_energy: float  # by which weight lowers the energy of the springs that hold bodies, J
     rigid: bool  # whether friction dampers stick without a spring
     tolerance: float
@@ -81,7 +81,7 @@ class Known(NamedTuple):
 class Transient:
     """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's.
 
-    numbers: what compiled functions take of it, (Known, loose and held LinearModes).
+    numbers: what compiled functions take of it, (Setup, loose and held LinearModes); parts: of both (LinearParts).
     """
 
     def __init__(self, scene: Scene, system: System | None = None) -> None:
@@ -90,7 +90,7 @@ class Transient:
         (loose, free), (held, stuck) = systems[0], systems[-1]
         time, prescribed = scene.time, isinstance(scene.structure, Prescribed)
         q, v = start_of_modes(scene, self.system)
-        known = Known(
+        setup = Setup(
             modes=self.system.modes, clock=np.array([self.system.omega, self.system.period]),
             frequency=self.system.frequency, load=self.system.load, q=q, v=v, excited=np.zeros(1, bool),
             driven=prescribed or scene.excitation.signal is not None, apart=len(systems) > 1,
@@ -100,8 +100,8 @@ class Transient:
             most=0 if time.steady and not prescribed else most_periods(scene),
             quantile_at=quantile_address(),
         )  # fmt: skip
-        self.numbers = known, free, stuck
-        begin_transient(known, loose, held, free, stuck)
+        self.numbers, self.parts = (setup, free, stuck), (loose, held)
+        begin_transient(setup, loose, held, free, stuck)
 
     def left_over(self, periods: float) -> float:
         """Return the bound of the remainder, as left_over."""
@@ -137,49 +137,49 @@ class Transient:
 
 
 @strict_entry
-def begin_transient(known, loose, held, free, stuck):
+def begin_transient(setup, loose, held, free, stuck):
     """Set the modes of the loose system, `free`, and of the held one, `stuck`."""
-    known.excited[0] = False
-    for h in range(len(known.load)):
-        for i in range(known.modes):
-            if known.load[h, i] != 0.0:
-                known.excited[0] = True
-    set_modes(loose, free, known.load, known.frequency, known.q, known.v)
-    if known.apart:
-        set_modes(held, stuck, known.load, known.frequency, known.q, known.v)
+    setup.excited[0] = False
+    for h in range(len(setup.load)):
+        for i in range(setup.modes):
+            if setup.load[h, i] != 0.0:
+                setup.excited[0] = True
+    set_modes(loose, free, setup.load, setup.frequency, setup.q, setup.v)
+    if setup.apart:
+        set_modes(held, stuck, setup.load, setup.frequency, setup.q, setup.v)
 
 
 @strict_entry
-def remainder(known, free, stuck, periods):
+def remainder(setup, free, stuck, periods):
     """Return the bound of the remainder (Transient.left_over)."""
-    if not known.excited[0]:
+    if not setup.excited[0]:
         return 0.0
-    return max(_remainder(known, free, periods), _remainder(known, stuck, periods))
+    return max(_remainder(setup, free, periods), _remainder(setup, stuck, periods))
 
 
 @strict
-def _remainder(known, modes, periods):
+def _remainder(setup, modes, periods):
     begun, left = 0.0, 0.0
     for j in range(len(modes.begun)):
         begun += modes.begun[j]
-        left += modes.begun[j] * math.exp(-modes.rate[j] * known.clock[1] * periods)
+        left += modes.begun[j] * math.exp(-modes.rate[j] * setup.clock[1] * periods)
     left /= max(modes.steady[0], _NOTHING * begun)
     return left if math.isfinite(left) else np.inf
 
 
 @strict_entry
-def slowest(known, free, stuck, periods):
+def slowest(setup, free, stuck, periods):
     """Return the slowest decay and the longest beat (Transient.slowest)."""
-    one, other = _slowest(known, free, periods), _slowest(known, stuck, periods)
+    one, other = _slowest(setup, free, periods), _slowest(setup, stuck, periods)
     return min(one[0], other[0]), max(one[1], other[1])
 
 
 @strict
-def _slowest(known, modes, periods):
+def _slowest(setup, modes, periods):
     decay, longest = np.inf, 0.0
     for j in range(len(modes.begun)):
-        if modes.felt[j] or not modes.begun[j] <= known.tolerance * modes.steady[0]:
-            rate, turns = modes.rate[j] * known.clock[1], modes.own[j] / known.clock[0]
+        if modes.felt[j] or not modes.begun[j] <= setup.tolerance * modes.steady[0]:
+            rate, turns = modes.rate[j] * setup.clock[1], modes.own[j] / setup.clock[0]
             decay = min(decay, rate)
             if rate * periods < 1.0:
                 longest = max(longest, 1.0 / abs(turns - math.floor(turns + 0.5)))
@@ -187,12 +187,12 @@ def _slowest(known, modes, periods):
 
 
 @strict_entry
-def settled(known, free, stuck, start, count, step, share):
+def settled(setup, free, stuck, start, count, step, share):
     """Return the first of `count` rising numbers of periods that leaves at most a share; their end where none does."""
     low, high = np.int64(0), count
     while low < high:
         middle = (low + high) >> 1
-        if remainder(known, free, stuck, float(start + middle * step)) <= share:
+        if remainder(setup, free, stuck, float(start + middle * step)) <= share:
             high = middle
         else:
             low = middle + 1
@@ -200,15 +200,15 @@ def settled(known, free, stuck, start, count, step, share):
 
 
 @strict_entry
-def run_length(known, free, stuck):
+def run_length(setup, free, stuck):
     """Return the length of a run (Transient.length)."""
-    enough, periods = known.dropped, known.simulated
-    if known.suited:
-        count = LIMIT + 1 - known.dropped
-        enough = settled(known, free, stuck, known.dropped, count, np.int64(1), known.tolerance)
-        enough = known.dropped if enough == LIMIT + 1 else enough
-        periods += enough - known.dropped
-    return enough, periods, max(periods, known.most)
+    enough, periods = setup.dropped, setup.simulated
+    if setup.suited:
+        count = LIMIT + 1 - setup.dropped
+        enough = settled(setup, free, stuck, setup.dropped, count, np.int64(1), setup.tolerance)
+        enough = setup.dropped if enough == LIMIT + 1 else enough
+        periods += enough - setup.dropped
+    return enough, periods, max(periods, setup.most)
 
 
 def most_periods(scene: Scene) -> int:

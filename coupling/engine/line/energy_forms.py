@@ -137,7 +137,7 @@ def _integrate(values, reciprocals, driven, load, m):
 
 @kernel
 def _invert_rates(flows, s, m, period, scratch):
-    """Set the reciprocals of the rates of products of modes k <= j, 0 for slow ones. List these, return their number."""
+    """Set the reciprocals of the rates of products of modes k <= j, 0 for slow ones. List these; return how many."""
     e, count, frame = flows.driven.shape[1] - 1, 0, scratch.frame
     for kind in range(2):
         sign = 1.0 if kind == SUM else -1.0

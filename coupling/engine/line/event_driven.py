@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import repeated
+from vanedamp.coupling.engine.line.columns import Columns, repeated
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
 from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
-from vanedamp.coupling.engine.line.scenes import JOB, run
+from vanedamp.coupling.engine.line.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job, run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
 from vanedamp.coupling.engine.line.subsystems import known_of
@@ -24,7 +24,10 @@ from vanedamp.coupling.numerics.codes import (
     CLOSES,
     FLOW,
     HELD,
+    ILL_CONDITIONED,
+    NEEDS_FLOW,
     PARTS,
+    PAUSED,
     PERIOD,
     POSITION,
     ROOT,
@@ -69,7 +72,7 @@ class EngineRun(EventDrivenRun):
         self.state, self.columns = new_state(system, modes), repeated(system, start)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
-        self.job = np.zeros(JOB, np.int64)
+        self.job, self.statistics = new_job(), UNJUDGED
         self._run = run
         if is_common(system, modes) and hasattr(run, "sized"):
             self._run = run.sized(*self._records(), 0, 0)
@@ -77,7 +80,7 @@ class EngineRun(EventDrivenRun):
     def _records(self) -> tuple[Any, ...]:
         return (
             self.job, self.columns, self.system, self.known.stack, self.flows, self.state, self.event_functions,
-            self.records, self.scratch, self.assembly,
+            self.records, self.scratch, self.assembly, *self.statistics,
         )  # fmt: skip
 
     def reuse(self, earlier: EngineRun) -> None:
@@ -177,15 +180,34 @@ class EngineRun(EventDrivenRun):
             loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
         )  # fmt: skip
 
+    def run_many(self, job: Job, columns: Columns, statistics: tuple[Any, ...]) -> int:
+        """Go on with the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.
+
+        columns: with a row more than scenes where these are linked; statistics: Setup, LinearParts and LinearModes of
+        the loose and the held system, Measured.
+        """
+        self.job, self.columns, self.statistics = job, columns, statistics
+        while True:
+            code = self._advance(0, self.max_events)
+            if code == NEEDS_FLOW:
+                try:
+                    self._add_flow()
+                except (IllConditioned, np.linalg.LinAlgError):
+                    job.at[CODE] = ILL_CONDITIONED
+            elif code != PAUSED:
+                return code
+
     def _left(self) -> RestartState:
-        state, system, s = self.state, self.system, int(self.counters[FLOW])
-        n, b, dampers = system.modes, system.bodies, slice(system.bodies, system.friction_rows)
-        active = slice(int(self.counters[ACTIVE]))
-        y = (state.amplitude[active] @ self.flows.shape[s, active]).real
-        y[: len(state.constant)] += state.constant
-        elongation = np.where(np.isfinite(system.spring), state.displacement, 0.0)[dampers]
+        self.job.at[STAGE] = LEAVES
+        self._advance(0, 0)
+        self.job.at[STAGE] = RUNS
+        return self.start_in(int(self.job.at[PLACE]))
+
+    def start_in(self, k: int) -> RestartState:
+        """Return the start of scene k in the columns; its travels are the present system's."""
+        start = self.columns
         parts = (
-            system.scale * y[:n], system.scale * y[n:], state.displacement[:b], state.velocity[:b], elongation,
-            self.whole.travels,
+            start.displacement[k], start.velocity[k], start.slip[k], start.slip_velocity[k], start.elongation[k],
+            self.system.free_travel[self.system.friction_rows :],
         )  # fmt: skip
         return RestartState(*map(frozen, parts))

@@ -1,44 +1,236 @@
 """Runs of sliders in one compiled call: of one scene, or of many that differ in numbers, one after the other.
 
-A scene begins with its start (columns), and its motion goes on until a number of periods (line.automaton). A linear
-subsystem that its structure has met before is filled here; only a new one needs Python.
+A scene begins with its start (line.columns), and its motion goes on until a number of periods (line.automaton). A
+linear subsystem that its structure has met before is filled here: only a new one needs Python. Of many scenes each is
+judged and measured here too, by the functions that do so after a single run (response.steadiness, response.figures).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
 
 from vanedamp.coupling.engine.line.automaton import advance, begin
 from vanedamp.coupling.engine.line.flow_assembly import add_known
 from vanedamp.coupling.engine.line.gap_kinematics import rigid
-from vanedamp.coupling.numerics.codes import COAST, DONE, NEEDS_FLOW, OPEN, UNDECIDED
-from vanedamp.coupling.numerics.compiler.jit import entry, strict
-from vanedamp.coupling.numerics.compiler.record import changed
+from vanedamp.coupling.engine.line.recording import structure_state
+from vanedamp.coupling.numerics.codes import (
+    COAST,
+    DONE,
+    LOGGED,
+    LONGER,
+    NEEDS_FLOW,
+    OPEN,
+    OUTSIDE,
+    PAUSED,
+    PERIOD,
+    UNDECIDED,
+)
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
+from vanedamp.coupling.numerics.compiler.record import changed, record_with, room
+from vanedamp.coupling.response.figures import FIGURES, Measured, measure
+from vanedamp.coupling.response.steadiness import judged, run_ends
+from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
+from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
 
-# numbers of a job: the place of its scene in the columns, and what comes next with it
-PLACE, STAGE = range(2)
-JOB = 2
-#: stages of a scene
-BEGINS, RUNS = range(2)
+#: slices of a run (line.automaton) after which Python sees interrupts
+_SLICES = 64
+#: gap, over the free travel, down to which a contact is closed at the start
+_CLOSED = 1e-12
+
+# numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
+# those left out and the longest run; the code that ends it; slices since Python has seen it; whether a scene begins
+# with the state that the one before has left
+COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SLICES, LINKED = range(9)
+#: what comes next with a scene: it begins, goes on, or leaves its state in its columns
+BEGINS, RUNS, LEAVES = range(3)
+
+
+@record_with(free_axes=2)
+class Job(NamedTuple):
+    """What is asked of a call, and the results of k scenes."""
+
+    at: Annotated[np.ndarray, "numbers", int]
+    codes: Annotated[np.ndarray, "k", int]  # of numerics.codes; 0: the scene has not run
+    kinds: Annotated[np.ndarray, "k", int]  # classes of motion (response.figures)
+    figures: Annotated[np.ndarray, "k figures"]
+    peaks: Annotated[np.ndarray, "periods"]  # room to judge a run
+
+
+def new_job(scenes: int = 0, periods: int = 0, linked: bool = False) -> Job:
+    """Return the job of many scenes, of at most so many periods; or of one run that the caller judges."""
+    job = room(Job, {"numbers": 9, "k": scenes, "figures": len(FIGURES), "periods": periods})
+    job.at[COUNT], job.at[LINKED] = scenes, linked
+    return job
+
+
+#: records of runs that the caller judges
+UNJUDGED = tuple(
+    room(kind, dict.fromkeys("bceknmNsu", 0))
+    for kind in (Setup, LinearParts, LinearParts, LinearModes, LinearModes, Measured)
+)
 
 
 @entry
-def run(job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, goal, max_events):
-    """Run a scene to the end of `goal` periods. Return the code (numerics.codes) of why it returns."""
-    k = job[PLACE]
-    system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
-    if job[STAGE] == BEGINS:
-        _set_start(system, st, watched, columns, k)
-        job[STAGE] = RUNS
-        if not begin(system, st, rec, scratch):
-            return UNDECIDED
+def run(
+    job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck,
+    measured, goal, max_events,
+):  # fmt: skip
+    """Run a scene to the end of `goal` periods, or all scenes of a job.
+
+    Returns the code (numerics.codes) of why it returns.
+    """
     while True:
-        code = advance(system, flows, st, watched, rec, scratch, goal, max_events)
-        if code == NEEDS_FLOW:
-            code = add_known(system, subsystems, st.active_set, flows, assembly)
-            if code == DONE:
+        at = job.at
+        k, begins = at[PLACE], at[STAGE] == BEGINS
+        if at[COUNT] > 0:
+            if k == at[COUNT]:
+                return DONE
+            if begins:
+                _take_numbers(columns, base, flows, setup, measured, k, at[LINKED])
+            goal = at[GOAL]
+        system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
+        if at[STAGE] == LEAVES:
+            _leave(system, flows, st, scratch, columns, k)
+            return DONE
+        code = at[CODE]
+        if begins:
+            used = st.counters[PERIOD]
+            _set_start(system, st, watched, columns, k)
+            if at[COUNT] > 0:
+                if _is_outside(system, st, columns, k, at[LINKED]):
+                    return OUTSIDE
+                _clear(rec, used)
+                begin_transient(setup, loose, held, free, stuck)
+                at[DROPPED], at[GOAL], at[MOST] = run_length(setup, free, stuck)
+                goal = at[GOAL]
+            at[STAGE] = RUNS
+            code = DONE if begin(system, st, rec, scratch) else UNDECIDED
+            at[CODE] = code
+        if code == DONE:
+            code = advance(system, flows, st, watched, rec, scratch, goal, max_events)
+            if code == NEEDS_FLOW:
+                code = add_known(system, subsystems, st.active_set, flows, assembly)
+                if code == DONE:
+                    continue
+        if at[COUNT] == 0 or code == NEEDS_FLOW:
+            return code
+        if code == PAUSED:
+            st.counters[LOGGED] = 0
+            at[SLICES] += 1
+            if at[SLICES] == _SLICES:
+                at[SLICES] = 0
+                return PAUSED
+            continue
+        if _end(job, setup, free, stuck, measured, rec, st.counters[PERIOD], code):
+            if at[LINKED]:
+                if code == DONE:
+                    _leave(system, flows, st, scratch, columns, k + 1)
+                else:  # a run that broke off within a period leaves the state that it began with
+                    _repeat(columns, k)
+            at[PLACE], at[STAGE], at[CODE] = k + 1, BEGINS, DONE
+
+
+@kernel
+def _end(job, setup, free, stuck, measured, rec, done, code):
+    """Judge and measure the present scene, which has ended with a code. Returns False where it is to be longer."""
+    at, confidence = job.at, math.nan
+    if code == DONE:
+        steady, rate, confidence = judged(setup, free, stuck, rec, at[DROPPED], done, job.peaks[: done - at[DROPPED]])
+        code = run_ends(steady, rate, at[DROPPED], done, at[MOST])
+        if code == LONGER:
+            at[DROPPED], at[GOAL] = done, 2 * done
+            return False
+    k, first = at[PLACE], min(at[DROPPED], max(done - 1, 0))
+    job.codes[k] = code
+    job.kinds[k] = measure(measured, rec, first, done, confidence, job.figures[k])
+    return True
+
+
+@kernel
+def _take_numbers(columns, base, flows, setup, measured, k, linked):
+    """Set what differs between scenes to the numbers of scene k; flows of other excitations are to be filled again."""
+    same = _copy(base.frequency, columns.frequency[k])
+    same = _copy(base.free_travel, columns.free_travel[k]) and same
+    _copy(base.rest, columns.rest[k])
+    _copy(base.limit, columns.limit[k])
+    _copy(base.restitution, columns.restitution[k])
+    for h in range(base.load.shape[0]):
+        setup.frequency[h], measured.frequency[h] = base.frequency[h], base.frequency[h]
+        for i in range(base.load.shape[1]):
+            load = columns.load[k, h, i]
+            same = same and base.load[h, i] == load
+            base.load[h, i], setup.load[h, i], measured.load[h, i] = load, load, load
+    if not same:
+        flows.modes[:] = 0
+    setup.clock[0], setup.clock[1] = columns.omega[k], columns.period[k]
+    measured.clock[0], measured.clock[1] = columns.omega[k], columns.period[k]
+    for i in range(0 if linked else base.modes):
+        setup.q[i] = columns.displacement[k, i] / base.scale
+        setup.v[i] = columns.velocity[k, i] / base.scale
+    for b in range(base.bodies):
+        measured.holds[b] = base.limit[b]
+    for u in range(len(base.rest) - base.friction_rows):
+        measured.rest[u], measured.play[u] = base.rest[base.friction_rows + u], base.free_travel[base.friction_rows + u]
+
+
+@kernel
+def _copy(own, other):
+    """Set numbers to others. Returns whether they were the same."""
+    same = True
+    for i in range(len(own)):
+        same = same and own[i] == other[i]
+        own[i] = other[i]
+    return same
+
+
+@kernel
+def _is_outside(system, st, columns, k, linked):
+    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python."""
+    for r in range(system.friction_rows, len(st.state)):
+        least = 0.0
+        if linked:
+            if k == 0 or (not rigid(system, r) and columns.free_travel[k, r] == columns.free_travel[k - 1, r]):
                 continue
-        return code
+            if system.left_body[r] >= 0 or system.right_body[r] >= 0:
+                least = -_CLOSED * system.free_travel[r]
+        if st.displacement[r] < least:
+            return True
+    return False
+
+
+@kernel
+def _clear(rec, done):
+    """Empty the records of a run of so many periods."""
+    last = min(done + 2, len(rec.peak))
+    rec.peak[:last], rec.square[:last], rec.collided[:last], rec.impacts[:last] = 0.0, 0.0, 0.0, 0
+    rec.harmonic[:last], rec.momentum[:last] = 0.0, 0.0
+    rec.section[0, :], rec.ledger[0, :], rec.parts[0, :] = 0.0, 0.0, 0.0
+    for i in range(min(last, len(rec.swing))):
+        rec.swing[i, 0], rec.swing[i, 1], rec.swing[i, 2] = -math.inf, math.inf, 0.0
+
+
+@kernel
+def _leave(system, flows, st, scratch, columns, k):
+    """Let scene k begin with the present state."""
+    n, b, y = system.modes, system.bodies, scratch.coordinates
+    structure_state(flows, st, y)
+    for i in range(n):
+        columns.displacement[k, i], columns.velocity[k, i] = system.scale * y[i], system.scale * y[n + i]
+    for body in range(b):
+        columns.slip[k, body], columns.slip_velocity[k, body] = st.displacement[body], st.velocity[body]
+    for r in range(b, system.friction_rows):
+        columns.elongation[k, r - b] = 0.0 if rigid(system, r) else st.displacement[r]
+
+
+@kernel
+def _repeat(columns, k):
+    """Let the scene after scene k begin as that."""
+    for part in (columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation):
+        for i in range(part.shape[1]):
+            part[k + 1, i] = part[k, i]
 
 
 @strict
@@ -78,4 +270,6 @@ def _set_start(system, st, watched, columns, k):
         if r < b:  # relative to the floor, so that a body at relative rest is known to be so
             st.displacement[r], st.velocity[r] = slip[r], slip_velocity[r]
         elif r < friction and not rigid(system, r):
-            st.displacement[r] = columns.elongation[k, r - b]
+            # an element slides at its limit
+            most = system.limit[r] / system.spring[r]
+            st.displacement[r] = min(max(columns.elongation[k, r - b], -most), most)

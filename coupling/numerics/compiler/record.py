@@ -85,8 +85,8 @@ def room(kind: type[Named], sizes: Mapping[str, int], **given: Any) -> Named:
     `Annotated[np.ndarray, "s 2m", complex]` is of shape (sizes["s"], 2 * sizes["m"]).
     """
     known = {"": 1, **sizes}
-    made: dict[str, np.ndarray] = {
-        name: np.zeros([factor * known[size] for factor, size in shape], number)
+    made: dict[str, Any] = {
+        name: number() if shape is None else np.zeros([factor * known[size] for factor, size in shape], number)
         for name, shape, number in _fields_with_room(kind)
         if name not in given
     }
@@ -94,10 +94,12 @@ def room(kind: type[Named], sizes: Mapping[str, int], **given: Any) -> Named:
 
 
 @functools.cache
-def _fields_with_room(kind: type) -> list[tuple[str, list[tuple[int, str]], type]]:
-    """Return name, shape and type of number of each annotated field of a record."""
-    fields = []
+def _fields_with_room(kind: type) -> list[tuple[str, list[tuple[int, str]] | None, type]]:
+    """Return name, shape (None: a number) and type of number of each annotated field of a record."""
+    fields: list[tuple[str, list[tuple[int, str]] | None, type]] = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
+        if hint in (bool, int, float):
+            fields.append((name, None, hint))
         if get_origin(hint) is Annotated:
             words, number = (*hint.__metadata__, float)[:2]
             parts = [re.fullmatch(r"(\d*)(\w*)", word) for word in words.split()]
