@@ -159,8 +159,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
     energy = {name: figures.pop(name) for name in ENERGIES}
     for name in ("amplitude_mean_confidence", "attached_mass_fraction"):
         figures[name] = None if np.isnan(figures[name]) else figures[name]
-    if not figures["energy_residual"] <= run.open_ledger and status in _USABLE:
-        status = Status.ENERGY
+    status = closed_status(status, figures["energy_residual"], run.open_ledger)
     extent: dict[str, Any] = {}
     if run.plane is not None:
         extent, tilted = _in_plane(run.plane, slice(first, done), max(done - first, 1) * system.period)
@@ -183,6 +182,11 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         **_series(system, records, done),
         **extent,
     )
+
+
+def closed_status(status: Status, imbalance: float, bound: float) -> Status:
+    """Return the status of a run by the imbalance of its energies, too."""
+    return Status.ENERGY if not imbalance <= bound and status in _USABLE else status
 
 
 def _series(system: System, records: Records, done: int) -> dict[str, Any]:

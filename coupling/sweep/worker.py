@@ -11,10 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import CacheError
-from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
+from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status
+from vanedamp.coupling.response.figures import FIGURES
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
@@ -66,17 +70,50 @@ class TaskResult(NamedTuple):
 def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     """Run some points, given by the values of the axes: the task of a worker.
 
-    Raises SweepError for errors that are no fault of a point.
+    Those that differ in numbers only run as one (sweep.alike). Raises SweepError for errors that are no fault of a
+    point.
     """
     started = time.perf_counter()
-    maker, state = Points(base, choices), task.start
+    maker, state = Points(base, choices), task.start if task.linked else None
     values = np.full((len(points), width_of(base)), np.nan)
-    texts: list[tuple[str, str]] = []
-    for row, point in zip(values, points, strict=True):
-        final = _run(maker, point, state if task.linked else None, row, texts)
-        # a run that broke off within a period leaves the state that it began with
-        state = state if final is None else final
-    return TaskResult(values, texts, state if task.linked else None, time.perf_counter() - started)
+    texts = [("", "")] * len(points)
+    for paths, places in groups(base, points, task.linked):
+
+        def alone(place: int, start: RestartState | None, places: Sequence[int] = places) -> RestartState | None:
+            place = places[place]
+            final, texts[place] = _run(maker, points[place], start, values[place])
+            return final
+
+        some = [points[place] for place in places]
+        kind = kind_of(maker, some[0], paths) if len(some) > 1 and are_scenes(maker, some, paths) else None
+        if kind is None:
+            for place in range(len(places)):
+                final = alone(place, state)
+                # a run that broke off within a period leaves the state that it began with
+                state = final if task.linked and final is not None else state
+            continue
+        numbers = {path: np.array([point[path] for point in some], float) for path in paths}
+        job, linear, state = kind.run_all(numbers, state, task.linked, alone)
+        ran = np.flatnonzero(job.codes)
+        at = np.array(places)[ran]
+        values[at] = _rows(job.figures[ran], linear[ran])
+        for place, code, motion, figures in zip(at, job.codes[ran], job.kinds[ran], job.figures[ran], strict=True):
+            texts[place] = _status(int(code), figures).value, class_name(int(motion))
+    return TaskResult(values, texts, state, time.perf_counter() - started)
+
+
+def _rows(figures: np.ndarray, linear: np.ndarray) -> np.ndarray:
+    """Return the rows of runs from their figures (k, figures) and linear amplitudes (k, 2)."""
+    rows = np.empty((len(figures), len(COLUMNS)))
+    for name, place in _OF_RUN:
+        rows[:, place] = figures[:, FIGURES.index(name)]
+    rows[:, _LINEAR] = linear
+    rows[:, len(MEASURES) :] = _shares(figures[:, [FIGURES.index(name) for name in LOSSES]])
+    return rows
+
+
+def _status(code: int, figures: np.ndarray) -> Status:
+    return closed_status(STATUS_OF[code], figures[FIGURES.index("energy_residual")], OPEN_LEDGER)
 
 
 def width_of(base: Scene) -> int:
@@ -136,9 +173,9 @@ class SweepTable:
 
 
 def _run(
-    maker: Points, point: Mapping[str, Any], start: RestartState | None, row: np.ndarray, texts: list[tuple[str, str]]
-) -> RestartState | None:
-    """Run one point into its row and its texts. Returns its last state."""
+    maker: Points, point: Mapping[str, Any], start: RestartState | None, row: np.ndarray
+) -> tuple[RestartState | None, tuple[str, str]]:
+    """Run one point into its row. Returns its last state and its texts."""
     try:
         chosen = maker.chosen(point)
         row[_LINEAR] = _linear(chosen.scene)
@@ -149,23 +186,21 @@ def _run(
             raise SweepError(
                 f"stopped at {where}: {type(error).__name__}: {error}; run the same again to go on from the checkpoint"
             ) from error
-        texts.extend(broken(error).texts)
-        return None
+        return None, broken(error).texts[0]
     for name, place in _OF_RUN:
         value = getattr(response, name)
         row[place] = np.nan if value is None else value
-    row[len(MEASURES) : len(COLUMNS)] = _shares(response)
+    row[len(MEASURES) : len(COLUMNS)] = _shares(np.array([[response.energy[name] for name in LOSSES]]))[0]
     of_bodies = np.reshape(row[len(COLUMNS) :], (len(IN_PLANE), -1))
     for place, name in enumerate(IN_PLANE if of_bodies.size else ()):
         of_bodies[place] = getattr(response, name)  # None, of sliders, is nan
-    texts.append((response.status.value, response.classification))
-    return response.final
+    return response.final, (response.status.value, response.classification)
 
 
-def _shares(response: Response) -> np.ndarray:
-    losses = np.array([response.energy[name] for name in LOSSES])
-    total = losses.sum()
-    return losses / total if total > 0 else np.full(len(LOSSES), np.nan)
+def _shares(losses: np.ndarray) -> np.ndarray:
+    """Return the fractions (k, 4) of energies lost (k, 4); nan where nothing is."""
+    total = losses.sum(axis=1, keepdims=True)
+    return np.divide(losses, total, out=np.full(losses.shape, np.nan), where=total > 0)
 
 
 def _linear(scene: Scene) -> list[float]:

@@ -25,6 +25,10 @@ from vanedamp.coupling.system.resonance import chosen_resonance, force_shapes
 from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, System
 from vanedamp.coupling.system.units import coefficient
 
+#: columns of the start, as in response.restart_state.RestartState; and paths of the level
+STARTS = ("displacement", "velocity", "slip", "slip_velocity", "elongation")
+LEVELS = ("excitation.force", "excitation.resonance_amplitude")
+
 _PLACES = re.compile(
     r"(?P<table>excitation|initial|cavity|damper)(\.(?P<entry>[^.]+))?\."
     r"(?P<key>frequency|force|resonance_amplitude|displacement|velocity|gap|friction|restitution|position)"
@@ -47,7 +51,7 @@ class Columns(NamedTuple):
     free_travel: Annotated[np.ndarray, "k r"]
     limit: Annotated[np.ndarray, "k r"]
     restitution: Annotated[np.ndarray, "k r"]
-    # the start, as in response.restart_state.RestartState
+    # STARTS
     displacement: Annotated[np.ndarray, "k n"]
     velocity: Annotated[np.ndarray, "k n"]
     slip: Annotated[np.ndarray, "k b"]
@@ -93,7 +97,7 @@ def _pulled(scene: Scene) -> bool:
     return bool(scene.speed) or scene.gravity.orientation_deg != 0.0 or scene.gravity.direction is not None
 
 
-def pattern(scene: Scene, path: str, value: float) -> bool:
+def pattern(path: str, value: float) -> bool:
     """Return what a number with a column changes beyond it: a body without friction has other linear modes."""
     return path.endswith(".friction") and value > 0.0
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import Columns, repeated
+from vanedamp.coupling.engine.line.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
 from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
 from vanedamp.coupling.engine.line.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job, run
@@ -204,10 +204,7 @@ class EngineRun(EventDrivenRun):
         return self.start_in(int(self.job.at[PLACE]))
 
     def start_in(self, k: int) -> RestartState:
-        """Return the start of scene k in the columns; its travels are the present system's."""
-        start = self.columns
-        parts = (
-            start.displacement[k], start.velocity[k], start.slip[k], start.slip_velocity[k], start.elongation[k],
-            self.system.free_travel[self.system.friction_rows :],
-        )  # fmt: skip
-        return RestartState(*map(frozen, parts))
+        """Return the start of scene k in the columns, in the cavities of the scene that has left it."""
+        parts = [getattr(self.columns, name)[k] for name in STARTS]
+        travels = self.columns.free_travel[max(k - 1, 0), self.system.friction_rows :]
+        return RestartState(*map(frozen, (*parts, travels)))

@@ -1,0 +1,165 @@
+"""Points of a sweep that differ in numbers only, run as one in compiled code (engine.line.scenes).
+
+A scene of a sweep costs a run a few microseconds there, where Python would take a thousand times as long to make it.
+Points whose other values differ, and scenes that the compiled code refuses, are run one by one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, pattern
+from vanedamp.coupling.engine.line.event_driven import EngineRun
+from vanedamp.coupling.engine.line.scenes import BEGINS, PLACE, STAGE, Job, new_job
+from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, OUTSIDE
+from vanedamp.coupling.response.figures import measured_of
+from vanedamp.coupling.response.restart import marked_with_speed, start_of
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.transient import Transient, most_periods
+from vanedamp.files.store import file_stamp
+from vanedamp.files.toml_input import InputError
+
+#: numbers with which a run begins: of linked runs only the first
+_OF_STARTS = ("initial.", ".position", ".velocity")
+
+#: runs point k of a group by itself, from a state; returns the state that it leaves, None if it broke off
+Alone = Callable[[int, RestartState | None], RestartState | None]
+
+
+class Kind:
+    """Scenes that differ from one of them in numbers with columns, and the run that takes them one after the other."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
+        run = run_of(scene)
+        if not isinstance(run, EngineRun):
+            raise ValueError("not a scene of the engine for sliders")
+        self.scene, self.run, self.start = scene, run, start_of(scene, run.whole)
+        transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)
+        (setup, free, stuck), (loose, held) = transient.numbers, transient.parts
+        self.statistics = setup, loose, held, free, stuck, measured_of(scene, run.whole)
+
+    def run_all(
+        self, values: Mapping[str, np.ndarray], start: RestartState | None, linked: bool, alone: Alone
+    ) -> tuple[Job, np.ndarray, RestartState | None]:
+        """Run scenes (k,). Return the job with their results, linear amplitudes (k, 2), and the state they leave.
+
+        values: of all paths; start: of the first of linked scenes; alone: runs scenes that compiled code refuses, whose
+        codes stay 0.
+        """
+        run, size = self.run, len(next(iter(values.values())))
+        table = self._columns(values, start, size, linked)
+        job, leaves = new_job(size, most_periods(self.scene), linked), False
+        while run.run_many(job, table, self.statistics) == OUTSIDE:
+            place = int(job.at[PLACE])
+            left = alone(place, self._left(place, start) if linked else None)
+            leaves = leaves or left is not None
+            if linked:
+                for name in STARTS:
+                    column = getattr(table, name)
+                    column[place + 1] = column[place] if left is None else getattr(left, name)
+            job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
+        leaves = linked and (leaves or bool(np.isin(job.codes, (DONE, NOT_STEADY)).any()))
+        return job, self._linear(table, values), self._left(size, start) if leaves else start
+
+    def _columns(
+        self, values: Mapping[str, np.ndarray], start: RestartState | None, size: int, linked: bool
+    ) -> Columns:
+        """Return the columns of scenes; of linked ones with a row more, for the state that the last one leaves."""
+        whole, line = self.run.whole, self.run.system
+        if linked:
+            values = {path: np.append(numbers, numbers[-1]) for path, numbers in values.items()}
+        table = columns(self.scene, whole, line, self.start, values)
+        if start is not None:
+            # the state is moved to where it fits the first scene
+            whole.rest[: whole.contacts] = table.rest[0, line.friction_rows :]
+            whole.play[: whole.contacts] = table.free_travel[0, line.friction_rows :]
+            fits = start_of(self.scene, whole, start)
+            for name in STARTS:
+                getattr(table, name)[0] = getattr(fits, name)
+        return table
+
+    def _left(self, place: int, start: RestartState | None) -> RestartState | None:
+        """Return the state with which linked scene k begins, which the one before has left."""
+        return start if place == 0 else marked_with_speed(self.scene, self.run.start_in(place))
+
+    def _linear(self, table: Columns, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the amplitudes (k, 2) without bodies and with fixed ones, m."""
+        size, n = len(next(iter(values.values()))), self.run.system.modes
+        frequency, found = values.get(FREQUENCY, np.full(size, self.scene.frequency)), []
+        for response in self.linear:
+            load = None
+            if any(path in values for path in LEVELS):
+                load = table.load[:size, np.isin(self.run.whole.order, response.order), :n]
+            found.append(response.amplitude(frequency, load))
+        return np.transpose(found)
+
+
+#: the kind that ran last, and what it was made of
+_LAST: dict[bytes, Kind] = {}
+
+
+def kind_of(maker: Points, point: Mapping[str, Any], paths: Sequence[str]) -> Kind | None:
+    """Return the kind of a point's scene; None where it has to be run by itself. The last one is kept."""
+    slow = {path: value for path, value in point.items() if path not in paths}
+    structure = maker.base.structure
+    stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
+    key = pickle.dumps((maker.base, maker.choices, slow, paths, stamp, [pattern(path, point[path]) for path in paths]))
+    if key not in _LAST:
+        _LAST.clear()
+        try:
+            chosen = maker.chosen(point)
+            if chosen.start is not None or chosen.scene.time.steady is not None:
+                return None
+            _LAST[key] = Kind(chosen.scene)
+        except (InputError, ValueError):  # its own run says what is wrong
+            return None
+    return _LAST[key]
+
+
+def are_scenes(maker: Points, points: Sequence[Mapping[str, Any]], paths: Sequence[str]) -> bool:
+    """Return whether the ends of all numbers are those of scenes. Between them others are, too: bounds are linear.
+
+    What bounds numbers by others, places by gaps, compiled code sees in the start.
+    """
+    try:
+        for path in paths:
+            numbers = [point[path] for point in points]
+            for end in (min(numbers), max(numbers)):
+                maker.raw({**points[0], path: end})
+    except (InputError, TypeError):
+        return False
+    return True
+
+
+def groups(base: Scene, points: Sequence[Mapping[str, Any]], linked: bool) -> Iterator[tuple[list[str], list[int]]]:
+    """Yield the paths with columns, and the places of points that differ only in these; linked ones in turn."""
+    paths = columned(base, points[0]) if points else []
+    if linked:
+        paths = [path for path in paths if not any(part in path for part in _OF_STARTS)]
+
+    def key(place: int) -> tuple[Any, ...]:
+        return tuple(
+            pattern(path, value) if path in paths else value for path, value in points[place].items()
+        )
+
+    if not paths:
+        yield from (([], [place]) for place in range(len(points)))
+    elif linked:
+        yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), key))
+    else:
+        found: dict[tuple[Any, ...], list[int]] = {}
+        for place in range(len(points)):
+            found.setdefault(key(place), []).append(place)
+        yield from ((paths, some) for some in found.values())

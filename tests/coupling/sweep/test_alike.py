@@ -1,0 +1,104 @@
+"""Points that differ in numbers run as one: bit for bit what they are one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vanedamp.coupling.model_order.choices import NOTHING
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep import alike, worker
+from vanedamp.coupling.sweep.worker import Task, run_points
+from vanedamp.files.toml_input import validate
+
+_RIGID = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "excitation": {"frequency": 15.9, "force": 2.0},
+    "cavity": [{"name": "c", "gap": 6e-3}, {"name": "d", "gap": 8e-3}],
+    "damper": [
+        {"cavity": "c", "mass": 0.05, "friction": 0.1, "restitution": 0.6},
+        {"cavity": "d", "mass": 0.04, "friction": 0.2, "restitution": 0.5},
+    ],
+    "time": {"periods": 60, "transient": 20},
+}
+_ONE = _RIGID | {"cavity": _RIGID["cavity"][:1], "damper": _RIGID["damper"][:1]}
+_RNG = np.random.default_rng(3)
+_POINTS = {
+    "frequencies": (_ONE, [{"excitation.frequency": f} for f in np.linspace(14.0, 18.0, 12)]),
+    "everything": (
+        _RIGID,
+        [
+            dict(zip(
+                ("excitation.frequency", "excitation.force", "cavity.c.gap", "damper.friction", "damper.1.restitution",
+                 "damper.0.position", "initial.velocity"), values, strict=True,
+            ))
+            for values in _RNG.uniform([14, 1, 2e-3, 0, 0, -8e-4, -1], [18, 4, 8e-3, 0.3, 0.9, 8e-4, 1], (25, 7))
+        ],
+    ),
+    "an open length": (_ONE | {"time": {}}, [{"excitation.frequency": f} for f in (15.0, 15.9, 16.4)]),
+    "one number slow": (
+        _ONE, [{"damper.mass": m, "cavity.c.gap": g} for m in (0.05, 0.2) for g in (1e-3, 4e-3, 1.0)],
+    ),
+    "compliant": (
+        _RIGID | {"contact": {"law": "compliant", "stiffness": 1e5}},
+        [{"cavity.gap": g, "excitation.frequency": f} for g in (2e-3, 5e-3) for f in (15.0, 16.0, 17.0)],
+    ),
+    "Jenkins, stop, harmonics": (
+        _RIGID | {
+            "friction_damper": [{"normal_force": 2.0, "friction": 0.3, "stiffness": 1e4}],
+            "stop": [{"side": "right", "gap": 9e-3, "restitution": 0.4}],
+            "excitation": _RIGID["excitation"] | {"harmonic": [{"order": 3, "amplitude": 0.3, "phase": 20.0}]},
+        },
+        [{"excitation.frequency": f, "damper.friction": m} for f in (15.2, 15.9, 16.3) for m in (0.0, 0.2)],
+    ),
+    "with and without friction": (_ONE, [{"damper.0.friction": m} for m in (0.0, 0.1, 0.0, 1e-10, 0.3)]),
+    "few events": (_ONE | {"solver": {"max_events": 40}}, [{"excitation.frequency": f} for f in (15.0, 15.9, 16.4)]),
+    "pulled along": (
+        _RIGID | {"gravity": {"orientation_deg": 60.0}}, [{"cavity.c.gap": g} for g in (2e-3, 4e-3, 6e-3)],
+    ),
+}  # fmt: skip
+
+
+def _alone(monkeypatch, scene, points, task):
+    with monkeypatch.context() as patch:
+        patch.setattr(worker, "kind_of", lambda *_: None)
+        return run_points(scene, NOTHING, points, task)
+
+
+@pytest.mark.parametrize("linked", [False, True], ids=["apart", "linked"])
+@pytest.mark.parametrize("name", _POINTS)
+def test_points_run_as_one_are_those_run_one_by_one(name, linked, monkeypatch):
+    tables, points = _POINTS[name]
+    scene, task = validate(Scene, tables, "scene"), Task(range(len(points)), linked)
+    one_by_one, runs = _alone(monkeypatch, scene, points, task), []
+    run = worker.simulate
+    monkeypatch.setattr(worker, "simulate", lambda *args, **options: runs.append(1) or run(*args, **options))
+    found = run_points(scene, NOTHING, points, task)
+    np.testing.assert_array_equal(found.values, one_by_one.values)
+    assert found.texts == one_by_one.texts
+    if not linked:
+        assert len(runs) == 0
+    assert (found.final is None) == (one_by_one.final is None) == (not linked or name == "few events")
+    if found.final is not None:
+        assert found.final.to_list() == one_by_one.final.to_list()
+
+
+def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
+    scene = validate(Scene, _RIGID, "scene")
+    points = [{"damper.0.position": x} for x in (0.0, 1e-3, 3.1e-3, -2e-3)]
+    task = Task(range(4))
+    found, one_by_one = run_points(scene, NOTHING, points, task), _alone(monkeypatch, scene, points, task)
+    np.testing.assert_array_equal(found.values, one_by_one.values)
+    assert found.texts == one_by_one.texts
+    assert "position: 0.0031 lies outside" in found.texts[2][0]
+
+
+def test_a_worker_keeps_the_last_kind(monkeypatch):
+    scene, made = validate(Scene, _ONE, "scene"), []
+    kind = alike.Kind
+    monkeypatch.setattr(alike, "Kind", lambda scene: made.append(1) or kind(scene))
+    alike._LAST.clear()
+    first = run_points(scene, NOTHING, _POINTS["frequencies"][1], Task(range(12)))
+    again = run_points(validate(Scene, _ONE, "scene"), NOTHING, _POINTS["frequencies"][1], Task(range(12)))
+    assert len(made) == 1
+    np.testing.assert_array_equal(first.values, again.values)
