@@ -121,12 +121,12 @@ def width_of(base: Scene) -> int:
     return len(COLUMNS) + (len(IN_PLANE) * len(base.damper) if base.planar else 0)
 
 
-def broken(error: BaseException, width: int = len(COLUMNS)) -> TaskResult:
-    """Return the result of a point whose run has broken, or has broken its worker."""
+def broken(error: BaseException, width: int = len(COLUMNS), points: int = 1) -> TaskResult:
+    """Return the result of points whose run has broken, or has broken its worker."""
     text = " ".join(f"error: {type(error).__name__}: {error}".split())
     if isinstance(error, BrokenExecutor):
         text = "error: the worker process ended abruptly (killed, or out of memory)"
-    return TaskResult(np.full((1, width), np.nan), [(text, "")], None)
+    return TaskResult(np.full((points, width), np.nan), [(text, "")] * points, None)
 
 
 class SweepTable:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.scene.paths import Range
 from vanedamp.coupling.scene.rotation import FREQUENCY
@@ -31,6 +32,8 @@ from vanedamp.studies.report.forced_response import LinearCurves, linear_between
 
 #: frequencies of a curve, and the step from one to the next of its coarse form
 POINTS, _COARSE = 60, 4
+#: points that a worker runs at once where they run as one (sweep.alike)
+_TOGETHER = 5
 #: periods evaluated, the shortest and the longest transient, and the budget of events of a run, which no worker is lost
 #: to for long
 EVALUATED, _SHORTEST, _LONGEST, _EVENTS = 200, 50, 2000, 300_000
@@ -175,11 +178,14 @@ class Curve:
         first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends belong to all its parts
         self.coarse = len(first)
         self._futures = list[Future[TaskResult]]()
-        for point in [*first, *sorted(set(range(self.size)) - set(first))]:
-            values = [self._grid.values(point)]
-            future = submit(run_points, self._grid.base, self._grid.choices, values, Task([point]))
-            self._futures.append(future)
-            future.add_done_callback(partial(self._add, Task([point])))
+        together = _TOGETHER if columned(self._grid.base, [FREQUENCY]) else 1
+        for some in (first, sorted(set(range(self.size)) - set(first))):
+            for start in range(0, len(some), together):
+                task = Task(some[start : start + together])
+                values = [self._grid.values(point) for point in task.points]
+                future = submit(run_points, self._grid.base, self._grid.choices, values, task)
+                self._futures.append(future)
+                future.add_done_callback(partial(self._add, task))
 
     @property
     def done(self) -> int:
@@ -219,7 +225,7 @@ class Curve:
         if future.cancelled():
             return
         error = future.exception()
-        result = future.result() if error is None else broken(error, width_of(self._grid.base))
+        result = future.result() if error is None else broken(error, width_of(self._grid.base), len(task.points))
         with self._news:
             self._table.add(task, result, False)
             self._news.notify_all()
