@@ -1,4 +1,4 @@
-"""Other programs on the same scenes: SUNDIALS CVODE, Exudyn and Siconos, each if it is installed.
+"""Other programs on the same scenes: SUNDIALS CVODE, heyoka, Exudyn and Siconos, each if it is installed.
 
 A peer takes a scene, periods and its setting (a tolerance, or steps a period) and returns a PeerRun. What it cannot
 express, or that it is not installed, it says by an InputError, which charts and tables pass on.
@@ -59,6 +59,8 @@ class Peer(NamedTuple):
 
 PEERS = {
     "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
+    # built for numpy 2 as it says, it runs with numpy 1 as well
+    "heyoka": Peer("peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H"),
     "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
     "Siconos": Peer(
         "peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h", planar=True

@@ -38,7 +38,10 @@ def error(periodic, name, setting):
 
 @pytest.mark.parametrize(
     ("name", "coarse", "fine", "bound"),
-    [("SUNDIALS CVODE", 1e-4, 1e-9, 1e-5), ("Exudyn", 300, 10_000, 2e-2), ("Siconos", 100, 3000, 5e-3)],
+    [
+        ("SUNDIALS CVODE", 1e-4, 1e-9, 1e-5), ("heyoka", 1e-4, 1e-10, 1e-10), ("Exudyn", 300, 10_000, 2e-2),
+        ("Siconos", 100, 3000, 5e-3),
+    ],  # fmt: skip
 )
 def test_peers_converge_to_the_exact_engine(periodic, name, coarse, fine, bound):
     needs(name)
@@ -76,7 +79,9 @@ def test_an_excitation_with_several_harmonics(name, setting):
     np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=1e-2)
 
 
-@pytest.mark.parametrize(("name", "setting", "bound"), [("Exudyn", 1000, 2e-2), ("SUNDIALS CVODE", 1e-6, 2e-3)])
+@pytest.mark.parametrize(
+    ("name", "setting", "bound"), [("Exudyn", 1000, 2e-2), ("SUNDIALS CVODE", 1e-6, 2e-3), ("heyoka", 1e-10, 1e-9)]
+)
 def test_soft_walls(name, setting, bound, periodic):
     """Exudyn's dashpot pulls until the gap opens, which is another restitution; ours and CVODE's lets go before."""
     needs(name)
