@@ -303,7 +303,7 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
 def _lengths(key: Key, effort: Settings) -> tuple[int, int]:
     """Return two lengths of a run in periods, so that the longer takes some tenths of a second."""
     if _by_tolerance(key[0]):
-        return 1, 3
+        return 1, PEERS[key[0]].timed if key[0] in PEERS else 3
     long = effort.timed / (key[1] or 25)
     if key[0] in PEERS:
         return 0, max(int(long / 10), 2)

@@ -45,7 +45,8 @@ class PeerRun:
 class Peer(NamedTuple):
     """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
 
-    colour, marker: of its line in charts; planar: whether its set-up takes a planar body.
+    colour, marker: of its line in charts; planar: whether its set-up takes a planar body; timed: periods of a timed run
+    if its setting is a tolerance.
     """
 
     module: str
@@ -55,12 +56,15 @@ class Peer(NamedTuple):
     colour: str
     marker: str
     planar: bool = False
+    timed: int = 3
 
 
 PEERS = {
     "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
-    # built for numpy 2 as it says, it runs with numpy 1 as well
-    "heyoka": Peer("peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H"),
+    # its metadata asks for numpy 2, which Debian 12's dolfinx does not bear; it runs with numpy 1 as well
+    "heyoka": Peer(
+        "peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H", timed=300
+    ),
     "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
     "Siconos": Peer(
         "peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h", planar=True
