@@ -45,8 +45,8 @@ class PeerRun:
 class Peer(NamedTuple):
     """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
 
-    colour, marker: of its line in charts; planar: whether its set-up takes a planar body; timed: periods of a timed run
-    if its setting is a tolerance.
+    colour, marker: of its line in charts; planar: whether its set-up takes a planar body; compiled: whether its
+    equations are, though its setting is a tolerance: its runs are as long as those by steps.
     """
 
     module: str
@@ -56,14 +56,14 @@ class Peer(NamedTuple):
     colour: str
     marker: str
     planar: bool = False
-    timed: int = 3
+    compiled: bool = False
 
 
 PEERS = {
     "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
     # its metadata asks for numpy 2, which Debian 12's dolfinx does not bear; it runs with numpy 1 as well
     "heyoka": Peer(
-        "peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H", timed=300
+        "peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H", compiled=True
     ),
     "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
     "Siconos": Peer(
