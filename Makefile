@@ -20,7 +20,7 @@ help: ## this list
 setup: ## install all that is missing: system packages (apt, with sudo when not root) and .venv
 	@$(SETUP)
 
-setup-%: ## install one group: product, tests, checks, browser, peers (VTK, Siconos, CVODE, Exudyn), docs
+setup-%: ## install one group: product, tests, checks, browser, peers (VTK, Siconos, CVODE, heyoka, Exudyn), docs
 	@$(SETUP) $*
 
 demo: setup-product ## the whole pipeline on the shipped mesh; the report is out/report.html

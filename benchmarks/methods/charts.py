@@ -25,7 +25,7 @@ from benchmarks.methods.peers import PEERS, PeerRun, run_peer, settings_of_peers
 from benchmarks.methods.scenes import Key
 from benchmarks.rows import Contest, Rows
 from benchmarks.timing import Clock, in_turns, spread
-from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
@@ -186,7 +186,8 @@ class Chart:
         response = self._run(scene, periods)
         point = _new_point(key, response.status.value) | {"spent": time.thread_time() - started}
         point |= {"energy_residual": response.energy_residual, "penetration": response.penetration}
-        if point["status"] != "ok":
+        # few periods that have not settled have a mean all the same, as those of other programs have
+        if point["status"] not in (Status.OK.value, Status.NOT_STEADY.value):
             return point
         # a method may fail later than in the periods that are compared
         point["status"] = status_after(scene, _lengths(key, self.effort)[1])
@@ -198,7 +199,9 @@ class Chart:
     def _peer_point(self, key: Key) -> dict[str, Any]:
         """Return the status and error of a peer's run, and what it took, s; or why it is absent."""
         effort, (name, setting), started = self.effort, key, time.thread_time()
-        periods = effort.checked if self.repeats else (effort.ivp if PEERS[name].tolerance else effort.others)
+        peer, periods = PEERS[name], effort.checked
+        if not self.repeats:
+            periods = effort.means if peer.compiled else effort.ivp if peer.tolerance else effort.others
         try:
             run = run_peer(name, self.scene, periods, setting, _SAMPLES if self.repeats else 0)
         except InputError as refused:
@@ -303,7 +306,7 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
 def _lengths(key: Key, effort: Settings) -> tuple[int, int]:
     """Return two lengths of a run in periods, so that the longer takes some tenths of a second."""
     if _by_tolerance(key[0]):
-        return 1, 3
+        return 1, 300 if key[0] in PEERS and PEERS[key[0]].compiled else 3
     long = effort.timed / (key[1] or 25)
     if key[0] in PEERS:
         return 0, max(int(long / 10), 2)

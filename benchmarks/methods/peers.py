@@ -1,4 +1,4 @@
-"""Other programs on the same scenes: SUNDIALS CVODE, Exudyn and Siconos, each if it is installed.
+"""Other programs on the same scenes: SUNDIALS CVODE, heyoka, Exudyn and Siconos, each if it is installed.
 
 A peer takes a scene, periods and its setting (a tolerance, or steps a period) and returns a PeerRun. What it cannot
 express, or that it is not installed, it says by an InputError, which charts and tables pass on.
@@ -45,7 +45,8 @@ class PeerRun:
 class Peer(NamedTuple):
     """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
 
-    colour, marker: of its line in charts; planar: whether its set-up takes a planar body.
+    colour, marker: of its line in charts; planar: whether its set-up takes a planar body; compiled: whether its
+    equations are, though its setting is a tolerance: its runs are as long as those by steps.
     """
 
     module: str
@@ -55,10 +56,15 @@ class Peer(NamedTuple):
     colour: str
     marker: str
     planar: bool = False
+    compiled: bool = False
 
 
 PEERS = {
     "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
+    # its metadata asks for numpy 2, which Debian 12's dolfinx does not bear; it runs with numpy 1 as well
+    "heyoka": Peer(
+        "peer_heyoka", "heyoka", "pip install --no-deps heyoka cloudpickle certifi", True, "#c026d3", "H", compiled=True
+    ),
     "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
     "Siconos": Peer(
         "peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h", planar=True

@@ -1,4 +1,4 @@
-"""Scaling of sweeps: efficiency, memory, what handing out costs, and what limits many workers.
+"""Scaling of sweeps: efficiency, memory, what handing out costs, and what limits many workers; short scenes.
 
 Efficiency is time of one process over processes times their time, in turns. By the clock it suffers from whatever else
 the machine does; so it is also taken from seconds of the processors: what one process needs, over processes times the
@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.apart import run_module
 from benchmarks.benchmark import Benchmark, Result
+from benchmarks.methods.peers import PEERS, version
 from benchmarks.rows import Rows
 from benchmarks.sweep.simulation import Costs, simulated
 from benchmarks.sweep.worker import Job, scene
@@ -49,6 +50,7 @@ _RANKS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
 }  # fmt: skip
+_SHORT = "many short scenes"
 #: points of a task when handing out is measured: two counts, for the cost of a task and of a point
 _PER_TASK = (20, 200)
 _SEED = 20_260_101
@@ -60,7 +62,7 @@ class SweepScaling(Benchmark):
 
     compared: those that one process and all cores run in turns, `rounds` times; sizes: further sweeps on all cores;
     others: with dask and MPI; tasks: handed out to find what that costs; timed: single scenes; simulated: numbers of
-    workers, and scenes for each of them.
+    workers, and scenes for each of them; short: scenes and periods that one core also runs by heyoka.
     """
 
     compared: tuple[int, int]
@@ -71,6 +73,7 @@ class SweepScaling(Benchmark):
     timed: int
     simulated: tuple[int, ...]
     each: int
+    short: tuple[int, int]
 
     NAME = "sweep"
     CLOCK = "CPU time of the processes"
@@ -88,7 +91,8 @@ class SweepScaling(Benchmark):
         } | {_name(job): _seconds(job) for job in self.sizes_on(folder)}  # fmt: skip
         for executor, title in _EXECUTORS.items():
             found |= {_name(job): _seconds(job) for job in self.on(executor)} | {f"{title}, handing out": 10.0}
-        return found | {"checkpoint": 3.0, "single scenes": 8.0} | {f"{n}, simulated": 5.0 for n in _EXECUTORS.values()}
+        found |= {_SHORT: 0.03 * self.short[0], "checkpoint": 3.0, "single scenes": 8.0}
+        return found | {f"{n}, simulated": 5.0 for n in _EXECUTORS.values()}
 
     def pair(self, turn: int) -> list[Job]:
         """Return the same sweep in one process and on all cores, in the order of a round."""
@@ -115,6 +119,7 @@ class SweepScaling(Benchmark):
             result["sizes"].append(rows.take(_name(job), partial(_run, job), tell=_tell_sweep))
             shutil.rmtree(job.folder, ignore_errors=True)
         result["executors"] = _executors(rows, self)
+        result["short"] = _short(rows, self)
         result["checkpoint"] = rows.take("checkpoint", _checkpoint, tell=_tell_checkpoint)
         timed = Job("points", self.timed, self.compared[1], 1, "")
         result["point_s"] = rows.take("single scenes", lambda: _run(timed)["seconds"], tell=_tell_points)
@@ -146,6 +151,7 @@ class SweepScaling(Benchmark):
         most = max(pair["all"]["worker_peak_bytes"] for pair in pairs)
         yield f"  memory of a worker with its part of the server {most / 1e6:.0f} MB  target {MOST_MB} MB"
         yield f"  share of the main process in the processors' time {format_spread(result['overhead'])}"
+        yield from _short_lines(result["short"])
         for check in result["checks"]:
             yield (
                 f"  {_EXECUTORS[check['executor']]}, {check['workers']} workers, {check['points']} scenes: time with a "
@@ -160,9 +166,9 @@ class SweepScaling(Benchmark):
 
 FULL = SweepScaling(
     (10_000, 1500), 3, ((1_000, 200), (100_000, 200), (1_000_000, 5)), (4000, 1500), 400, 300,
-    (1, 2, 8, 64, 256, 1000, 4000), 1000,
+    (1, 2, 8, 64, 256, 1000, 4000), 1000, (1000, 50),
 )  # fmt: skip
-QUICK = SweepScaling((200, 300), 1, ((400, 20),), (100, 300), 40, 20, (1, 2, 1000), 200)
+QUICK = SweepScaling((200, 300), 1, ((400, 20),), (100, 300), 40, 20, (1, 2, 1000), 200, (100, 50))
 
 
 def _seconds(job: Job) -> float:
@@ -197,6 +203,29 @@ def _executors(rows: Rows, effort: SweepScaling) -> dict[str, dict[str, Any]]:
         handing = rows.take(f"{title}, handing out", partial(_handing_out, executor, effort.tasks), tell=_tell_tasks)
         found[executor] = {"sweeps": sweeps, "costs": handing}
     return found
+
+
+def _short(rows: Rows, effort: SweepScaling) -> dict[str, Any]:
+    """Measure many short scenes on one core, by heyoka too where it is installed."""
+    job, installed = Job("short", *effort.short, 1, ""), version("heyoka")
+    inputs = asdict(effort) | {"heyoka": installed}
+    found: dict[str, Any] = rows.take(_SHORT, partial(_run, job), inputs=inputs, tell=_tell_short)
+    return found | {"heyoka": installed}
+
+
+def _short_lines(found: Mapping[str, Any]) -> Iterator[str]:
+    """Yield scenes per second on one core, and how heyoka compares."""
+    yield f"{_SHORT}, {found['points']} of {found['periods']} periods, one core, scenes per second:"
+    for name, speed in found["scenes_per_second"].items():
+        text = f"  {name:38} {speed['median']:8.0f}  ({speed['low']:.0f} to {speed['high']:.0f})"
+        if name in found["ratio"]:
+            text += (
+                f"; vd.sweep over it {format_spread(found['ratio'][name]).strip()}, states within "
+                f"{found['difference'][name]:.1e}, other impacts in {found['scenes_with_other_impacts'][name]} scenes"
+            )
+        yield text
+    if found["heyoka"] is None:
+        yield f"  heyoka: not installed; {PEERS['heyoka'].remedy}"
 
 
 def _missing(executor: str) -> str | None:
@@ -321,6 +350,12 @@ def _tell_sweep(entry: Mapping[str, Any]) -> str:
         busy = entry["task_s"] / (entry["workers"] * entry["wall_s"])
         text += f", a worker {entry['worker_peak_bytes'] / 1e6:.0f} MB; workers busy {busy:.3f}"
     return f"{text}; file {entry['file_bytes'] / 1e6:.2f} MB"
+
+
+def _tell_short(found: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{name}: {speed['median']:.0f} scenes/s" for name, speed in found["scenes_per_second"].items()
+    )  # fmt: skip
 
 
 def _tell_tasks(costs: Mapping[str, float]) -> str:

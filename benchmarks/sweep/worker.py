@@ -36,11 +36,15 @@ from vanedamp.studies.workers import workers
 
 #: the calibrated cluster of the demonstration
 _MASS, _STIFFNESS, _AMPLITUDE = 0.148, 3.4e7, 3.0e-5
+#: turns of the programs on many short scenes
+_ROUNDS = 5
 
 
 @dataclass(frozen=True)
 class Job:
     """What is measured: "sweep" runs scenes; "tasks" hands them out without running any; "points" times single ones.
+
+    "short": many short scenes, compared with heyoka.
 
     executor: "pool", "dask" or "mpi"; folder: of the sweep's files.
     """
@@ -89,6 +93,10 @@ def measure(job: Job) -> dict[str, Any] | None:
     """Run a job; workers have started before the clock. None: on MPI ranks other than the first."""
     if job.what == "points":
         return {"seconds": _single_points(job)}
+    if job.what == "short":
+        from benchmarks.sweep import short_scenes  # whose engine and loops would count in the memory of the others
+
+        return short_scenes.measure(job.points, job.periods, _ROUNDS)
     with _executor(job) as pool:
         if pool is None and job.executor == "mpi":
             return None

@@ -38,7 +38,12 @@ def error(periodic, name, setting):
 
 @pytest.mark.parametrize(
     ("name", "coarse", "fine", "bound"),
-    [("SUNDIALS CVODE", 1e-4, 1e-9, 1e-5), ("Exudyn", 300, 10_000, 2e-2), ("Siconos", 100, 3000, 5e-3)],
+    [
+        ("SUNDIALS CVODE", 1e-4, 1e-9, 1e-5),
+        ("heyoka", 1e-4, 1e-10, 1e-10),
+        ("Exudyn", 300, 10_000, 2e-2),
+        ("Siconos", 100, 3000, 5e-3),
+    ],
 )
 def test_peers_converge_to_the_exact_engine(periodic, name, coarse, fine, bound):
     needs(name)
@@ -57,7 +62,9 @@ def test_siconos_and_our_own_time_stepping_are_one_method(periodic):
     assert theirs.penetration == pytest.approx(ours.penetration, rel=0.05)
 
 
-@pytest.mark.parametrize(("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6)])
+@pytest.mark.parametrize(
+    ("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6), ("heyoka", 1e-6)]
+)
 def test_friction_and_bodies_in_one_cavity(name, setting):
     """Two bodies with friction over the first periods, before chaos parts the runs."""
     needs(name)
@@ -66,7 +73,9 @@ def test_friction_and_bodies_in_one_cavity(name, setting):
     np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=5e-3)
 
 
-@pytest.mark.parametrize(("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6)])
+@pytest.mark.parametrize(
+    ("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6), ("heyoka", 1e-6)]
+)
 def test_an_excitation_with_several_harmonics(name, setting):
     needs(name)
     harmonic = [{"order": 1, "amplitude": 0.8, "phase": 25.0}, {"order": 3, "amplitude": 1.3, "phase": -70.0}]
@@ -76,7 +85,9 @@ def test_an_excitation_with_several_harmonics(name, setting):
     np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=1e-2)
 
 
-@pytest.mark.parametrize(("name", "setting", "bound"), [("Exudyn", 1000, 2e-2), ("SUNDIALS CVODE", 1e-6, 2e-3)])
+@pytest.mark.parametrize(
+    ("name", "setting", "bound"), [("Exudyn", 1000, 2e-2), ("SUNDIALS CVODE", 1e-6, 2e-3), ("heyoka", 1e-10, 1e-9)]
+)
 def test_soft_walls(name, setting, bound, periodic):
     """Exudyn's dashpot pulls until the gap opens, which is another restitution; ours and CVODE's lets go before."""
     needs(name)
@@ -86,6 +97,31 @@ def test_soft_walls(name, setting, bound, periodic):
     run = peers.run_peer(name, scene, PERIODS, setting)
     assert run.status == "ok"
     np.testing.assert_allclose(run.peak, exact.peak, rtol=bound)
+
+
+@pytest.mark.parametrize(
+    ("make", "periods"), [(method_scenes.chatter, 3), (method_scenes.single, 40), (method_scenes.double, 40)]
+)
+def test_heyoka_sticks_and_stays_closed_as_the_exact_engine_does(make, periods):
+    """A chatter that ends at rest and is launched again; slip and sticking, also of two bodies at once.
+
+    Errors grow with every impact, and fall while a body sticks.
+    """
+    needs("heyoka")
+    scene = make().replace({"time.periods": periods, "time.transient": 0})
+    exact = simulate(scene, samples_per_period=SAMPLES)
+    samples = np.column_stack([exact.displacement, exact.body_displacement])
+    run = peers.run_peer("heyoka", scene, periods, 1e-10, SAMPLES)
+    assert run.status == "ok" and exact.impacts_per_period > 1
+    assert (np.abs(run.samples - samples) / np.ptp(samples, axis=0)).max() < 1e-6
+    np.testing.assert_allclose(run.peak, exact.peak, rtol=1e-6)
+
+
+def test_heyoka_refuses_friction_dampers(monkeypatch):
+    monkeypatch.setitem(peers.PEERS, "heyoka", peers.PEERS["heyoka"]._replace(needs="numpy"))
+    scene = method_scenes.single().to_dict() | {"friction_damper": [{"normal_force": 1.0, "friction": 0.1}]}
+    with pytest.raises(InputError, match="heyoka: this set-up knows no friction dampers"):
+        peers.run_peer("heyoka", validate(Scene, scene, "scene"), 1, 1e-6)
 
 
 def test_a_soft_wall_is_refused_with_the_reason():

@@ -3,16 +3,18 @@
 import csv
 import json
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from benchmarks.sweep.measure import SweepScaling, _efficiency
+from benchmarks.sweep.measure import SweepScaling, _efficiency, _short_lines
+from benchmarks.sweep.short_scenes import scenes as short_scenes
 from benchmarks.sweep.simulation import Costs, simulated
 from benchmarks.sweep.worker import Job, measure, scene
 from vanedamp.coupling.sweep.grid import grid
 
-TINY = SweepScaling((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20)
+TINY = SweepScaling((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20, (3, 10))
 FREE = Costs(0.0, 0.0, 0.0, 0.0)
 
 
@@ -43,6 +45,40 @@ def test_handing_out_runs_nothing(tmp_path):
     found = measure(Job("tasks", 200, 5, 2, str(tmp_path), "pool", 10))
     # a task of one point, then of four, then of as many as take a second, and fewer at the end
     assert 20 < found["tasks"] < 60 and found["main_cpu_s"] > 0
+
+
+def test_short_scenes_have_two_impacts_per_period():
+    """heyoka shares no line with the engine: its final states and impacts are the engine's."""
+    assert grid(short_scenes(11, 20)).shape == (11,)
+    found = measure(Job("short", 11, 20, 1, ""))
+    assert (found["ok"], found["impacts"]) == (11, 11 * 20 * 2)
+    others = set(found["scenes_per_second"]) - {"vd.sweep"}
+    assert others == set(found["ratio"]) == set(found["difference"])
+    if find_spec("heyoka"):
+        assert others == {"heyoka, one by one", "heyoka, batches"}
+        assert set(found["scenes_with_other_impacts"].values()) == {0}
+        assert max(found["difference"].values()) < 1e-10
+    else:
+        assert not others
+
+
+def test_summary_of_short_scenes():
+    speed = {"median": 250.0, "low": 240.0, "high": 260.0}
+    found = {
+        "points": 10, "periods": 5, "scenes_per_second": {"vd.sweep": speed}, "ratio": {}, "heyoka": None,
+    }  # fmt: skip
+    head, ours, absent = _short_lines(found)
+    assert "10 of 5 periods" in head and "250  (240 to 260)" in ours
+    assert absent == "  heyoka: not installed; pip install --no-deps heyoka cloudpickle certifi"
+    name = "heyoka, batches"
+    theirs = {
+        "scenes_per_second": {"vd.sweep": speed, name: {"median": 500.0, "low": 480.0, "high": 520.0}},
+        "ratio": {name: {"median": 0.5, "low": 0.49, "high": 0.51}}, "difference": {name: 3e-13},
+        "scenes_with_other_impacts": {name: 0}, "heyoka": "7.13.2",
+    }  # fmt: skip
+    line = list(_short_lines(found | theirs))[-1]
+    assert line.split()[:3] == ["heyoka,", "batches", "500"]
+    assert "vd.sweep over it 0.5  (0.49 to 0.51), states within 3.0e-13, other impacts in 0 scenes" in line
 
 
 def test_efficiency_by_hand():
@@ -85,4 +121,5 @@ def test_benchmark_leaves_its_results(tmp_path, capsys, pictures):
     assert set(memory.curves) == {"main process", "a worker"} and memory.y == "peak memory, MB"
     assert simulated_ones.curves and simulated_ones.x == "workers"
     TINY.print_summary(result)
-    assert "parallel efficiency by the processor" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "parallel efficiency by the processor" in out and "many short scenes, 3 of 10 periods" in out
