@@ -81,13 +81,15 @@ class Known(NamedTuple):
 class Transient:
     """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's.
 
-    numbers: what compiled functions take of it, (Known, loose and held LinearModes).
+    systems: the loose and the held LinearParts; numbers: what compiled functions take besides, (Known, their
+    LinearModes).
     """
 
     def __init__(self, scene: Scene, system: System | None = None) -> None:
         self.scene, self.system = scene, assemble(scene) if system is None else system
         systems = linear_systems(scene, self.system)
         (loose, free), (held, stuck) = systems[0], systems[-1]
+        self.systems = loose, held
         time, prescribed = scene.time, isinstance(scene.structure, Prescribed)
         q, v = start_of_modes(scene, self.system)
         known = Known(
