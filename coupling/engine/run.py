@@ -30,7 +30,6 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.system import System
 
-
 #: bytes that the subsystems of one run may take
 ROOM = 2**29
 

@@ -166,9 +166,10 @@ def _set_restitution(
     for row in _rows(whole, system, np.ones(whole.bodies, bool)):
         unit = row - system.friction_rows
         own, other = restitution[:, whole.body[unit]], whole.other[unit]
-        found.restitution[:, row] = own if other < 0 else [
-            scene.contact.pair_restitution(*pair) for pair in zip(own.tolist(), restitution[:, other].tolist(), strict=True)
-        ]  # fmt: skip
+        if other >= 0:
+            pairs = zip(own.tolist(), restitution[:, other].tolist(), strict=True)
+            own = np.array([scene.contact.pair_restitution(*pair) for pair in pairs])
+        found.restitution[:, row] = own
 
 
 def columned(scene: Scene, paths: Iterable[str]) -> list[str]:

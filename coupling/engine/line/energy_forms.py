@@ -37,7 +37,8 @@ def set_energies(system, flows, s, m, scratch):
                 for j in range(m):
                     push = flows.velocity[s, r, j]
                     left[0, j, width], left[1, j, width] = push.real, push.imag
-                    right[0, j, width], right[1, j, width] = push.real * system.dashpot[r], push.imag * system.dashpot[r]
+                    lost = push * system.dashpot[r]
+                    right[0, j, width], right[1, j, width] = lost.real, lost.imag
                 width += 1
         for j in range(m):
             span[j, 0], span[j, 1] = 0, width

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_
 from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
 from vanedamp.coupling.engine.line.scenes import JOB, run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
-from vanedamp.coupling.engine.line.subsystems import Known
-from vanedamp.coupling.engine.run import EventDrivenRun
+from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
+from vanedamp.coupling.engine.line.subsystems import known_of
+from vanedamp.coupling.engine.run import EventDrivenRun, with_free_place
 from vanedamp.coupling.numerics.codes import (
     ACTIVE,
     AT_LOW,
@@ -42,11 +43,6 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: parts of a system that decide its subsystems (line.subsystems.Subsystems)
-_OF_SUBSYSTEMS = (
-    "stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot", "response",
-)  # fmt: skip
-
 
 def is_common(system: LineSystem, modes: int) -> bool:
     """Whether this is the most common scene, for whose lengths the engine is compiled.
@@ -57,7 +53,7 @@ def is_common(system: LineSystem, modes: int) -> bool:
 
 
 class EngineRun(EventDrivenRun):
-    """A run of sliders. system: its rows; known: subsystems met so far, including those from `reuse`."""
+    """A run of sliders. system: its rows; known: subsystems that runs with its structure have met."""
 
     rows_of: ClassVar = staticmethod(rows_of_line)
 
@@ -67,8 +63,8 @@ class EngineRun(EventDrivenRun):
     ) -> None:  # fmt: skip
         super().__init__(whole, records, events, max_events)
         self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
-        self.known, self.assembly_scratch = Known(system), new_assembly_scratch(system)
-        self.flows = empty_flows(system)
+        self.known, self.assembly, self.flows = known_of(system), new_assembly_scratch(system), empty_flows(system)
+        self._stack_begun = self.known.begun
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.columns = new_state(system, modes), repeated(system, start)
         self.event_functions = new_event_functions(system, modes)
@@ -76,17 +72,18 @@ class EngineRun(EventDrivenRun):
         self.job = np.zeros(JOB, np.int64)
         self._run = run
         if is_common(system, modes) and hasattr(run, "sized"):
-            self._run = run.sized(
-                self.job, self.columns, system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
-            )
+            self._run = run.sized(*self._records(), 0, 0)
+
+    def _records(self) -> tuple[Any, ...]:
+        return (
+            self.job, self.columns, self.system, self.known.stack, self.flows, self.state, self.event_functions,
+            self.records, self.scratch, self.assembly,
+        )  # fmt: skip
 
     def reuse(self, earlier: EngineRun) -> None:
-        """Take over the subsystems that an earlier run has met, if its system has the same, at whatever frequency."""
+        """Take over the flows of an earlier run of the same system."""
         if self.whole is earlier.whole:
-            self.flows = earlier.flows
-        pairs = ((getattr(self.whole, name), getattr(earlier.whole, name)) for name in _OF_SUBSYSTEMS)
-        if all(one is other or np.array_equal(one, other) for one, other in pairs):
-            self.known = earlier.known
+            self.flows, self._stack_begun = earlier.flows, earlier._stack_begun
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Return the code of numerics.codes.
@@ -102,13 +99,14 @@ class EngineRun(EventDrivenRun):
         return self.advance(0, max_events)
 
     def _advance(self, periods: int, max_events: int) -> int:
-        return int(self._run(
-            self.job, self.columns, self.system, self.flows, self.state, self.event_functions, self.records,
-            self.scratch, periods, max_events,
-        ))  # fmt: skip
+        if self._stack_begun != self.known.begun:  # by another run
+            self.flows, self._stack_begun = empty_flows(self.system), self.known.begun
+        return int(self._run(*self._records(), periods, max_events))
 
     def _add_flow(self) -> None:
-        self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known, self.assembly_scratch)
+        k = self.known.place(self.system, self.state.active_set)
+        if not np.any(self.flows.subsystem == k + 1):
+            self.flows, _ = with_free_place(self.flows, self.flows.subsystem, partial(empty_flows, self.system))
 
     def _segment(self) -> Segment:
         # roots of other segments do not apply

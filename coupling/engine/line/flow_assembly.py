@@ -10,6 +10,7 @@ from vanedamp.coupling.engine.line.energy_forms import set_energies
 from vanedamp.coupling.engine.line.peaks import GRIDS
 from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import FAR
+from vanedamp.coupling.numerics.codes import DONE, ILL_CONDITIONED, NEEDS_FLOW
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.elimination import reciprocal, solve
@@ -82,8 +83,35 @@ def fill(system, subsystems, k, flows, s, scratch):
         step *= 0.5
     _take_constants(system, subsystems, k, flows, s)
     set_energies(system, flows, s, e + count, scratch)
-    flows.modes[s] = e + count
+    flows.modes[s], flows.subsystem[s] = e + count, k + 1
     return True
+
+
+@kernel
+def add_known(system, subsystems, closed, flows, scratch):
+    """Fill the flow of the closed rows (r,), at a place that has been theirs before or is new.
+
+    Returns DONE, ILL_CONDITIONED where doubles do not resolve it, NEEDS_FLOW for a subsystem that is new, or no place.
+    """
+    for k in range(len(subsystems.met)):
+        same = subsystems.met[k]
+        for r in range(len(closed)):
+            if not same:
+                break
+            same = subsystems.closed[k, r] == closed[r]
+        if not same:
+            continue
+        free = -1
+        for s in range(len(flows.subsystem)):
+            if flows.subsystem[s] == k + 1:
+                free = s
+                break
+            if flows.subsystem[s] == 0 and free < 0:
+                free = s
+        if free < 0:
+            return NEEDS_FLOW
+        return DONE if fill(system, subsystems, k, flows, free, scratch) else ILL_CONDITIONED
+    return NEEDS_FLOW
 
 
 @kernel

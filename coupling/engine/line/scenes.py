@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.engine.line.automaton import advance, begin
+from vanedamp.coupling.engine.line.flow_assembly import add_known
 from vanedamp.coupling.engine.line.gap_kinematics import rigid
-from vanedamp.coupling.numerics.codes import COAST, OPEN, UNDECIDED
+from vanedamp.coupling.numerics.codes import COAST, DONE, NEEDS_FLOW, OPEN, UNDECIDED
 from vanedamp.coupling.numerics.compiler.jit import entry, strict
 from vanedamp.coupling.numerics.compiler.record import changed
 
@@ -22,17 +23,22 @@ BEGINS, RUNS = range(2)
 
 
 @entry
-def run(job, columns, base, flows, st, watched, rec, scratch, goal, max_events):
+def run(job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, goal, max_events):
     """Run a scene to the end of `goal` periods. Return the code (numerics.codes) of why it returns."""
+    k = job[PLACE]
+    system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
+    if job[STAGE] == BEGINS:
+        _set_start(system, st, watched, columns, k)
+        job[STAGE] = RUNS
+        if not begin(system, st, rec, scratch):
+            return UNDECIDED
     while True:
-        k = job[PLACE]
-        system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
-        if job[STAGE] == BEGINS:
-            _set_start(system, st, watched, columns, k)
-            job[STAGE] = RUNS
-            if not begin(system, st, rec, scratch):
-                return UNDECIDED
-        return advance(system, flows, st, watched, rec, scratch, goal, max_events)
+        code = advance(system, flows, st, watched, rec, scratch, goal, max_events)
+        if code == NEEDS_FLOW:
+            code = add_known(system, subsystems, st.active_set, flows, assembly)
+            if code == DONE:
+                continue
+        return code
 
 
 @strict

@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.flow_assembly import AssemblyScratch, fill, new_assembly_scratch
+from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
 from vanedamp.coupling.engine.line.peaks import GRIDS
 from vanedamp.coupling.engine.line.subsystems import Known, most_modes
 from vanedamp.coupling.engine.run import IllConditioned, with_free_place
@@ -35,6 +35,7 @@ class Flows(NamedTuple):
     """
 
     # the subsystem
+    subsystem: Annotated[np.ndarray, "s", int]  # its place among the subsystems, counted from 1; 0: none yet
     active_set: Annotated[np.ndarray, "s r", bool]  # which rows are closed
     modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: a free index
     eigenvalue: Annotated[np.ndarray, "s m", complex]  # of the modes, 1/s
@@ -99,18 +100,16 @@ def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
     return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})
 
 
-def add_flow(
-    flows: Flows, system: LineSystem, closed: np.ndarray, known: Known | None = None,
-    scratch: AssemblyScratch | None = None,
-) -> Flows:  # fmt: skip
-    """Return the stack with the subsystem of the closed rows (r,) at its first free index.
+def add_flow(flows: Flows, system: LineSystem, closed: np.ndarray) -> Flows:
+    """Return the stack with the subsystem of the closed rows (r,). Raises IllConditioned if doubles cannot resolve it.
 
-    known: subsystems of this system, or of one that differs by its excitation only, to which new ones are added; None:
-    none. Raises IllConditioned for one that doubles cannot resolve.
+    For flows of one system alone, without what compiled runs (line.scenes) keep of its structure.
     """
-    known = Known(system) if known is None else known
+    known = Known(system)
+    for s in np.flatnonzero(flows.subsystem):
+        known.place(system, flows.active_set[s])
     k = known.place(system, closed)
-    flows, s = with_free_place(flows, flows.modes, lambda size: empty_flows(system, size))
-    if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system) if scratch is None else scratch):
+    flows, s = with_free_place(flows, flows.subsystem, lambda size: empty_flows(system, size))
+    if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system)):
         raise IllConditioned("its modes cancel, it rests too far away under its weight, or nothing damps its resonance")
     return flows

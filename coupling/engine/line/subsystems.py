@@ -6,6 +6,7 @@ others move freely. Each subsystem is found once, by numpy; line.flow_assembly s
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -89,10 +90,13 @@ def most_modes(system: LineSystem) -> int:
 
 
 class Known:
-    """The subsystems met so far, of a system and of those that differ from it by what the excitation decides."""
+    """The subsystems met so far, of a system and of those that differ from it by what the excitation decides.
+
+    begun: how often the stack has begun again (engine.run.with_free_place), which gives its places other meanings.
+    """
 
     def __init__(self, system: LineSystem) -> None:
-        self.stack = empty_subsystems(system)
+        self.stack, self.begun = empty_subsystems(system), 0
 
     def __bool__(self) -> bool:
         return bool(self.stack.met.any())
@@ -106,8 +110,26 @@ class Known:
         if len(found):
             return int(found[0])
         self.stack, k = with_free_place(self.stack, self.stack.met, lambda size: empty_subsystems(system, size))
+        self.begun += k == 0
         _set(self.stack, k, system, np.flatnonzero(closed))
         return k
+
+
+#: parts of a system that decide its subsystems
+_DECIDING = ("mass", "stiffness", "damping", "response", "floor", "J", "spring", "dashpot")
+#: structures whose subsystems are kept
+_KEPT = 8
+_OF_STRUCTURES: OrderedDict[tuple[bytes, ...], Known] = OrderedDict()
+
+
+def known_of(system: LineSystem) -> Known:
+    """Return the subsystems of a system's structure: those that any run with it has met, of the latest structures."""
+    key = tuple(getattr(system, name).tobytes() for name in _DECIDING)
+    known = _OF_STRUCTURES.pop(key, None) or Known(system)
+    _OF_STRUCTURES[key] = known
+    while len(_OF_STRUCTURES) > _KEPT:
+        _OF_STRUCTURES.popitem(last=False)
+    return known
 
 
 def _set(stack: Subsystems, k: int, system: LineSystem, closed: np.ndarray) -> None:

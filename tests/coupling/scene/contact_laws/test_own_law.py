@@ -16,7 +16,7 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 from tests.tools.processes import environment
-from vanedamp.coupling.engine.line.automaton import advance
+from vanedamp.coupling.engine.line.scenes import run
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.contact_laws.newton import Newton
@@ -281,16 +281,16 @@ class Other(ContactLaw):
 
 response = simulate(dropped({{"law": "other"}}, 1.0), events=True)
 first = impacts(response)[0]
-print(first.relative_velocity_after / -first.relative_velocity_before, len(advance._compiled.stats.cache_misses))
+print(first.relative_velocity_after / -first.relative_velocity_before, len(run._compiled.stats.cache_misses))
 """
 
 
 def test_laws_share_the_compiled_engine():
     """In one process and in others: nothing of the engine is compiled for a law, and no law is taken for another."""
     simulate(dropped({"law": "newton"}, 0.5))
-    compiled = len(advance._compiled.signatures)
+    compiled = len(run._compiled.signatures)
     simulate(dropped({"law": "fifth root", "c": C}))
-    assert len(advance._compiled.signatures) == compiled > 0
+    assert len(run._compiled.signatures) == compiled > 0
     for factor in (0.25, 0.75):
         text = _PROCESS.format(factor=factor)
         said = subprocess.run(
