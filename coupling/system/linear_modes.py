@@ -71,29 +71,17 @@ class LinearModes(NamedTuple):
     start: Annotated[np.ndarray, "m"]
 
 
-class _Matrices(NamedTuple):
-    """The matrices of LinearParts."""
-
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
-    weight: np.ndarray
-    response: np.ndarray
-    basis: np.ndarray
-    place: np.ndarray
-
-
 def linear_systems(scene: Scene, system: System) -> list[tuple[LinearParts, LinearModes]]:
     """Return the loose system of a scene and, where that is another one, the held one, with empty modes."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
     rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
-    made = [_matrices(scene, system, sprung, np.zeros(len(sprung), bool))]
+    made = [_system(scene, system, sprung, np.zeros(len(sprung), bool))]
     # what pulls a body along its cavity presses it on a wall
     held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
     if held.any() or np.isfinite(system.casing_spring).any():
-        made.append(_matrices(scene, system, sprung & ~held, held, True))
-    return [_with_modes(matrices) for matrices in made]
+        made.append(_system(scene, system, sprung & ~held, held, True))
+    return made
 
 
 def start_of_modes(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +93,9 @@ def start_of_modes(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray
     return np.r_[p * modes, floor * p + position], np.r_[rate * modes, floor * rate + speed]
 
 
-def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray, stuck: bool = False) -> _Matrices:
+def _system(
+    scene: Scene, system: System, moving: np.ndarray, held: np.ndarray, stuck: bool = False
+) -> tuple[LinearParts, LinearModes]:
     """Return the system whose coordinates are the modes and the bodies `moving` (b,); those `held` follow their floor.
 
     stuck: sliders of Jenkins elements hold.
@@ -130,12 +120,11 @@ def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray
         drawn = np.isfinite(system.casing_spring)
         rows = system.casing[drawn][:, free]
         stiffness += rows.T @ (system.casing_spring[drawn, None] * rows)
+    together = basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis
     whole = np.zeros((len(system.mass), basis.shape[1]))
     whole[free] = basis
-    return _Matrices(
-        basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis, system.weight @ whole,
-        system.response @ whole, whole, np.r_[np.arange(n), n + np.flatnonzero(moving)],
-    )  # fmt: skip
+    place = np.r_[np.arange(n), n + np.flatnonzero(moving)]
+    return _with_modes(together, whole, place, system.response @ whole, system.weight @ whole)
 
 
 def _turning(scene: Scene) -> np.ndarray:
@@ -154,23 +143,23 @@ def _static(stiffness: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.lstsq(stiffness, weight, rcond=None)[0])
 
 
-def _with_modes(made: _Matrices) -> tuple[LinearParts, LinearModes]:
-    """Return a system with its modes."""
-    k, static = len(made.response), _static(made.stiffness, made.weight)
-    together = (made.mass, made.damping, made.stiffness)
+def _with_modes(
+    together: tuple[np.ndarray, ...], basis: np.ndarray, place: np.ndarray, response: np.ndarray, weight: np.ndarray
+) -> tuple[LinearParts, LinearModes]:
+    """Return a system with its modes. together: mass, damping and stiffness; others as in LinearParts."""
+    k, static = len(response), _static(together[2], weight)
     diagonal = all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together)
     if diagonal:
-        mass = np.diag(made.mass)
-        values, shapes, seen = _oscillators(np.diag(made.stiffness) / mass, np.diag(made.damping) / mass)
-        both = np.r_[made.response, made.response]
+        mass, damping, stiffness = (np.diag(matrix) for matrix in together)
+        values, shapes, seen = _oscillators(stiffness / mass, damping / mass)
+        both = np.r_[response, response]
         felt, seen, inverse = np.abs(both * shapes), both * seen, np.zeros((0, 0), complex)
     else:
         values, shapes, inverse = _complex(k, *(matrix.tobytes() for matrix in together))
-        seen = made.response @ shapes
+        seen = response @ shapes
         felt = np.abs(seen)
     parts = LinearParts(
-        diagonal, float(made.weight @ static) / 2, *together, made.basis, made.place, made.response, static, values,
-        seen, inverse,
+        diagonal, float(weight @ static) / 2, *together, basis, place, response, static, values, seen, inverse
     )  # fmt: skip
     return parts, room(
         LinearModes, {"k": k, "m": 2 * k}, rate=-values.real, own=np.abs(values.imag),
