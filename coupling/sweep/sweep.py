@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
@@ -109,8 +110,8 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     )
 
 
-#: keys of bodies that linear curves do not depend on
-_UNFELT = re.compile(r"damper(\.\d+)?\.(friction|restitution)")
+#: keys that linear curves do not depend on
+_UNFELT = re.compile(r"damper(\.[^.]+)?\.(friction|restitution|position|velocity)|cavity(\.[^.]+)?\.gap|initial\..+")
 
 
 def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
@@ -121,8 +122,13 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     others = {path: values for path, values in grid.axes.items() if path != swept}
     low, high = min(grid.axes[swept]), max(grid.axes[swept])
     points, found, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
+    feels = [path for path in others if not _UNFELT.fullmatch(path)]
+    fits = set(columned(grid.base, others)) | set(feels) == set(others)  # others may keep bodies from fitting together
     for values in itertools.product(*others.values()):
-        felt = tuple(value for path, value in zip(others, values, strict=True) if not _UNFELT.fullmatch(path))
+        felt = tuple(value for path, value in zip(others, values, strict=True) if path in feels)
+        if felt in known and fits:
+            found.append(known[felt])
+            continue
         try:
             scene = points.scene({**dict(zip(others, values, strict=True)), swept: low})
             if felt in known:

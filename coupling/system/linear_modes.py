@@ -147,11 +147,12 @@ def _with_modes(
     together: tuple[np.ndarray, ...], basis: np.ndarray, place: np.ndarray, response: np.ndarray, weight: np.ndarray
 ) -> tuple[LinearParts, LinearModes]:
     """Return a system with its modes. together: mass, damping and stiffness; others as in LinearParts."""
-    k, static = len(response), _static(together[2], weight)
+    mass, damping, stiffness = together
+    k, static = len(response), _static(stiffness, weight)
     diagonal = all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together)
     if diagonal:
-        mass, damping, stiffness = (np.diag(matrix) for matrix in together)
-        values, shapes, seen = _oscillators(stiffness / mass, damping / mass)
+        own = np.diag(mass)
+        values, shapes, seen = _oscillators(np.diag(stiffness) / own, np.diag(damping) / own)
         both = np.r_[response, response]
         felt, seen, inverse = np.abs(both * shapes), both * seen, np.zeros((0, 0), complex)
     else:
@@ -159,7 +160,8 @@ def _with_modes(
         seen = response @ shapes
         felt = np.abs(seen)
     parts = LinearParts(
-        diagonal, float(weight @ static) / 2, *together, basis, place, response, static, values, seen, inverse
+        diagonal, float(weight @ static) / 2, mass, damping, stiffness, basis, place, response, static, values, seen,
+        inverse,
     )  # fmt: skip
     return parts, room(
         LinearModes, {"k": k, "m": 2 * k}, rate=-values.real, own=np.abs(values.imag),
