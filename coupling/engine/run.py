@@ -29,7 +29,6 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment
 from vanedamp.coupling.system.system import System
 
-
 #: bytes that the subsystems of one run may take
 ROOM = 2**29
 
@@ -41,8 +40,8 @@ class IllConditioned(ArithmeticError):
 def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any]) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
-    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory. Many
-    bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
     """
     free = np.flatnonzero(filled == 0)
     if len(free):
