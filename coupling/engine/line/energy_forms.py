@@ -22,43 +22,47 @@ from vanedamp.coupling.numerics.elimination import reciprocal
 def set_energies(system, flows, s, m, scratch):
     """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
     n, e, rows = system.modes, len(system.frequency), len(system.spring)
-    left, right, span = scratch.left, scratch.right, scratch.span
     _set_linear(system, flows, s, m, scratch)
     pairs = _invert_rates(flows, s, m, system.period, scratch)
-    for j in range(m):
-        span[j, 0], span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
-    _split(flows.shape[s, :m, n:], left)
-    _damp(system.damping, left, right, span, m, n, system.proportional)
-    _set_form(flows, s, m, scratch, flows.loss[s], flows.slow_loss[s], pairs)
-    if flows.damped[s]:
-        width = 0
+    for what in range(3):  # one place only, which is compiled once
+        if what == 0:
+            form, slow = flows.loss[s], flows.slow_loss[s]
+            _split(flows.shape[s, :m, n:], scratch.left)
+            for j in range(m):
+                scratch.span[j, 0], scratch.span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
+            _damp(system.damping, scratch.left, scratch.right, scratch.span, m, n, system.proportional)
+        elif what == 1:
+            form, slow = flows.square[s], flows.slow_square[s]
+            _take_factor(flows.response[s], 1.0, 0, m, scratch)
+        else:
+            if not flows.damped[s]:
+                break
+            form, slow, width = flows.dashpot[s], flows.slow_dashpot[s], 0
+            for r in range(rows):
+                if flows.active_set[s, r] and system.dashpot[r] > 0.0:
+                    _take_factor(flows.velocity[s, r], system.dashpot[r], width, m, scratch)
+                    width += 1
+        _set_form(flows, s, m, scratch, form, slow, pairs)
         for r in range(rows):
-            if flows.active_set[s, r] and system.dashpot[r] > 0.0:
-                for j in range(m):
-                    push = flows.velocity[s, r, j]
-                    left[0, j, width], left[1, j, width] = push.real, push.imag
-                    lost = push * system.dashpot[r]
-                    right[0, j, width], right[1, j, width] = lost.real, lost.imag
-                width += 1
-        for j in range(m):
-            span[j, 0], span[j, 1] = 0, width
-        _set_form(flows, s, m, scratch, flows.dashpot[s], flows.slow_dashpot[s], pairs)
-    for j in range(m):
-        span[j, 0], span[j, 1], part = 0, 1, flows.response[s, j]
-        left[0, j, 0], left[1, j, 0], right[0, j, 0], right[1, j, 0] = part.real, part.imag, part.real, part.imag
-    _set_form(flows, s, m, scratch, flows.square[s], flows.slow_square[s], pairs)
-    flows.slow_count[s] = _list_single(flows, s, m, e, system.period, pairs)
+            _kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
+    flows.slow_count[s] = _list_single(flows, s, m, system.period, pairs)
     for r in range(rows):
-        change = flows.impulse_response[s, r, :m]
-        _kick(change, flows.loss[s], flows.kick[s, r, 0])
-        _kick(change, flows.square[s], flows.kick[s, r, 1])
-        if flows.damped[s]:
-            _kick(change, flows.dashpot[s], flows.kick[s, r, 2])
+        change = flows.impulse_response[s, r]
         for c in range(flows.kick_maps.shape[2]):
             total = 0.0
-            for j in range(m):
+            for j in range(e, m):
                 total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
             flows.kick_maps[s, r, c] = total
+
+
+@kernel
+def _take_factor(values, weight, place, m, scratch):
+    """Take a functional of the modes as factor `place`, the last one, of their products, by a weight."""
+    for j in range(m):
+        x, y = values[j].real, values[j].imag
+        scratch.left[0, j, place], scratch.left[1, j, place] = x, y
+        scratch.right[0, j, place], scratch.right[1, j, place] = weight * x, weight * y
+        scratch.span[j, 0], scratch.span[j, 1] = 0, place + 1
 
 
 @inlined
@@ -122,7 +126,7 @@ def _set_map(row, first, a, b):
     row[first + 2], row[first + 3] = (a + b).imag, (a - b).real
 
 
-@kernel
+@summing
 def _integrate(values, reciprocals, driven, load, m):
     """Replace a functional of the amplitudes by the one with this rate; `reciprocals` of the rates of its terms.
 
@@ -159,7 +163,7 @@ def _invert_rates(flows, s, m, period, scratch):
 
 
 @kernel
-def _list_single(flows, s, m, e, period, count):
+def _list_single(flows, s, m, period, count):
     """List the modes that are left out of means, and calm modes, behind the pairs. Return the number of all."""
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
     # is taken at once (line.energy_balance)
@@ -232,7 +236,7 @@ def _multiply(left, right, span, m, both, mixed):
             both[j, k], mixed[j, k] = complex(rr - ii, ri + ir), complex(rr + ii, ir - ri)
 
 
-@kernel
+@summing
 def _integrate_by_parts(product, reciprocals, driven, load, m, plain):
     """Take what driven modes add to the products of their harmonics; plain: symmetric products, otherwise Hermitian."""
     e = len(driven) - 1

@@ -111,7 +111,7 @@ class Known:
             return int(found[0])
         self.stack, k = with_free_place(self.stack, self.stack.met, lambda size: empty_subsystems(system, size))
         self.begun += k == 0
-        _set(self.stack, k, system, np.flatnonzero(closed))
+        _set(self.stack, k, system, closed)
         return k
 
 
@@ -132,41 +132,38 @@ def known_of(system: LineSystem) -> Known:
     return known
 
 
-def _set(stack: Subsystems, k: int, system: LineSystem, closed: np.ndarray) -> None:
-    """Set the subsystem of some closed rows at a free place."""
-    n, b = system.modes, system.bodies
+def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None:
+    """Set the subsystem of the closed rows (r,) at a free place."""
+    n, b, closed = system.modes, system.bodies, np.flatnonzero(key)
     rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
     carrier, cluster, inner = _attachment(system, rigid)
     springs = _sprung_bodies(system, cluster, sprung)
     carrier[springs.anchored] = system.floor[springs.anchored]
     functional = _functional(system, carrier)
-    law = np.hstack([functional[sprung], system.of_bodies.J[sprung]])
+    law = np.hstack([functional[sprung], system.J[sprung, n:]])
     real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
     push = project[:, q:] @ loads
-    shape = np.vstack([lift @ shape[:q], lift @ shape[q:]])
-    project = np.hstack([project[:, :q] @ drop, project[:, q:] @ drop])
-    structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
+    shape, project = lift @ shape.reshape(2, q, m), project.reshape(m, 2, q) @ drop
     free = (cluster >= 0) & ~springs.anchored
     acceleration = np.zeros((b, b))
-    for c in np.unique(springs.cluster[free]):
+    for c in set(springs.cluster[free]):
         members = free & (springs.cluster == c)
-        acceleration[np.ix_(members, members)] = 1 / system.of_bodies.mass[members].sum()
-    values = _functionals(system, carrier, functional, eigenvalue, shape)
-    values |= _forces(system, rigid, sprung, eigenvalue, values["motion"], shape[structure])
+        acceleration[np.ix_(members, members)] = 1 / system.mass[n:][members].sum()
+    values = _functionals(system, carrier, functional, eigenvalue, shape[0])
+    values |= _forces(system, rigid, sprung, eigenvalue, values["motion"], shape[:, :n].reshape(2 * n, m))
     values |= _round_off(system, carrier, functional, law, sprung, shape, project)
     values |= {
-        "closed": np.isin(np.arange(len(system.delassus)), closed), "held": cluster < 0, "free": free,
-        "sprung": len(sprung) > 0,
+        "closed": key, "held": cluster < 0, "free": free, "sprung": len(sprung) > 0,
         "uncoupled": system.proportional and not len(closed) and m == n, "carrier": carrier, "functional": functional,
         "static": lift / real.frequency**2 @ loads, "constrained": kept, "body_acceleration": acceleration,
         "coordinates": q, "frequency": real.frequency, "damping": real.damping,
         "mixed": np.count_nonzero(real.damping) > np.count_nonzero(np.diagonal(real.damping)), "lift": lift,
-        "loads": loads, "modes": m, "near": DRIVEN, "eigenvalue": eigenvalue, "shape": shape[structure].T,
-        "support": _support(shape[structure]), "slip_shape": shape[n : n + b].T, "project": project[:, structure],
-        "project_slip": project[:, xi], "push": push,
-        "impulse_response": system.of_structure.J @ project[:, n + b : 2 * n + b].T,
+        "loads": loads, "modes": m, "near": DRIVEN, "eigenvalue": eigenvalue,
+        "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
+        "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
+        "push": push, "impulse_response": system.J[:, :n] @ project[:, 1, :n].T,
     }  # fmt: skip
     for name, value in values.items():
         getattr(stack, name)[(k, *map(slice, np.shape(value)))] = value
@@ -218,32 +215,33 @@ def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _support(shape: np.ndarray) -> np.ndarray:
-    """Return the first coordinate p of each mode's (p, p') (2n, m) that is not zero, and the last plus 1 (m, 2)."""
-    n = len(shape) // 2
+    """Return the first coordinate p of each mode's p and p' (2, n, m) that is not zero, and the last plus 1 (m, 2)."""
+    _, n, m = shape.shape
     if n == 0:
-        return np.zeros((shape.shape[1], 2), int)
-    moved = (shape[:n] != 0.0) | (shape[n:] != 0.0)
-    last = np.where(moved.any(axis=0), n - moved[::-1].argmax(axis=0), 0)
-    return np.column_stack([moved.argmax(axis=0), last])
+        return np.zeros((m, 2), int)
+    moved = shape.any(axis=0)
+    return np.stack([moved.argmax(axis=0), np.where(moved.any(axis=0), n - moved[::-1].argmax(axis=0), 0)], axis=1)
 
 
 def _functionals(
     system: LineSystem, carrier: np.ndarray, functional: np.ndarray, eigenvalue: np.ndarray, shape: np.ndarray
 ) -> dict[str, Any]:
-    """Return bodies, rows and response as functionals of the modes, and the modes' sizes. shape: (2N, m)."""
-    n, b = system.modes, system.bodies
-    p, own, response = shape[:n], shape[n : n + b], system.of_structure.response
-    body = carrier @ p + own
-    motion = functional @ p + system.of_bodies.J @ own
+    """Return bodies, rows and response as functionals of the modes, and the modes' sizes. shape: (N, m)."""
+    n = system.modes
+    p, own = shape[:n], shape[n:]
+    body, of_bodies = carrier @ p + own, system.J[:, n:]
+    motion = functional @ p + of_bodies @ own
     # terms by their sizes: a mode may be where no row feels it as long as others are closed
-    terms = np.abs(functional) @ np.abs(p) + np.abs(system.of_bodies.J) @ np.abs(own)
-    held = np.vstack([np.abs(functional) @ np.abs(p), np.abs(response) @ np.abs(p)]).max(axis=0)
+    held = np.abs(functional) @ np.abs(p)
+    terms = held + np.abs(of_bodies) @ np.abs(own)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
     motion[np.abs(motion) <= CANCELLED * terms] = 0.0
-    size, rate = np.abs(np.vstack([motion, response @ p])).max(axis=0), np.abs(eigenvalue)
+    response, rate = system.response[:n] @ p, np.abs(eigenvalue)
+    size = np.maximum(np.abs(motion).max(axis=0, initial=0.0), np.abs(response))
+    held = np.maximum(held.max(axis=0, initial=0.0), np.abs(system.response[:n]) @ np.abs(p))
     return {
-        "body": body.T, "motion": motion, "response": response @ p, "speed": size * rate,
-        "acceleration": np.maximum(size, held) * rate**2, "momentum": (system.of_bodies.mass @ body) * eigenvalue,
+        "body": body.T, "motion": motion, "response": response, "speed": size * rate,
+        "acceleration": np.maximum(size, held) * rate**2, "momentum": (system.mass[n:] @ body) * eigenvalue,
     }  # fmt: skip
 
 
@@ -258,7 +256,9 @@ def _forces(
     force, closed_inverse = np.zeros(motion.shape, complex), np.zeros(system.delassus.shape)
     spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]
     force[sprung] = -(spring + dashpot * eigenvalue) * motion[sprung]
-    pull = system.of_structure.J @ np.hstack([-np.diag(system.of_structure.stiffness), -system.of_structure.damping])
+    n = system.modes
+    on_structure = system.J[:, :n]
+    pull = -np.hstack([on_structure * system.stiffness[:n], on_structure @ system.damping[:n, :n]])
     if len(rigid):
         inverse = np.linalg.inv(system.delassus[np.ix_(rigid, rigid)])
         acceleration = (pull @ structure + system.delassus[:, sprung] @ force[sprung])[rigid]
@@ -278,19 +278,19 @@ def _round_off(
     """Return how round-off in a state (z, z') grows over modes that cancel: over LOST, or FAR by their moduli.
 
     Each coordinate counts by its part in the rows, the response and the motion of carried bodies, its rate by its own
-    frequency, which is returned, or the excitation's (line.flow_assembly).
+    frequency, which is returned, or the excitation's (line.flow_assembly). shape: (2, N, m); project: (m, 2, N).
     """
     n, b = system.modes, system.bodies
-    felt = np.abs(np.vstack([functional, system.of_structure.response, carrier])).max(axis=0, initial=0.0)
-    size = np.r_[1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
-    size = np.r_[size, size]
-    parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
+    felt = np.abs(np.vstack([functional, system.response[:n], carrier])).max(axis=0)
+    size = np.ones((2, n + b))
+    size[:, :n] = 1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny))
+    size, vectors, inverse = size.ravel(), shape.reshape(2 * (n + b), -1), project.reshape(-1, 2 * (n + b))
+    parts = np.abs(vectors.real) @ np.abs(inverse.real) + np.abs(vectors.imag) @ np.abs(inverse.imag)
     # the search for events uses only the modulus of an amplitude
-    whole = np.abs(shape) @ np.abs(project)
-    stiffness = np.r_[system.of_structure.stiffness, np.zeros(b)] + system.spring[sprung] @ law**2
+    whole = np.abs(vectors) @ np.abs(inverse)
     return {
         "round_off": np.maximum(parts / LOST, whole / FAR) * (np.finfo(float).eps * size / size[:, None]),
-        "natural": np.sqrt(stiffness / np.r_[np.ones(n), system.of_bodies.mass]),
+        "natural": np.sqrt((system.stiffness + system.spring[sprung] @ law**2) / system.mass),
     }
 
 
