@@ -16,9 +16,8 @@ from scipy import sparse
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.sparse_indices import SparseError, within_shape
-from vanedamp.files.toml_input import LARGEST
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 from scipy import linalg, sparse
-from slepc4py import SLEPc
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
@@ -203,7 +202,7 @@ def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
 def _nearest(
     stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps = _eigenproblem(stack, operators, "TARGET_MAGNITUDE")
     eps.setTarget(shift)
     eps.setDimensions(count)
     eps.getST().setShift(shift)
@@ -216,7 +215,7 @@ def _nearest(
 def _interval(
     stack: contextlib.ExitStack, operators: list[Any], lower: float, upper: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.ALL)
+    eps = _eigenproblem(stack, operators, "ALL")
     eps.setInterval(lower, upper)
     _solve(eps, eps.getKrylovSchurKSP())
     return _eigenpairs(stack, eps, operators[0])
@@ -225,7 +224,9 @@ def _interval(
 _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _nearest, "interval": _interval}
 
 
-def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: Any) -> Any:
+def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: str) -> Any:
+    from slepc4py import SLEPc  # one rank and the lowest modes do without
+
     eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)
     # the solver makes its factors itself, so that MUMPS takes its controls from the options of that prefix only
@@ -237,7 +238,7 @@ def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: Any)
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
     eps.setTolerances(1e-11, 500)
-    eps.setWhichEigenpairs(which)
+    eps.setWhichEigenpairs(getattr(SLEPc.EPS.Which, which))
     eps.getST().setType(SLEPc.ST.Type.SINVERT)
     return eps
 
