@@ -13,6 +13,7 @@ Why not scipy's eigsh (ARPACK, 1.10), which has none either: with the same facto
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ class _Krylov(Subspace):
     """A Krylov space: the operator has not been applied to the last `block` rows yet."""
 
     def __init__(self, mass: Any, most: int) -> None:
-        super().__init__(mass, most)
+        super().__init__(partial(product, mass), mass.shape[0], most)
         self._before = 0  # first of the rows that the operator couples with the last block
 
     def begin(self, rows: np.ndarray) -> None:
@@ -104,8 +105,8 @@ class _Krylov(Subspace):
         """Keep the best Ritz vectors and the last block only."""
         values, turns = self.ritz(kept)
         last = self.vectors[len(turns) : self.count].copy()
-        self.vectors[: len(values)] = turns.T @ self.vectors[: len(turns)]
-        self.vectors[len(values) : len(values) + self.block] = last
+        self.turn(turns)
+        self.vectors[self.count : self.count + self.block] = last
         self.projected[:] = 0.0
         self.projected[np.arange(len(values)), np.arange(len(values))] = values
-        self.count, self._before = len(values) + self.block, 0
+        self.count, self._before = self.count + self.block, 0

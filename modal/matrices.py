@@ -76,6 +76,8 @@ class SystemMatrices(Displayed):
     patches        label -> Patch
     damping_ratio  modal damping ratio of every mode
     provenance     where the numbers come from: mesh hash, versions, parameters (JSON-able)
+    vertices       (n_nodes, n_vertices) linear shape functions of the mesh's vertices at the nodes of elements of higher
+                   degree, for the iterative solver; None: unknown, as after `load`
     """
 
     stiffness: sparse.csr_array
@@ -85,6 +87,7 @@ class SystemMatrices(Displayed):
     patches: Mapping[str, Patch]
     damping_ratio: float
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    vertices: sparse.csr_array | None = None
 
     def __post_init__(self) -> None:
         coordinates = store.frozen(self.coordinates)
@@ -103,6 +106,8 @@ class SystemMatrices(Displayed):
         _check_range("fixed", values["fixed"], size, "DOFs")
         for label, patch in self.patches.items():
             _check_range(f"patch {label}", patch.nodes, len(coordinates), "nodes")
+        if self.vertices is not None and self.vertices.shape[0] != len(coordinates):
+            raise MatricesError(f"vertices: expected one row for each of {len(coordinates)} nodes")
         if not 0.0 <= self.damping_ratio < 1.0:
             raise MatricesError(f"damping_ratio: expected 0 <= ratio < 1, not {self.damping_ratio}")
         for name, value in values.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,20 +12,26 @@ from vanedamp.modal.algebra import symmetric_part
 
 # directions are dropped below this fraction of their block, and made orthogonal once more below the other
 _DEPENDENT, _LOSING = 1e-14, 1e-6
+# entries of all rows that are combined at once
+_COLUMNS = 1 << 14
+
+#: a matrix (n, n) applied to rows (k, n)
+Rows = Callable[[np.ndarray], np.ndarray]
 
 
 class Subspace:
     """Mass-orthonormal rows, and a symmetric operator projected on them.
 
+    mass       applied to rows
     vectors    (most, n), of which `count` are in use; the last `block` of these were appended last
     inertia    (block, n) products of these last rows with the mass: of the others they are computed where needed, which
                takes less than the solves between, and half the memory
     projected  (most, most) the operator between the rows
     """
 
-    def __init__(self, mass: Any, most: int) -> None:
-        self.mass, self.size, self.most, self.count, self.block = mass, mass.shape[0], most, 0, 0
-        self.vectors, self.inertia = np.empty((most, self.size)), np.empty((0, self.size))
+    def __init__(self, mass: Rows, size: int, most: int) -> None:
+        self.mass, self.size, self.most, self.count, self.block = mass, size, most, 0, 0
+        self.vectors, self.inertia = np.empty((most, size)), np.empty((0, size))
         self.projected = np.zeros((most, most))
 
     def append(self, rows: np.ndarray) -> np.ndarray:
@@ -34,7 +41,7 @@ class Subspace:
         """
         shares = np.eye(len(rows))
         for _ in range(3):
-            inertia = product(self.mass, rows)
+            inertia = self.mass(rows)
             scale = np.sqrt(np.maximum(np.einsum("ij,ij->i", rows, inertia), np.finfo(float).tiny))
             gram = symmetric_part((rows @ inertia.T) / scale / scale[:, None])
             values, turns = linalg.eigh(gram)
@@ -57,10 +64,18 @@ class Subspace:
         """
         found = np.zeros((self.count, len(rows)))
         for start in (first, 0):  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
-            shares = self.vectors[start : self.count] @ product(self.mass, rows).T
+            shares = self.vectors[start : self.count] @ self.mass(rows).T
             rows = rows - shares.T @ self.vectors[start : self.count]
             found[start:] += shares
         return rows, found
+
+
+    def turn(self, turns: np.ndarray) -> None:
+        """Replace the first rows by orthonormal combinations (k, j) of them, and drop the others."""
+        for start in range(0, self.size, _COLUMNS):  # in place
+            columns = slice(start, start + _COLUMNS)
+            self.vectors[: turns.shape[1], columns] = turns.T @ self.vectors[: len(turns), columns]
+        self.count = turns.shape[1]
 
 
 def product(matrix: Any, rows: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ COUNT = 10
 OURS = "lanczos"
 NAMES = {
     "lanczos": "block Lanczos, CHOLMOD",
+    "iterative": "Davidson, multigrid",
     "mumps": "block Lanczos, MUMPS",
     "superlu": "eigsh, SuperLU (symmetric mode)",
     "superlu_default": "eigsh, SuperLU (default)",
