@@ -41,8 +41,8 @@ def lowest_eigenpairs(
     stiffness, mass, precondition  matrices (n, n) applied to rows, the last one near the inverse of the stiffness
     diagonal  (n,) of the stiffness
     start     (k >= m, n) independent rows
-    limits    (m,) of the residuals r: sqrt(r^T K^-1 r / (lambda - floor)), with the preconditioner for K^-1. Eigenvalues
-              have its square. Not below the round-off of r.
+    limits    (m,) of the residuals r, sqrt(r^T K^-1 r / (lambda - floor)) with the preconditioner for K^-1, not below
+              their round-off. Errors of eigenvalues, relative, are about their squares.
     floor     a shift below all eigenvalues: where they are measured from
 
     That no eigenpair is missed is not proven. Raises NotConvergedError.
@@ -98,7 +98,7 @@ class _Ritz(Subspace):
         return values, turns
 
     def restart(self, turns: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Keep Ritz vectors (k, m) and those of the last round (j <= k, m) only; return the first (i, m) in the rows."""
+        """Keep Ritz vectors (k, m) and those of the last round (j <= k, m) only; return the former in the rows."""
         kept, known = turns, np.zeros_like(turns)
         known[: len(before)] = before[:, : turns.shape[1]]
         for _ in range(2):  # the two are nearly the same
@@ -106,8 +106,6 @@ class _Ritz(Subspace):
             known, triangle = np.linalg.qr(known)
             known = known[:, np.abs(np.diag(triangle)) > _DEPENDENT]
         kept = np.column_stack([kept, known])
-        self.projected[: kept.shape[1], : kept.shape[1]] = (
-            kept.T @ self.projected[: self.count, : self.count] @ kept
-        )
+        self.projected[: kept.shape[1], : kept.shape[1]] = kept.T @ self.projected[: self.count, : self.count] @ kept
         self.turn(kept)
         return np.eye(kept.shape[1])[:, : turns.shape[1]]

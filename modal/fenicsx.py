@@ -218,7 +218,7 @@ def matrix(form: Any) -> sparse.csr_array:
     try:
         assembled.assemble()
         row_start, columns, values = assembled.getValuesCSR()
-        result = sparse.csr_array((values, columns, row_start), shape=assembled.getSize(), copy=True)
+        result = sparse.csr_array((values, columns, row_start), shape=assembled.getSize())
     finally:
         assembled.destroy()
     result.eliminate_zeros()

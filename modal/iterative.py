@@ -85,7 +85,10 @@ class Iteration:
         self._random = np.random.default_rng(0)
 
     def lowest(self, count: int, known: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Return the lowest eigenvalues (count,), ascending, and vectors (count, n); known: vectors (k, n) near some."""
+        """Return the lowest eigenvalues (count,), ascending, and vectors (count, n).
+
+        known: vectors (k, n) to start from. Raises SolverError.
+        """
         size = self._mass.shape[0]
         limits = np.repeat(_LIMITS, (count, _SPARE, _GUARD))
         if size <= 2 * directions(limits.size):

@@ -1,7 +1,7 @@
-"""Import this before dolfinx, PETSc, SLEPc and mpi4py: the order in which PyPI's wheels of them and of h5py can be loaded.
+"""Import this before dolfinx, PETSc, SLEPc and mpi4py: the order in which their PyPI wheel and h5py's can be loaded.
 
-The wheel of dolfinx loads its MPI library before the rest. It has an HDF5 library of its own, and so has h5py's, which
-has to be the first. Without such wheels h5py is left until a file needs it.
+The wheel loads its MPI library before the rest. It has an HDF5 library of its own, and so has h5py's, which has to be
+the first. The system's h5py shares that of PETSc, and is left until a file needs it.
 """
 
 import contextlib

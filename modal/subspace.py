@@ -69,7 +69,6 @@ class Subspace:
             found[start:] += shares
         return rows, found
 
-
     def turn(self, turns: np.ndarray) -> None:
         """Replace the first rows by orthonormal combinations (k, j) of them, and drop the others."""
         for start in range(0, self.size, _COLUMNS):  # in place

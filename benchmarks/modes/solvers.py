@@ -5,6 +5,8 @@ from __future__ import annotations
 COUNT = 10
 #: what `vanedamp modal` runs on one rank
 OURS = "lanczos"
+#: and where factors need too much memory; without factors
+ITERATIVE = "iterative"
 NAMES = {
     "lanczos": "block Lanczos, CHOLMOD",
     "iterative": "Davidson, multigrid",

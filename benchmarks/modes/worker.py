@@ -133,8 +133,8 @@ def ngsolve(matrices: Path, count: int) -> Result:
 
 
 SOLVERS: dict[str, Callable[[Path, int], Result]] = {
-    "lanczos": lanczos, "iterative": iterative, "mumps": mumps, "superlu": superlu, "superlu_default": superlu_default, "cholmod": cholmod,
-    "ngsolve": ngsolve,
+    "lanczos": lanczos, "iterative": iterative, "mumps": mumps, "superlu": superlu, "superlu_default": superlu_default,
+    "cholmod": cholmod, "ngsolve": ngsolve,
 }  # fmt: skip
 _PARTS = ("data", "indices", "indptr")
 _VERTICES = "vertices.npz"
