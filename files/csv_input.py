@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.foreign import existing, reading
-from vanedamp.files.toml_input import LARGEST, InputError
+from vanedamp.files.toml_input import InputError
 
 
 class CsvRow(NamedTuple):

@@ -68,10 +68,10 @@ def _shown(value: Any) -> str | None:
         return str(value.value)
     if isinstance(value, np.ndarray):
         return _array(value)
-    if value is None or (hasattr(value, "__len__") and len(value) == 0):
-        return None
     if hasattr(value, "nnz"):
         return f"{'×'.join(map(str, value.shape))} sparse, {value.nnz} entries"
+    if value is None or (hasattr(value, "__len__") and len(value) == 0):
+        return None
     if isinstance(value, Displayed):
         return type(value).__name__
     if isinstance(value, Mapping):

@@ -2,6 +2,9 @@
 
 import re
 
+#: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and
+#: squares are numbers, too
+LARGEST = 1e40
 #: characters of a word, and of a message: no name of a file is longer
 _WORD, _MESSAGE = 500, 4000
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.foreign import existing
 from vanedamp.files.reference import constants, options
 
@@ -28,10 +28,7 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 _NO_TABLE = ("dataclass_type", "model_type", "dict_type", "mapping_type", "model_attributes_type")
 _NO_LIST = ("tuple_type", "list_type")
 
-#: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and
-#: squares are numbers, too
-LARGEST = 1e40
-#: and no whole number is longer than TOML's
+#: no whole number is longer than TOML's
 _LONGEST = 2**63 - 1
 #: of a file of ours: bytes, and tables and lists one in another
 _MOST_BYTES, _DEEPEST = 50_000_000, 30

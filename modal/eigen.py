@@ -15,6 +15,7 @@ from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.modal import petsc
 from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
+from vanedamp.modal.iterative import Iteration, chosen
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError, factorize
 
@@ -44,7 +45,8 @@ class Modes(Displayed):
                     factors (or else the largest component) is positive
     residuals       (m,) |K phi - lambda M phi| / ((lambda - shift) |M phi|) over the free DOFs, with the small negative
                     shift of the solver, so that rigid modes have a measure too
-    provenance      of the matrices (JSON-able)
+    provenance      of the matrices (JSON-able), and as "solver" how the modes were found: "name", whether they were
+                    "counted", so that none is missed; for "auto" its estimate, "factor_bytes" and "memory_bytes"
     """
 
     frequencies_hz: np.ndarray
@@ -67,6 +69,11 @@ class Modes(Displayed):
     def first(self, count: int) -> Modes:
         """Return the first `count` modes."""
         return Modes(self.frequencies_hz[:count], self.shapes[:count], self.residuals[:count], self.provenance)
+
+    @property
+    def counted(self) -> bool:
+        """Whether the number of modes is proven by Sylvester's law of inertia."""
+        return bool(self.provenance.get("solver", {}).get("counted", True))
 
     @property
     def angular_frequencies(self) -> np.ndarray:
@@ -98,22 +105,34 @@ class Modes(Displayed):
 
 
 def solve_modes(
-    matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None, min_frequency: float = 0.0
-) -> Modes:
+    matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None, min_frequency: float = 0.0,
+    solver: str = "auto", memory: float | None = None,
+) -> Modes:  # fmt: skip
     """Return the lowest `count` modes, or all from `min_frequency` to `max_frequency` (Hz; `count` is then not used).
 
-    Sylvester's law of inertia proves that no mode is missed. Free and partly held structures show their rigid modes at
-    zero frequency: those whose strain energy is within round-off. Raises SolverError for a count that the structure
-    does not have, no mode in the range, or no convergence.
+    solver  "factor"     block Lanczos on factors of the stiffness: Sylvester's law of inertia proves that no mode is
+                         missed
+            "iterative"  Davidson's method with multigrid: memory grows as the structure, not as its factors; modes as
+                         exact, but their number is not proven
+            "auto"       iterative where the factors are estimated to need more than half of the memory
+    memory  of the machine, bytes; None: found out
+
+    Free and partly held structures show their rigid modes at zero frequency: those whose strain energy is within
+    round-off. Raises SolverError for a count that the structure does not have, no mode in the range, or no convergence.
     """
-    free, pencil = matrices.free, _Pencil.of(matrices)
-    floor = _SHIFT * _straining_eigenvalue(matrices)
-    if max_frequency is None:
-        if not 1 <= count <= free.size:
-            raise SolverError(f"count: expected 1 to {free.size} modes (the free DOFs), not {count}")
+    free = matrices.free
+    found = chosen(solver, free.size, memory)
+    pencil, floor = _Pencil.of(matrices), _SHIFT * _straining_eigenvalue(matrices)
+    if max_frequency is None and not 1 <= count <= free.size:
+        raise SolverError(f"count: expected 1 to {free.size} modes (the free DOFs), not {count}")
+    counted = found["name"] == "factor"
+    if counted and max_frequency is None:
         eigenvalues, vectors = _lowest(pencil, count, floor)
+    elif max_frequency is None:
+        eigenvalues, vectors = _iteration(matrices, pencil, floor).lowest(count)
     else:
-        eigenvalues, vectors = _within(pencil, min_frequency, max_frequency, floor)
+        iteration = None if counted else _iteration(matrices, pencil, floor)
+        eigenvalues, vectors = _within(pencil, min_frequency, max_frequency, floor, iteration)
     vectors, inertia = _orthonormal(vectors, vectors @ pencil.mass)
     forces = vectors @ pencil.stiffness
     residuals = np.linalg.norm(forces - eigenvalues[:, None] * inertia, axis=1)
@@ -123,7 +142,8 @@ def solve_modes(
     signs = shape_signs(vectors, inertia @ matrices.movable_translations()[free])
     shapes = np.zeros((len(eigenvalues), matrices.size))
     shapes[:, free] = signs[:, None] * vectors
-    return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, matrices.provenance)
+    provenance = dict(matrices.provenance) | {"solver": found | {"counted": counted}}
+    return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, provenance)
 
 
 def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
@@ -177,6 +197,10 @@ class _Pencil(NamedTuple):
         return petsc.negative_eigenvalues(sparse.csr_array(self.stiffness - eigenvalue * self.mass))
 
 
+def _iteration(matrices: SystemMatrices, pencil: _Pencil, floor: float) -> Iteration:
+    return Iteration(*pencil, floor, matrices.coordinates, matrices.fixed, matrices.vertices)
+
+
 def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
     size, spare = pencil.mass.shape[0], SPARE
@@ -198,15 +222,26 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
     return values[:count], vectors[:count]
 
 
-def _within(pencil: _Pencil, low_hz: float, high_hz: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return all eigenpairs of a range of frequencies, whose number follows from the inertia at its ends."""
+def _within(
+    pencil: _Pencil, low_hz: float, high_hz: float, floor: float, iteration: Iteration | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return all eigenpairs of a range of frequencies, whose number follows from the inertia at its ends.
+
+    iteration: finds them instead, without their number.
+    """
     if not 0.0 <= low_hz < high_hz:
         raise SolverError(f"min_frequency: expected 0 <= min_frequency < max_frequency, not {low_hz} and {high_hz} Hz")
     lower, upper = _eigenvalue(low_hz) if low_hz else floor, _eigenvalue(high_hz)
-    count = pencil.below(upper) - (pencil.below(lower) if low_hz else 0)
+    if iteration is not None:
+        values, vectors = iteration.within(lower, upper)
+        count = len(values)
+    else:
+        count = pencil.below(upper) - (pencil.below(lower) if low_hz else 0)
     if count == 0:
         low = f"from {low_hz} " if low_hz else ""
         raise SolverError(f"max_frequency: the structure has no mode {low}up to {high_hz} Hz; raise it")
+    if iteration is not None:
+        return values, vectors
     if count <= _SLICE:
         # the eigenvalues nearest to the middle of an interval are those inside
         values, vectors = petsc.nearest_eigenpairs(*pencil, count, 0.5 * (lower + upper) if low_hz else floor)

@@ -184,6 +184,7 @@ class Solid:
                 "versions": fenicsx.versions(),
             }
             | ({} if self.temperature is None else {"temperature": self.temperature.to_json()}),
+            vertices=fenicsx.vertex_weights(self.space) if self.degree > 1 else None,
         )
         return self._heated(unheated)
 

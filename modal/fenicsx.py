@@ -180,6 +180,30 @@ def node_coordinates(space: Any) -> np.ndarray:
     return np.array(space.tabulate_dof_coordinates())
 
 
+def vertex_weights(space: Any) -> sparse.csr_array:
+    """Return the linear shape functions of the vertices at the nodes, (n_nodes, n_vertices)."""
+    topology = space.mesh.topology
+    points = space.element.interpolation_points
+    points = np.asarray(points() if callable(points) else points)
+    if topology.cell_name() == "tetrahedron":
+        shapes = np.column_stack([1.0 - points.sum(axis=1), points])
+    else:  # the first coordinate changes the fastest from vertex to vertex
+        x, y, z = (np.column_stack([1.0 - points[:, axis], points[:, axis]]) for axis in range(3))
+        shapes = np.einsum("nk,nj,ni->nkji", z, y, x).reshape(len(points), -1)
+    nodes = _cell_dofs(space)
+    topology.create_connectivity(3, 0)
+    corners = _array(topology.connectivity(3, 0)).reshape(len(nodes), -1)
+    # every node from one of the cells that it is in
+    _, first = np.unique(nodes, return_index=True)
+    cells, places = np.divmod(first, nodes.shape[1])
+    starts = corners.shape[1] * np.arange(first.size + 1)
+    size = (first.size, topology.index_map(0).size_local)
+    weights = sparse.csr_array((shapes[places].ravel(), corners[cells].ravel(), starts), shape=size)
+    weights.data[np.abs(weights.data) < 1e-12] = 0.0
+    weights.eliminate_zeros()
+    return weights
+
+
 def group_nodes(space: Any, entities: np.ndarray, dimension: int = 2) -> np.ndarray:
     """Return the sorted indices of the nodes on facets (dimension 2), edges (1) or vertices (0)."""
     space.mesh.topology.create_connectivity(dimension, 3)
@@ -194,7 +218,7 @@ def matrix(form: Any) -> sparse.csr_array:
     try:
         assembled.assemble()
         row_start, columns, values = assembled.getValuesCSR()
-        result = sparse.csr_array((values, columns, row_start), shape=assembled.getSize(), copy=True)
+        result = sparse.csr_array((values, columns, row_start), shape=assembled.getSize())
     finally:
         assembled.destroy()
     result.eliminate_zeros()

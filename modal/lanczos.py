@@ -13,12 +13,12 @@ Why not scipy's eigsh (ARPACK, 1.10), which has none either: with the same facto
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
-from vanedamp.modal.algebra import symmetric_part
+from vanedamp.modal.subspace import Subspace, product
 
 #: the inverse of K - shift M applied to rows (k, n)
 Solve = Callable[[np.ndarray], np.ndarray]
@@ -26,8 +26,6 @@ Solve = Callable[[np.ndarray], np.ndarray]
 _RESTARTS = 100
 # residuals below this, relative to the largest eigenvalue of the shifted inverse, are the round-off of its solves
 _ROUND_OFF = 5e-14
-# directions are dropped below this fraction of their block, and made orthogonal once more below the other
-_DEPENDENT, _LOSING = 1e-14, 1e-6
 
 
 class NotConvergedError(ArithmeticError):
@@ -59,11 +57,11 @@ def eigenpairs(
     """
     wanted, width = count + spare, block(count)
     limits = np.r_[np.full(count, tolerance), np.full(spare, tolerance**0.5)]
-    space, random = _Space(mass, directions(wanted)), np.random.default_rng(0)
+    space, random = _Krylov(mass, directions(wanted)), np.random.default_rng(0)
     for _ in range(_RESTARTS):
         while space.count <= space.most - width:
             if space.block == 0:  # at the start, or the space holds all that its start can reach
-                space.begin(solve(_product(mass, random.standard_normal((width, space.size)))))
+                space.begin(solve(product(mass, random.standard_normal((width, space.size)))))
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
             residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
@@ -75,48 +73,22 @@ def eigenpairs(
     raise NotConvergedError(f"{np.count_nonzero(converged)} of {wanted} modes converged")
 
 
-class _Space:
-    """Mass-orthonormal rows, their products with the mass, and the operator projected on them.
-
-    The last `block` of the `count` rows is the one that the operator has not been applied to.
-    """
+class _Krylov(Subspace):
+    """A Krylov space: the operator has not been applied to the last `block` rows yet."""
 
     def __init__(self, mass: Any, most: int) -> None:
-        self.size, self.most, self.count, self.block = mass.shape[0], most, 0, 0
+        super().__init__(partial(product, mass), mass.shape[0], most)
         self._before = 0  # first of the rows that the operator couples with the last block
-        self.vectors, self.inertia = np.empty((most, self.size)), np.empty((most, self.size))
-        self.projected = np.zeros((most, most))
-        self._mass = mass
 
     def begin(self, rows: np.ndarray) -> None:
         """Append independent rows (b, n) that are not from the space."""
-        self.append(self._orthogonal(rows, 0)[0])
+        self.append(self.orthogonal(rows)[0])
         self._before = self.count - self.block
-
-    def append(self, rows: np.ndarray) -> np.ndarray:
-        """Make rows (b, n) orthonormal, append the independent ones, return their components (b, j) in `rows`."""
-        shares = np.eye(len(rows))
-        for _ in range(3):
-            inertia = _product(self._mass, rows)
-            scale = np.sqrt(np.maximum(np.einsum("ij,ij->i", rows, inertia), np.finfo(float).tiny))
-            gram = symmetric_part((rows @ inertia.T) / scale / scale[:, None])
-            values, turns = linalg.eigh(gram)
-            kept = values > _DEPENDENT
-            turn, root = turns[:, kept], np.sqrt(values[kept])
-            rows, inertia = ((turn / scale[:, None] / root).T @ each for each in (rows, inertia))
-            shares = shares @ (turn * scale[:, None] * root)
-            if values[kept].min(initial=1.0) > _LOSING:
-                break
-            rows = self._orthogonal(rows, 0)[0]
-        self.block = len(rows)
-        start, self.count = self.count, self.count + self.block
-        self.vectors[start : self.count], self.inertia[start : self.count] = rows, inertia
-        return shares
 
     def extend(self, solve: Solve) -> np.ndarray:
         """Apply the operator to the last block and append new directions; return its components (j, b) in them."""
         count, last = self.count, slice(self.count - self.block, self.count)
-        rows, shares = self._orthogonal(solve(self.inertia[last]), self._before)
+        rows, shares = self.orthogonal(solve(self.inertia), self._before)
         self.projected[:count, last] = shares
         self.projected[last, :count] = shares.T
         self._before = last.start
@@ -132,28 +104,9 @@ class _Space:
     def restart(self, kept: int) -> None:
         """Keep the best Ritz vectors and the last block only."""
         values, turns = self.ritz(kept)
-        known = len(turns)
-        for rows in (self.vectors, self.inertia):
-            last = rows[known : self.count].copy()
-            rows[: len(values)] = turns.T @ rows[:known]
-            rows[len(values) : len(values) + self.block] = last
+        last = self.vectors[len(turns) : self.count].copy()
+        self.turn(turns)
+        self.vectors[self.count : self.count + self.block] = last
         self.projected[:] = 0.0
         self.projected[np.arange(len(values)), np.arange(len(values))] = values
-        self.count, self._before = len(values) + self.block, 0
-
-    def _orthogonal(self, rows: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows (b, n) without their components along the space, and these (k, b).
-
-        first: of the rows of the space along which the components are more than round-off.
-        """
-        found = np.zeros((self.count, len(rows)))
-        for start in (first, 0):  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
-            shares = self.inertia[start : self.count] @ rows.T
-            rows = rows - shares.T @ self.vectors[start : self.count]
-            found[start:] += shares
-        return rows, found
-
-
-def _product(mass: Any, rows: np.ndarray) -> np.ndarray:
-    """Return the products (b, n) of a symmetric matrix with rows."""
-    return np.ascontiguousarray((mass @ np.ascontiguousarray(rows.T)).T)
+        self.count, self._before = self.count + self.block, 0

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 from scipy import linalg, sparse
-from slepc4py import SLEPc
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
@@ -45,8 +44,8 @@ class Factorization:
         self.size = int(matrix.shape[0])
         # only the factor is kept: its inputs take as much memory in the largest structures
         with contextlib.ExitStack() as stack:
-            given = stack.enter_context(_petsc(_upper_triangle(matrix)))
-            ksp = stack.enter_context(_petsc(PETSc.KSP().create(PETSc.COMM_SELF)))
+            given = stack.enter_context(owned(_upper_triangle(matrix)))
+            ksp = stack.enter_context(owned(PETSc.KSP().create(PETSc.COMM_SELF)))
             ksp.setOperators(given)
             _set_direct(ksp, direct, inertia=direct == "mumps")
             try:
@@ -72,8 +71,8 @@ class Factorization:
         columns = np.asfortranarray(rows.T)
         solution = np.zeros_like(columns, order="F")
         with (
-            _petsc(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given,
-            _petsc(PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)) as found,
+            owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given,
+            owned(PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)) as found,
         ):
             given.assemble()
             found.assemble()
@@ -105,6 +104,27 @@ class Factorization:
                 f"the matrix of size {self.size} is singular to working precision (status {status}); "
                 "hold the structure against every rigid motion"
             )
+
+
+class Product:
+    """A sparse matrix (m, n) that is applied to rows (k, n): several of them share a pass over its entries."""
+
+    def __init__(self, matrix: sparse.csr_array) -> None:
+        indices = (matrix.indptr.astype(PETSc.IntType, copy=False), matrix.indices.astype(PETSc.IntType, copy=False))
+        self._kept = (*indices, matrix.data)  # PETSc reads them where they are
+        self._matrix = PETSc.Mat().createAIJWithArrays(matrix.shape, self._kept, comm=PETSc.COMM_SELF)
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """Return the products (k, m)."""
+        columns = np.ascontiguousarray(rows).T
+        with owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given:
+            given.assemble()
+            with owned(self._matrix.matMult(given)) as found:
+                return np.array(found.getDenseArray().T, order="C")
+
+    def __del__(self) -> None:
+        if hasattr(self, "_matrix") and not PETSc.Sys.isFinalized():
+            self._matrix.destroy()
 
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
@@ -181,12 +201,12 @@ def _assist(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
 
 def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
     with contextlib.ExitStack() as stack:
-        operators = [stack.enter_context(_petsc(_distributed(matrix))) for matrix in matrices]
+        operators = [stack.enter_context(owned(_distributed(matrix))) for matrix in matrices]
         return _TASKS[task](stack, operators, *arguments)
 
 
 def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
-    ksp = stack.enter_context(_petsc(PETSc.KSP().create(parallel.COMM)))
+    ksp = stack.enter_context(owned(PETSc.KSP().create(parallel.COMM)))
     ksp.setOperators(operators[0])
     _set_direct(ksp, inertia=True)
     ksp.setUp()
@@ -203,7 +223,7 @@ def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
 def _nearest(
     stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps = _eigenproblem(stack, operators, "TARGET_MAGNITUDE")
     eps.setTarget(shift)
     eps.setDimensions(count)
     eps.getST().setShift(shift)
@@ -216,7 +236,7 @@ def _nearest(
 def _interval(
     stack: contextlib.ExitStack, operators: list[Any], lower: float, upper: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators, SLEPc.EPS.Which.ALL)
+    eps = _eigenproblem(stack, operators, "ALL")
     eps.setInterval(lower, upper)
     _solve(eps, eps.getKrylovSchurKSP())
     return _eigenpairs(stack, eps, operators[0])
@@ -225,8 +245,10 @@ def _interval(
 _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _nearest, "interval": _interval}
 
 
-def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: Any) -> Any:
-    eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
+def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: str) -> Any:
+    from slepc4py import SLEPc  # one rank and the lowest modes do without
+
+    eps = stack.enter_context(owned(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)
     # the solver makes its factors itself, so that MUMPS takes its controls from the options of that prefix only
     options = PETSc.Options(f"{_PREFIX}st_mat_mumps_icntl_")
@@ -237,7 +259,7 @@ def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: Any)
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
     eps.setTolerances(1e-11, 500)
-    eps.setWhichEigenpairs(which)
+    eps.setWhichEigenpairs(getattr(SLEPc.EPS.Which, which))
     eps.getST().setType(SLEPc.ST.Type.SINVERT)
     return eps
 
@@ -252,7 +274,7 @@ def _solve(eps: Any, ksp: Any) -> None:
 
 def _eigenpairs(stack: contextlib.ExitStack, eps: Any, operator: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return all converged values and, on rank 0, vectors."""
-    vector = stack.enter_context(_petsc(operator.createVecRight()))
+    vector = stack.enter_context(owned(operator.createVecRight()))
     values, vectors = np.empty(eps.getConverged()), np.empty((eps.getConverged(), vector.getLocalSize()))
     for index in range(len(values)):
         values[index] = eps.getEigenpair(index, vector).real
@@ -261,7 +283,8 @@ def _eigenpairs(stack: contextlib.ExitStack, eps: Any, operator: Any) -> tuple[n
 
 
 @contextlib.contextmanager
-def _petsc(created: Any) -> Iterator[Any]:
+def owned(created: Any) -> Iterator[Any]:
+    """Yield an object of PETSc, and destroy it."""
     try:
         yield created
     finally:

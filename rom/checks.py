@@ -8,8 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.files.errors import VanedampError
-from vanedamp.files.toml_input import LARGEST
+from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.modal.algebra import symmetric_part
 
 _ASYMMETRY = 1e-9

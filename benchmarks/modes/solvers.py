@@ -5,8 +5,11 @@ from __future__ import annotations
 COUNT = 10
 #: what `vanedamp modal` runs on one rank
 OURS = "lanczos"
+#: and where factors need too much memory; without factors
+ITERATIVE = "iterative"
 NAMES = {
     "lanczos": "block Lanczos, CHOLMOD",
+    "iterative": "Davidson, multigrid",
     "mumps": "block Lanczos, MUMPS",
     "superlu": "eigsh, SuperLU (symmetric mode)",
     "superlu_default": "eigsh, SuperLU (default)",

@@ -56,6 +56,10 @@ from vanedamp.studies.terminal import stage
 _NEAR, _NOTABLE = 0.02, 0.01
 #: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
 _MODES, _REACH = 10, 1.5
+_UNCOUNTED = (
+    "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
+    '(solver = "factor")'
+)
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 
@@ -240,6 +244,7 @@ class ModalAnalysis:
             "effective_mass": self.effective_mass.tolist(),
             "movable_mass": self.structure.matrices.movable_mass.tolist(),
             "residual": self.modes.residuals.tolist(),
+            "solver": dict(self.modes.provenance["solver"]),
             "first_bending": self.first_bending,
             "first_bending_number": None if self.first_bending is None else self.first_bending + 1,
             "rigid": None if self.rigid is None else asdict(self.rigid),
@@ -326,6 +331,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
     lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
     warnings += unit_doubts(structure, lowest)
+    if not modes.counted:
+        warnings += (_UNCOUNTED,)
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
         inertia = base_inertia(case, matrices, label)
@@ -368,7 +375,7 @@ def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) 
     count = table.count or _MODES
     # one more, so that the last of them is not half of a pair
     more = count + 1 if count < size else count
-    modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency)
+    modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency, table.solver)
     inertia = matrices.mass @ (matrices.movable_translations() @ unit_direction(table.direction))
     guides = [inertia] if functional is None else [functional, inertia]
     modes = turned(modes, matrices, guides, table.pair_tolerance)

@@ -255,6 +255,9 @@ class ModesTable:
     """interface coordinate of the rigid model (default: the only one, or "shroud")"""
     shape: str | None = None
     """file of measured shapes, the first of which the first bending is most like, in place of `direction`"""
+    solver: Literal["factor", "iterative", "auto"] = "auto"
+    """"factor": by factors of the stiffness, which prove that no mode is missed; "iterative": without them, in less
+    memory; "auto": iterative where factors are estimated to need more than half of the memory"""
     pair_tolerance: Annotated[Real, Field(ge=0, le=0.1)] = 1e-3
     """relative difference of frequencies up to which they are one multiple mode [-]"""
 

@@ -59,6 +59,10 @@ COMMANDS = (
         (
             input_file("CASE.toml"), output_file("MODES.h5"), json_file,
             argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)"),
+            argument(
+                "--solver", choices=["factor", "iterative", "auto"],
+                help="by factors of the stiffness, without, or as the memory allows (default: the case's, else auto)",
+            ),
         ),
         writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE,
     ),

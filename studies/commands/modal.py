@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from vanedamp.studies.case.stages import assemble, modal_analysis
@@ -17,6 +18,8 @@ def run(arguments: Namespace, case: Case) -> None:
     if arguments.vtk:  # loads matplotlib and meshio, and reports missing packages before the work
         from vanedamp.studies.report.pictures import save_vtk
 
+    if arguments.solver is not None:
+        case = replace(case, modes=replace(case.modes, solver=arguments.solver))
     analysis = modal_analysis(assemble(case))
     result = analysis.to_json()
 

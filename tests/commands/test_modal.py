@@ -50,6 +50,31 @@ def test_free_structure(tmp_path, capfd):
     assert "None of these modes is a first bending" in (tmp_path / "report.html").read_text()
 
 
+def test_modes_without_factors(tmp_path, capfd, clamped):
+    """By the case, and by the option, which comes first."""
+    known = clamped["frequency_hz"]
+    assert clamped["solver"]["name"] == "factor" and clamped["solver"]["counted"]
+    assert clamped["solver"]["factor_bytes"] < clamped["solver"]["memory_bytes"]
+    result, told = modal(tmp_path, capfd, ("count = 8", 'count = 8\nsolver = "iterative"'))
+    assert result["frequency_hz"] == pytest.approx(known, rel=1e-8)
+    assert result["solver"] == {"name": "iterative", "counted": False}
+    assert "only factors prove that there is none" in result["warnings"][0]
+    assert told.count("\n") == 1
+    assert not Modes.load(tmp_path / "modes.h5").counted
+    case = str(tmp_path / "case.toml")
+    assert main(["modal", case, "--solver", "factor", "--json", "-"]) == 0
+    assert json.loads(capfd.readouterr().out)["solver"] == {"name": "factor", "counted": True}
+
+
+def test_a_solver_that_does_not_exist(tmp_path, capfd):
+    status, told = modal(tmp_path, capfd, ("count = 8", 'count = 8\nsolver = "lobpcg"'))
+    assert status == BAD_INPUT and told.count("\n") == 1
+    assert "modes.solver" in told and "'iterative'" in told
+    with pytest.raises(SystemExit, match="2"):
+        main(["modal", str(tmp_path / "case.toml"), "--solver", "lobpcg"])
+    assert "--solver" in capfd.readouterr().err
+
+
 def test_range_of_frequencies(tmp_path, capfd, clamped):
     known = clamped["frequency_hz"]
     low, high = 0.5 * (known[1] + known[2]), 0.5 * (known[5] + known[6])

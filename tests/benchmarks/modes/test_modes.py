@@ -26,7 +26,7 @@ def test_all_solvers_find_the_same_modes(folder):
     result = json.loads((folder / "bench_modal.json").read_text())
     (entry,) = result["sizes"]
     assert entry["agree"]
-    assert {"lanczos", "mumps", "superlu", "superlu_default"} <= set(entry["solvers"])
+    assert {"lanczos", "iterative", "mumps", "superlu", "superlu_default"} <= set(entry["solvers"])
     for found in entry["solvers"].values():
         assert found["status"] == "ok"
         assert found["peak_bytes"] >= found["loaded_bytes"] > 1e7
@@ -117,6 +117,29 @@ def test_solvers_that_have_lost_by_far_are_left_out(whole):
     assert first["solvers"][OURS]["modes"]["cpu_s"] == 1.25 and first["solvers"][OURS]["solves"] == 20
     assert "0.004 m, eigsh, SuperLU (default), round 2: left out, 5.4 times" in out
     assert (folder / "bench_modal.png").is_file()
+
+
+def test_solvers_whose_factors_do_not_fit_are_left_out(tmp_path):
+    """The one without factors goes on, however slow it was."""
+    calls, process = [], faked([])
+
+    def slow(module, task, *files, limit):
+        calls.append(task)
+        if task != bench_modal.ITERATIVE:
+            return process(module, task, *files, limit=limit)
+        return process(module, "superlu_default", *files, limit=limit)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench_modal, "_solvers", lambda: ([OURS, bench_modal.ITERATIVE], {}))
+        patch.setattr(bench_modal, "build", lambda *_: None)
+        patch.setattr(bench_modal, "apart", slow)
+        estimates = iter([{"name": "factor", "factor_bytes": 1e6}, {"name": "iterative", "factor_bytes": 26e9}])
+        patch.setattr(bench_modal, "chosen", lambda *_: next(estimates))
+        result = Modal((0.004, 0.003), 1, 100.0).run(tmp_path)
+    assert calls == ["assemble", OURS, bench_modal.ITERATIVE, "assemble", bench_modal.ITERATIVE]
+    assert result["sizes"][1]["solvers"][OURS]["status"].startswith("dropped: factors of 26 GB estimated at 10,000")
+    assert result["sizes"][1]["solvers"][bench_modal.ITERATIVE]["status"] == "ok"
+    assert not result["ahead"]["behind"]
 
 
 @pytest.mark.parametrize("stop_at", [1, 4, 9, 12])

