@@ -70,10 +70,12 @@ class Flows(NamedTuple):
 
     # how it begins: c = project ((p, p') - constant - excitation) + project_slip ((slips, rates) - ...)
     project: Annotated[np.ndarray, "s m 2n", complex]
+    reach: Annotated[np.ndarray, "s m 2", int]  # first coordinate p of each of its rows, and the last plus 1
     project_slip: Annotated[np.ndarray, "s m 2b", complex]
     excited: Annotated[np.ndarray, "s 2b e", complex]  # the excitation in xi of sprung bodies and its rate
     static: Annotated[np.ndarray, "s N N"]  # constant (p, xi) under constant loads on (p, x)
     constrained: Annotated[np.ndarray, "s N n"]  # constant (p, xi) kept by constraints inside the structure
+    tied: Annotated[np.ndarray, "s", bool]  # whether there are any
     body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
     impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
@@ -222,8 +224,10 @@ def _fill(flows: Flows, system: LineSystem, s: int, subsystem: Subsystem) -> Non
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :m] = full[structure].T
     if n:
-        moved = (full[structure] != 0.0).reshape(2, n, m).any(axis=0)
-        flows.support[s, :m, 0], flows.support[s, :m, 1] = moved.argmax(axis=0), n - moved[::-1].argmax(axis=0)
+        for place, part in ((flows.support[s, :m], full[structure].T), (flows.reach[s, e:m], project[:, structure])):
+            moved = (part != 0.0).reshape(-1, 2, n).any(axis=1)
+            place[:, 0], place[:, 1] = moved.argmax(axis=1), n - moved[:, ::-1].argmax(axis=1)
+    flows.tied[s] = len(subsystem.kept) > 0
     flows.excited[s] = full[xi, :e]
     flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
     flows.impulse_response[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T

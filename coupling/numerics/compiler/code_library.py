@@ -17,11 +17,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
+from numba.np import arrayobj
 
 from vanedamp.coupling.numerics.compiler.record import Record
 
@@ -32,7 +35,34 @@ _METHODS = (
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
-class _Kernel(JITCodeLibrary):
+class _FromZero(JITCodeLibrary):
+    """Code whose indices count from the start of an array, as in C: none is negative, but a literal.
+
+    numba adds the length to a negative index, wherever it cannot see that none is: with most indices, as they come out
+    of arrays. That takes several instructions each, and keeps loops from taking several turns at once.
+    """
+
+    def create_ir_module(self, name: str) -> Any:
+        """Return an empty module of a function, marked for `_index`."""
+        module = super().create_ir_module(name)
+        module.from_zero = True
+        return module
+
+
+_numbas_index = arrayobj.fix_integer_index
+
+
+def _index(context: Any, builder: Any, kind: Any, index: Any, length: Any) -> Any:
+    """Return an index of an array as an address needs it, in place of numba's function."""
+    if isinstance(index, ir.Constant) or not getattr(builder.module, "from_zero", False):
+        return _numbas_index(context, builder, kind, index, length)
+    return context.cast(builder, index, kind, types.intp)
+
+
+arrayobj.fix_integer_index = _index
+
+
+class _Kernel(_FromZero):
     """Code of a function that only compiled functions call: it stays as it was lowered."""
 
     def finalize(self) -> None:
@@ -72,7 +102,7 @@ class _Loops(_Kernel):
     """Code of a function whose loops are long."""
 
 
-class _Entry(JITCodeLibrary):
+class _Entry(_FromZero):
     """Code of a function that Python calls, with that of all functions below it.
 
     sized: whether it is compiled for the lengths of its records.
@@ -124,7 +154,15 @@ class _Entry(JITCodeLibrary):
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal
                 function.name = f"{self.name}.{place}"
-        super()._optimize_final_module()
+        if not apart:
+            super()._optimize_final_module()
+            return
+        # whole vectors one by one: by numba's means four at once, and what does not fill four number by number. Its
+        # passes before the others are for reference counting
+        tuning = llvm.create_pipeline_tuning_options()
+        tuning.speed_level, tuning.loop_vectorization, tuning.loop_interleaving = config.OPT, True, False
+        builder = llvm.create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
 
 
 def _below(library: Any) -> Iterator[Any]:
