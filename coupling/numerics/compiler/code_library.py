@@ -6,7 +6,7 @@ its cache the intermediate code of all that is below it, for callers that would 
 than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
-are numba's own but not documented. Where a version of numba lacks one of them, numba's compiler is taken:
+are numba's own but not documented; one function of numba is replaced, and does for other code what it did (`_index`). Where a version of numba lacks one of them, numba's compiler is taken:
 slower, with the same results. numba's own means do not replace it: numba 0.68 compiles the engine of sliders in 201 s
 in place of 41 s with its option `forceinline`; without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
 """
@@ -49,7 +49,7 @@ class _FromZero(JITCodeLibrary):
         return module
 
 
-_numbas_index = arrayobj.fix_integer_index
+_numbas_index = getattr(arrayobj, "fix_integer_index", None)
 
 
 def _index(context: Any, builder: Any, kind: Any, index: Any, length: Any) -> Any:
@@ -57,9 +57,6 @@ def _index(context: Any, builder: Any, kind: Any, index: Any, length: Any) -> An
     if isinstance(index, ir.Constant) or not getattr(builder.module, "from_zero", False):
         return _numbas_index(context, builder, kind, index, length)
     return context.cast(builder, index, kind, types.intp)
-
-
-arrayobj.fix_integer_index = _index
 
 
 class _Kernel(_FromZero):
@@ -221,7 +218,12 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
     return Chosen
 
 
-if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
+if (
+    all(hasattr(JITCodeLibrary, name) for name in _METHODS)
+    and hasattr(llvm, "create_pipeline_tuning_options")
+    and _numbas_index is not None
+):
+    arrayobj.fix_integer_index = _index
     ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
     INLINED, LOOPS = _compiler(_Kernel, "inlined", inline=True), _compiler(_Loops, "loops")
 else:
