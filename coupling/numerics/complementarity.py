@@ -82,6 +82,8 @@ def _drive(problem, k, i, tolerance):
     """Move f_i until row i obeys its condition, keeping the conditions of all rows that are in."""
     f, a, state = problem.force, problem.acceleration, problem.state
     df, da = problem.d_force, problem.d_acceleration
+    if k == 1:
+        return _drive_only(problem, tolerance)
     for _ in range(50 + 20 * k):
         if abs(a[i]) <= tolerance:
             state[i] = DEPENDENT if _dependent(problem, k, i) else FREE
@@ -108,6 +110,31 @@ def _drive(problem, k, i, tolerance):
         if stops == i:
             return True
     return False
+
+
+@kernel
+def _drive_only(problem, tolerance):
+    """Move the force of the only row until it obeys its condition: what `_drive` finds, without its equations."""
+    f, a, inverse_mass = problem.force[0], problem.acceleration[0], problem.matrix[0, 0]
+    way = 1.0 if a < 0.0 else -1.0
+    bound = problem.high[0] if way > 0.0 else problem.low[0]
+    room = (bound - f) * way
+    if abs(a) <= tolerance:
+        problem.state[0] = FREE if inverse_mass > 0.0 else DEPENDENT
+        a = 0.0
+    elif inverse_mass > 0.0 and 0.0 < abs(a) / inverse_mass <= room:
+        problem.state[0] = FREE
+        f += way * (abs(a) / inverse_mass)
+        a = 0.0
+    else:
+        problem.state[0] = AT_HIGH if way > 0.0 else AT_LOW
+        if room == np.inf:
+            return False
+        if room > 0.0:
+            f = bound
+            a += room * way * inverse_mass
+    problem.force[0], problem.acceleration[0] = f, a
+    return True
 
 
 @kernel

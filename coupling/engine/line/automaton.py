@@ -13,9 +13,11 @@ import math
 from vanedamp.coupling.engine.line.compliant_contacts import begin_contact, change_contact, spring_force
 from vanedamp.coupling.engine.line.contact_states import (
     add_force,
+    add_multiple,
     constant_loads,
     keep_released,
     resolve_contact_states,
+    row_terms,
     stop_attached_bodies,
 )
 from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell
@@ -247,7 +249,6 @@ def _begin_subsystem(system, flows, st, scratch, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
     _set_constants(system, flows, st, scratch, s)
-    _set_phases(system, st)
     _set_amplitudes(system, flows, st, scratch, s)
     _set_free_accelerations(system, st)
     _set_constant_forces(system, flows, st, scratch, s)
@@ -265,49 +266,82 @@ def _set_constants(system, flows, st, scratch, s):
     constant_loads(system, st, scratch)
     if flows.sprung[s]:
         _preload(system, flows, st, scratch, s, y)
-    for i in range(n + b if flows.sprung[s] else n):
-        total = 0.0
-        for k in range(n + b):
-            total += flows.static[s, i, k] * scratch.loads[k]
-        for k in range(n):
-            total += flows.constrained[s, i, k] * y[k]
-        if i < n:
-            st.constant[i] = total
-        else:
-            st.slip_constant[i - n] = total
+    for i in range(n):
+        st.constant[i] = 0.0
+    for i in range(b):
+        st.slip_constant[i] = 0.0
+    loaded = False
+    for i in range(n + b):
+        loaded = loaded or scratch.loads[i] != 0.0
+    if loaded:
+        _add_product(flows.static[s], 0, scratch.loads, st.constant)
+        if flows.sprung[s]:
+            _add_product(flows.static[s], n, scratch.loads, st.slip_constant)
+    if flows.tied[s]:
+        _add_product(flows.constrained[s], 0, y, st.constant)
+        if flows.sprung[s]:
+            _add_product(flows.constrained[s], n, y, st.slip_constant)
     for i in range(b):
         st.coordinate_acceleration[n + i] = 0.0
         for k in range(b):
             st.coordinate_acceleration[n + i] += flows.body_acceleration[s, i, k] * scratch.loads[n + k]
 
 
+@summing
+def _add_product(matrix, first, x, total):
+    """Add the rows of a matrix from `first` on, as many as `total` has, times x to it."""
+    for i in range(len(total)):
+        part = 0.0
+        for k in range(matrix.shape[1]):
+            part += matrix[first + i, k] * x[k]
+        total[i] += part
+
+
 @inlined
 def _set_amplitudes(system, flows, st, scratch, s):
     """Set the amplitudes of the free modes from the motion, less its constant part and that of the excitation."""
-    n, b, e, y, sprung = len(st.constant), system.bodies, len(system.frequency), st.coordinates, flows.sprung[s]
-    for i in range(2 * n):
-        scratch.coordinates[i] = y[i]
-        for h in range(e):
-            scratch.coordinates[i] -= (flows.shape[s, h, i] * st.amplitude[h]).real
-        if i < n:
-            scratch.coordinates[i] -= st.constant[i]
-    if sprung:
+    b, e = system.bodies, len(system.frequency)
+    _subtract_steady(flows.shape[s], st.amplitude, st.constant, e, st.coordinates, scratch.coordinates)
+    _project(flows.project[s], flows.reach[s], scratch.coordinates, e, flows.modes[s], st.amplitude)
+    if flows.sprung[s]:
         for i in range(b):
             scratch.slips[i], scratch.slips[b + i] = st.displacement[i], st.velocity[i]
             for h in range(e):
                 scratch.slips[i] -= (flows.excited[s, i, h] * st.amplitude[h]).real
                 scratch.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
             scratch.slips[i] -= st.slip_constant[i]
-    for j in range(e, flows.modes[s]):
-        total = 0.0j
-        for i in range(2 * n):
-            total += flows.project[s, j, i] * scratch.coordinates[i]
-        if sprung:
+        for j in range(e, flows.modes[s]):
+            part = st.amplitude[j]
             for i in range(2 * b):
-                total += flows.project_slip[s, j, i] * scratch.slips[i]
-        st.amplitude[j] = total
+                part += flows.project_slip[s, j, i] * scratch.slips[i]
+            st.amplitude[j] = part
     for j in range(flows.modes[s], len(st.amplitude)):
         st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
+
+
+@summing
+def _subtract_steady(shape, phase, constant, harmonics, y, rest):
+    """Set the rest of y = (p, p') without its constant part and without that of the excitation."""
+    n = len(constant)
+    for i in range(n):
+        rest[i], rest[n + i] = y[i] - constant[i], y[n + i]
+    for h in range(harmonics):
+        c = phase[h]
+        for i in range(2 * n):
+            rest[i] -= shape[h, i].real * c.real - shape[h, i].imag * c.imag
+
+
+@summing
+def _project(project, reach, y, first, last, amplitude):
+    """Set the amplitudes of the modes from `first` to `last` that (p, p') = y has."""
+    n = len(y) // 2
+    for j in range(first, last):
+        x, turned = 0.0, 0.0
+        for i in range(reach[j, 0], reach[j, 1]):
+            of_place, of_speed = project[j, i], project[j, n + i]
+            x += of_place.real * y[i] + of_speed.real * y[n + i]
+            turned += of_place.imag * y[i] + of_speed.imag * y[n + i]
+        amplitude[j] = complex(x, turned)
 
 
 @kernel
@@ -331,9 +365,10 @@ def _preload(system, flows, st, scratch, s, y):
 @kernel
 def _set_free_accelerations(system, st):
     """Set the constant parts of the rows' accelerations, by the free bodies."""
+    n, b = system.modes, system.bodies
     for r in range(len(st.state)):
         st.free_acceleration[r], size = 0.0, 0.0
-        for i in range(len(st.coordinate_acceleration)):
+        for i in range(n, n + b):
             part = system.J[r, i] * st.coordinate_acceleration[i]
             st.free_acceleration[r] += part
             size += abs(part)
@@ -344,25 +379,23 @@ def _set_free_accelerations(system, st):
 @kernel
 def _set_constant_forces(system, flows, st, scratch, s):
     """Set the constant parts of the closed rows' forces."""
-    n, b, r_count, sprung = len(st.constant), system.bodies, len(st.state), flows.sprung[s]
-    if sprung:
-        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
+    n, b, r_count, sprung, rigid_closed = len(st.constant), system.bodies, len(st.state), flows.sprung[s], False
     for r in range(r_count):
         st.constant_force[r] = 0.0
         if sprung and st.state[r] == SPRUNG:
-            st.constant_force[r] = spring_force(system, st, r)
-            for j in range(flows.modes[s]):
-                st.constant_force[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+            force = _real_sum(flows.force[s, r], st.amplitude, flows.modes[s])
+            st.constant_force[r] = spring_force(system, st, r) - force
+        rigid_closed = rigid_closed or flows.closed_inverse[s, r, r] != 0.0
+    if not rigid_closed:
+        return
+    if sprung:
+        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
     for i in range(n):
         scratch.loads[i] -= system.stiffness[i] * st.constant[i]
     for i in range(n, n + b):
         scratch.loads[i] /= system.mass[i]
     for r in range(r_count):
-        scratch.acceleration[r], scratch.jerk[r] = 0.0, 0.0
-        for i in range(n + b):
-            part = system.J[r, i] * scratch.loads[i]
-            scratch.acceleration[r] += part
-            scratch.jerk[r] += abs(part)
+        scratch.acceleration[r], scratch.jerk[r] = row_terms(system.J[r], scratch.loads, scratch.loads)
         if sprung:
             for k in range(r_count):
                 scratch.acceleration[r] += system.delassus[r, k] * st.constant_force[k]
@@ -375,6 +408,15 @@ def _set_constant_forces(system, flows, st, scratch, s):
             force -= flows.closed_inverse[s, r, k] * scratch.acceleration[k]
             size += abs(flows.closed_inverse[s, r, k]) * scratch.jerk[k]
         st.constant_force[r] = force if abs(force) > CANCELLED * size else 0.0
+
+
+@summing
+def _real_sum(functional, amplitude, count):
+    """Return the value of a functional of the first `count` amplitudes."""
+    total = 0.0
+    for j in range(count):
+        total += functional[j].real * amplitude[j].real - functional[j].imag * amplitude[j].imag
+    return total
 
 
 @inlined
@@ -486,11 +528,17 @@ def _advance_motion(system, flows, st, scratch, tau):
     if st.counters[CLOSED_ROWS] > 0:
         _stay_together(system, st, scratch)
     measure_gaps(system, st)
-    for j in range(count):
-        gain = scratch.gain[j]
-        st.amplitude[j] += gain
-        st.change[2 * j] += gain.real
-        st.change[2 * j + 1] += gain.imag
+    _add_gains(scratch.gain, 1.0, 0, count, st.amplitude, st.change)
+
+
+@summing
+def _add_gains(gain, factor, first, last, amplitude, change):
+    """Add gains times a factor to the amplitudes of the modes from `first` to `last`, and to their changes."""
+    for j in range(first, last):
+        x, y = factor * gain[j].real, factor * gain[j].imag
+        amplitude[j] += complex(x, y)
+        change[2 * j] += x
+        change[2 * j + 1] += y
 
 
 @summing
@@ -543,24 +591,25 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
 
     Returns STATES_GO_ON, STATES_OPEN where contact states must be decided again, or NO_SOLUTION.
     """
-    if order == POSITION and meaning == CLOSES and single_impact(system, st, rec, scratch, r):
-        _change_amplitudes(system, flows, st, rec, scratch)
-        return STATES_GO_ON
-    keep_released(st, scratch)
-    if order == POSITION and meaning != RECLOSES:
+    closes = order == POSITION and meaning == CLOSES
+    collided = closes and single_impact(system, st, rec, scratch, r)
+    if order == POSITION and meaning != RECLOSES and not collided:
         # a gap that closes while it still widens, to round-off, is a touch without speed
-        if meaning == CLOSES and st.velocity[r] > 0.0:
+        if closes and st.velocity[r] > 0.0:
             st.velocity[r] = 0.0
             mark_only(scratch, r)
             join_speeds(system, st, scratch)
         _close_gap(system, st, scratch, r)
-    if order == POSITION and meaning == CLOSES and rigid(system, r):
-        _set_capture_speeds(system, flows, st)
-        if not simultaneous_impacts(system, st, rec, scratch):
-            return NO_SOLUTION
-        if all_in_flight(system, st):
-            _change_amplitudes(system, flows, st, rec, scratch)
-            return STATES_GO_ON
+        if closes and rigid(system, r):
+            _set_capture_speeds(system, flows, st)
+            if not simultaneous_impacts(system, st, rec, scratch):
+                return NO_SOLUTION
+            collided = True
+    if collided and all_in_flight(system, st):
+        _change_amplitudes(system, flows, st, rec, scratch)
+        return STATES_GO_ON
+    keep_released(st, scratch)
+    if collided:
         structure_state(flows, st, st.coordinates)
         _push_structure(system, st, scratch)
         return STATES_OPEN
@@ -596,20 +645,15 @@ def _change_amplitudes(system, flows, st, rec, scratch):
         impulse = scratch.impulse[r]
         if impulse != 0.0:
             account_impact(system, flows, st, rec, r, impulse)
-            for j in range(flows.driven[s, 0], flows.modes[s]):
-                jump = flows.impulse_response[s, r, j] * impulse
-                st.amplitude[j] += jump
-                st.change[2 * j] += jump.real
-                st.change[2 * j + 1] += jump.imag
+            _add_gains(
+                flows.impulse_response[s, r], impulse, flows.driven[s, 0], flows.modes[s], st.amplitude, st.change
+            )
     _activate_modes(flows, st)
 
 
 @inlined
 def _push_structure(system, st, scratch):
     """Add the impulses to the structure's modal velocities in st.coordinates."""
-    n = len(st.constant)
-    for i in range(n):
-        jump = 0.0
-        for r in range(len(scratch.impulse)):
-            jump += system.J[r, i] * scratch.impulse[r]
-        st.coordinates[n + i] += jump
+    for r in range(len(scratch.impulse)):
+        if scratch.impulse[r] != 0.0:
+            add_multiple(system.J[r], scratch.impulse[r], st.coordinates[len(st.constant) :])

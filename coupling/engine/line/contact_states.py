@@ -6,6 +6,8 @@ acceleration vanish together, as at the instant at which a contact lets go, thei
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vanedamp.coupling.engine.line.compliant_contacts import close_pressed_contacts, slide_or_hold, spring_force
@@ -30,7 +32,7 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     TOUCHING,
 )
-from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.complementarity import solve_box
 from vanedamp.coupling.numerics.tolerances import FORCE_ROUND_OFF
 
@@ -216,8 +218,24 @@ def constant_loads(system, st, scratch):
 @kernel
 def add_force(system, scratch, r, force):
     """Add the force of row r (N) to scratch.loads."""
-    for i in range(len(scratch.loads)):
-        scratch.loads[i] += system.J[r, i] * force
+    add_multiple(system.J[r], force, scratch.loads)
+
+
+@summing
+def add_multiple(row, factor, total):
+    """Add the first numbers of a row, as many as `total` has, times a factor to it."""
+    for i in range(len(total)):
+        total[i] += row[i] * factor
+
+
+@summing
+def row_terms(row, values, sizes):
+    """Return the sum of values by a row's factors, and that of the sizes of its terms, by sizes of the values."""
+    total, terms = 0.0, 0.0
+    for i in range(len(values)):
+        total += row[i] * values[i]
+        terms += abs(row[i]) * abs(sizes[i])
+    return total, terms
 
 
 @inlined
@@ -227,39 +245,44 @@ def _free_accelerations(system, st, scratch):
     Returns the size of the terms that the accelerations are sums of. Leaves the accelerations of the coordinates in
     scratch.loads.
     """
-    n, size, largest = len(st.constant), len(scratch.loads), 0.0
+    largest = 0.0
     constant_loads(system, st, scratch)
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
             add_force(system, scratch, r, spring_force(system, st, r))
-    for i in range(n):
-        p, speed = st.coordinates[i], st.coordinates[n + i]
-        damper = _damping_force(system, st.coordinates[n:], i)
-        # sizes by amplitude: a term that passes through zero has the round-off of its peak
-        scratch.sizes[i] = (
-            abs(scratch.loads[i]) + abs(damper)
-            + system.stiffness[i] * abs(p) + np.sqrt(system.stiffness[i]) * abs(speed)
-        )  # fmt: skip
-        scratch.loads[i] -= system.stiffness[i] * p + damper
-    for i in range(n, size):
-        scratch.sizes[i] = abs(scratch.loads[i])
-    for h in range(len(system.frequency)):
-        for i in range(size):
-            scratch.loads[i] += (system.load[h, i] * st.amplitude[h]).real
-            scratch.sizes[i] += abs(system.load[h, i])
-    for i in range(n, size):
-        scratch.sizes[i] /= system.mass[i]
-        scratch.loads[i] /= system.mass[i]
+    _to_accelerations(system, st.coordinates, st.amplitude, scratch.loads, scratch.sizes)
     for r in range(len(st.state)):
-        total, terms = 0.0, 0.0
-        for i in range(size):
-            total += system.J[r, i] * scratch.loads[i]
-            terms += abs(system.J[r, i]) * scratch.sizes[i]
+        total, terms = row_terms(system.J[r], scratch.loads, scratch.sizes)
         if r >= system.friction_rows and st.state[r] == SPRUNG:
             terms += TRAVEL * system.spring[r] * system.free_travel[r] * system.delassus[r, r]
         scratch.acceleration[r] = total
         largest = max(largest, terms)
     return largest
+
+
+@summing
+def _to_accelerations(system, y, phase, loads, sizes):
+    """Make constant loads the accelerations of the coordinates at y = (p, p'). Set the sizes of their terms."""
+    n, size = len(y) // 2, len(loads)
+    for i in range(n):
+        damper = _damping_force(system, y[n:], i)
+        # sizes by amplitude: a term that passes through zero has the round-off of its peak
+        sizes[i] = (
+            abs(loads[i]) + abs(damper)
+            + system.stiffness[i] * abs(y[i]) + math.sqrt(system.stiffness[i]) * abs(y[n + i])
+        )  # fmt: skip
+        loads[i] -= system.stiffness[i] * y[i] + damper
+    for i in range(n, size):
+        sizes[i] = abs(loads[i])
+    for h in range(len(system.frequency)):
+        c = phase[h]
+        for i in range(size):
+            load = system.load[h, i]
+            loads[i] += load.real * c.real - load.imag * c.imag
+            sizes[i] += math.sqrt(load.real * load.real + load.imag * load.imag)
+    for i in range(n, size):
+        sizes[i] /= system.mass[i]
+        loads[i] /= system.mass[i]
 
 
 @kernel
@@ -307,10 +330,6 @@ def _free_jerks(system, st, scratch, k):
         scratch.rates[i] /= system.mass[i]
         scratch.sizes[i] /= system.mass[i]
     for r in range(len(st.state)):
-        total, terms = 0.0, 0.0
-        for i in range(size):
-            total += system.J[r, i] * scratch.rates[i]
-            terms += abs(system.J[r, i]) * scratch.sizes[i]
-        scratch.jerk[r] = total
+        scratch.jerk[r], terms = row_terms(system.J[r], scratch.rates, scratch.sizes)
         largest = max(largest, terms)
     return largest

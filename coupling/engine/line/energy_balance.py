@@ -77,29 +77,27 @@ def account_spell(system, flows, st, rec, scratch):
     for j in range(count):
         total[2 * j] = 2.0 * st.amplitude[j].real - change[2 * j]
         total[2 * j + 1] = 2.0 * st.amplitude[j].imag - change[2 * j + 1]
-    coupled = e if flows.uncoupled[s] else count
-    st.ledger[VISCOUS] += _quadratic_form(flows.loss[s], change, total, count, coupled)
-    rec.square[period] += _quadratic_form(flows.square[s], change, total, count, count)
+    if flows.uncoupled[s]:
+        st.ledger[VISCOUS] += _uncoupled_form(flows.loss[s], change, total, e, count)
+    else:
+        st.ledger[VISCOUS] += _quadratic_form(flows.loss[s], change, total, count)
+    rec.square[period] += _quadratic_form(flows.square[s], change, total, count)
     if flows.damped[s]:
-        st.ledger[CONTACT] += _quadratic_form(flows.dashpot[s], change, total, count, count)
+        st.ledger[CONTACT] += _quadratic_form(flows.dashpot[s], change, total, count)
     _linear_forms(system, flows, st, rec, scratch, s, period, count)
     for i in range(2 * count):
         change[i] = 0.0
 
 
 @summing
-def _quadratic_form(form, change, total, count, coupled):
-    """Return change Q total for `count` complex numbers by their real and imaginary parts.
-
-    Q (., .) is symmetric; numbers from `coupled` on are coupled to themselves and to those before.
-    """
+def _quadratic_form(form, change, total, count):
+    """Return change Q total for `count` complex numbers by their real and imaginary parts; Q (., .) is symmetric."""
     result = 0.0
     for j in range(count):
-        last = 2 * min(j, coupled)
         row, other = form[2 * j], form[2 * j + 1]
         dr, di, tr, ti = change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
         on_total, on_change, other_total, other_change = 0.0, 0.0, 0.0, 0.0
-        for k in range(last):
+        for k in range(2 * j):
             on_total += row[k] * total[k]
             on_change += row[k] * change[k]
             other_total += other[k] * total[k]
@@ -108,6 +106,24 @@ def _quadratic_form(form, change, total, count, coupled):
         on_total += row[at] * tr + row[at + 1] * ti
         other_total += other[at] * tr + other[at + 1] * ti
         result += (dr * on_total + di * other_total) + (tr * on_change + ti * other_change)
+    return result
+
+
+@summing
+def _uncoupled_form(form, change, total, harmonics, count):
+    """Return the same where numbers behind the harmonics' are coupled to themselves and to those only."""
+    result, first, last = 0.0, 2 * harmonics, 2 * count
+    for i in range(first):
+        on_total, on_change = 0.0, 0.0
+        for k in range(first, last):
+            on_total += form[i, k] * total[k]
+            on_change += form[i, k] * change[k]
+        result += change[i] * on_total + total[i] * on_change
+        for k in range(first):
+            result += change[i] * form[i, k] * total[k]
+    for k in range(first, last, 2):
+        dr, di, tr, ti = change[k], change[k + 1], total[k], total[k + 1]
+        result += dr * (form[k, k] * tr + form[k, k + 1] * ti) + di * (form[k + 1, k] * tr + form[k + 1, k + 1] * ti)
     return result
 
 

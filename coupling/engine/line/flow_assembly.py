@@ -256,7 +256,8 @@ def _take_modes(system, subsystems, k, flows, s, count, scratch):
         flows.eigenvalue[s, j], scratch.inverse_rate[j] = rate, reciprocal(rate)
         flows.response[s, j], flows.momentum[s, j] = subsystems.response[k, i], subsystems.momentum[k, i]
         flows.speed[s, j], flows.acceleration[s, j] = subsystems.speed[k, i], subsystems.acceleration[k, i]
-        flows.support[s, j, 0], flows.support[s, j, 1] = subsystems.support[k, i, 0], subsystems.support[k, i, 1]
+        for end in range(2):
+            flows.support[s, j, end], flows.reach[s, j, end] = subsystems.support[k, i, end], subsystems.reach[k, i, end]
         for l in range(2 * n):
             flows.shape[s, j, l], flows.project[s, j, l] = subsystems.shape[k, i, l], subsystems.project[k, i, l]
         for l in range(2 * b):
@@ -382,8 +383,8 @@ def _set_forces(system, subsystems, k, flows, s, h, scratch):
 def _take_constants(system, subsystems, k, flows, s):
     """Set what the excitation does not change."""
     n, b = system.modes, system.bodies
-    flows.sprung[s], flows.damped[s], flows.uncoupled[s] = (
-        subsystems.sprung[k], subsystems.damped[k], subsystems.uncoupled[k]
+    flows.sprung[s], flows.damped[s], flows.uncoupled[s], flows.tied[s] = (
+        subsystems.sprung[k], subsystems.damped[k], subsystems.uncoupled[k], subsystems.tied[k]
     )  # fmt: skip
     for r in range(len(system.spring)):
         flows.active_set[s, r] = subsystems.closed[k, r]

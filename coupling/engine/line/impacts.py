@@ -20,7 +20,7 @@ from vanedamp.coupling.system.restitution import restitution_at
 
 @inlined
 def single_impact(system, st, rec, scratch, r):
-    """Apply the ordinary impact: of row r only, between free flights that keep their directions, no end of a chatter.
+    """Apply the ordinary impact: of row r only, all other contacts open, no end of a chatter.
 
     Returns False, with nothing changed, if it is not that: then `simultaneous_impacts` decides.
     """
@@ -35,10 +35,6 @@ def single_impact(system, st, rec, scratch, r):
         if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * system.free_travel[i]):
             return False
     impulse = -(1.0 + restitution) * speed / system.delassus[r, r]
-    for i in range(friction):
-        turns = st.state[i] * (st.velocity[i] + system.delassus[i, r] * impulse) <= 0.0
-        if st.state[i] >= STICK or (st.state[i] != COAST and turns):
-            return False
     for i in range(len(st.state)):
         scratch.impulse[i] = 0.0
         if i < friction or not system.moves_with_floor[i]:

@@ -146,7 +146,7 @@ def _height(x, side):
 @inlined
 def _may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
     """Whether the height of x may exceed peak within [0, h]: cubic interpolant of the ends and bound of its error."""
-    room = peak - fourth * h * h * h * h / 384.0
+    room = peak - fourth * h * h * h * h * (1 / 384)
     # the interpolant's basis functions of the slopes stay below 4/27 h
     rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
     fall = min(x0, x1) + (4 / 27) * h * (min(v0, 0.0) + min(-v1, 0.0))

@@ -109,11 +109,17 @@ def _dot(a, b):
 @inlined
 def structure_state(flows, st, y):
     """Set y to (p, p') at the segment's start."""
-    s, n = st.counters[FLOW], len(st.constant)
-    for i in range(2 * n):
-        y[i] = st.constant[i] if i < n else 0.0
-    for j in range(st.counters[ACTIVE]):
-        c, shape = st.amplitude[j], flows.shape[s, j]
-        for i in range(flows.support[s, j, 0], flows.support[s, j, 1]):
-            y[i] += shape[i].real * c.real - shape[i].imag * c.imag
-            y[n + i] += shape[n + i].real * c.real - shape[n + i].imag * c.imag
+    s = st.counters[FLOW]
+    _add_modes(flows.shape[s], flows.support[s], st.amplitude, st.constant, st.counters[ACTIVE], y)
+
+
+@summing
+def _add_modes(shape, support, amplitude, constant, count, y):
+    n = len(constant)
+    for i in range(n):
+        y[i], y[n + i] = constant[i], 0.0
+    for j in range(count):
+        c = amplitude[j]
+        for i in range(support[j, 0], support[j, 1]):
+            y[i] += shape[j, i].real * c.real - shape[j, i].imag * c.imag
+            y[n + i] += shape[j, n + i].real * c.real - shape[j, n + i].imag * c.imag

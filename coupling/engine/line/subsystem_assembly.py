@@ -59,10 +59,12 @@ class Flows(NamedTuple):
 
     # how it begins: c = project ((p, p') - constant - excitation) + project_slip ((slips, rates) - ...)
     project: Annotated[np.ndarray, "s m 2n", complex]
+    reach: Annotated[np.ndarray, "s m 2", int]  # first coordinate p of each of its rows, and the last plus 1
     project_slip: Annotated[np.ndarray, "s m 2b", complex]
     excited: Annotated[np.ndarray, "s 2b e", complex]  # the excitation in xi of sprung bodies and its rate
     static: Annotated[np.ndarray, "s N N"]  # constant (p, xi) under constant loads on (p, x)
     constrained: Annotated[np.ndarray, "s N n"]  # constant (p, xi) kept by constraints inside the structure
+    tied: Annotated[np.ndarray, "s", bool]  # whether there are any
     body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
     impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row

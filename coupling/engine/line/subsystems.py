@@ -42,6 +42,7 @@ class Subsystems(NamedTuple):
     pull: Annotated[np.ndarray, "k r 2n"]  # acceleration of each row by (p, p'), no row closed
     static: Annotated[np.ndarray, "k N N"]  # z under constant loads on (p, x)
     constrained: Annotated[np.ndarray, "k N n"]  # constant z that constraints inside the structure keep
+    tied: Annotated[np.ndarray, "k", bool]  # whether there are any
     body_acceleration: Annotated[np.ndarray, "k b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "k r r"]  # inverse Delassus matrix of the rigid closed rows
 
@@ -62,6 +63,7 @@ class Subsystems(NamedTuple):
     slip_shape: Annotated[np.ndarray, "k m b", complex]  # of xi
     body: Annotated[np.ndarray, "k m b", complex]  # of x
     project: Annotated[np.ndarray, "k m 2n", complex]  # amplitudes from (p, p')
+    reach: Annotated[np.ndarray, "k m 2", int]  # first coordinate p of each of its rows, and the last plus 1
     project_slip: Annotated[np.ndarray, "k m 2b", complex]  # and from (xi, xi')
     push: Annotated[np.ndarray, "k m N", complex]  # rate of an amplitude by loads on (p, x)
     motion: Annotated[np.ndarray, "k r m", complex]  # displacement of each row

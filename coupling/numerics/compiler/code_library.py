@@ -6,7 +6,7 @@ its cache the intermediate code of all that is below it, for callers that would 
 than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
-are numba's own but not documented. Where a version of numba lacks one of them, numba's compiler is taken:
+are numba's own but not documented; one function of numba is replaced, and does for other code what it did (`_index`). Where a version of numba lacks one of them, numba's compiler is taken:
 slower, with the same results. numba's own means do not replace it: numba 0.68 compiles the engine of sliders in 201 s
 in place of 41 s with its option `forceinline`; without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
 """
@@ -17,11 +17,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
+from numba.np import arrayobj
 
 from vanedamp.coupling.numerics.compiler.record import Record
 
@@ -32,7 +35,31 @@ _METHODS = (
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
-class _Kernel(JITCodeLibrary):
+class _FromZero(JITCodeLibrary):
+    """Code whose indices count from the start of an array, as in C: none is negative, but a literal.
+
+    numba adds the length to a negative index, wherever it cannot see that none is: with most indices, as they come out
+    of arrays. That takes several instructions each, and keeps loops from taking several turns at once.
+    """
+
+    def create_ir_module(self, name: str) -> Any:
+        """Return an empty module of a function, marked for `_index`."""
+        module = super().create_ir_module(name)
+        module.from_zero = True
+        return module
+
+
+_numbas_index = getattr(arrayobj, "fix_integer_index", None)
+
+
+def _index(context: Any, builder: Any, kind: Any, index: Any, length: Any) -> Any:
+    """Return an index of an array as an address needs it, in place of numba's function."""
+    if isinstance(index, ir.Constant) or not getattr(builder.module, "from_zero", False):
+        return _numbas_index(context, builder, kind, index, length)
+    return context.cast(builder, index, kind, types.intp)
+
+
+class _Kernel(_FromZero):
     """Code of a function that only compiled functions call: it stays as it was lowered."""
 
     def finalize(self) -> None:
@@ -72,7 +99,7 @@ class _Loops(_Kernel):
     """Code of a function whose loops are long."""
 
 
-class _Entry(JITCodeLibrary):
+class _Entry(_FromZero):
     """Code of a function that Python calls, with that of all functions below it.
 
     sized: whether it is compiled for the lengths of its records.
@@ -124,7 +151,15 @@ class _Entry(JITCodeLibrary):
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal
                 function.name = f"{self.name}.{place}"
-        super()._optimize_final_module()
+        if not apart:
+            super()._optimize_final_module()
+            return
+        # whole vectors one by one: by numba's means four at once, and what does not fill four number by number. Its
+        # passes before the others are for reference counting
+        tuning = llvm.create_pipeline_tuning_options()
+        tuning.speed_level, tuning.loop_vectorization, tuning.loop_interleaving = config.OPT, True, False
+        builder = llvm.create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
 
 
 def _below(library: Any) -> Iterator[Any]:
@@ -183,7 +218,12 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
     return Chosen
 
 
-if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
+if (
+    all(hasattr(JITCodeLibrary, name) for name in _METHODS)
+    and hasattr(llvm, "create_pipeline_tuning_options")
+    and _numbas_index is not None
+):
+    arrayobj.fix_integer_index = _index
     ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
     INLINED, LOOPS = _compiler(_Kernel, "inlined", inline=True), _compiler(_Loops, "loops")
 else:

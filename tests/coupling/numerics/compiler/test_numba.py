@@ -441,6 +441,47 @@ def _cfunc(folder):
     return CFUNCTYPE(c_double, c_double, c_double)(compiled.address)(1.0, 0.0) == np.inf
 
 
+@assumed("arrayobj.fix_integer_index(context, builder, idxty, idx, size) makes an integer an index, in every access")
+def _index(folder):
+    from numba import njit
+    from numba.np import arrayobj
+
+    numbas, calls = arrayobj.fix_integer_index, []
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return numbas(*arguments)
+
+    def swap(x, i, j):
+        x[i, 0], x[j, 0] = x[j, 0], x[i, 0]
+
+    arrayobj.fix_integer_index = counted
+    try:
+        njit(swap)(np.zeros((2, 1)), 0, 1)
+    finally:
+        arrayobj.fix_integer_index = numbas
+    return parameters(numbas)[1:2] == ["builder"] and len(calls) == 8 and hasattr(calls[0][1].module, "functions")
+
+
+@assumed("a library makes its module by create_ir_module(name)")
+def _create_ir_module(folder):
+    from numba.core.codegen import JITCodeLibrary
+
+    return parameters(JITCodeLibrary.create_ir_module) == ["name"]
+
+
+@assumed("llvmlite: tuning options have speed_level, loop_vectorization, loop_interleaving; numba's codegen has _tm")
+def _tuning(folder):
+    import llvmlite.binding as llvm
+
+    options = llvm.create_pipeline_tuning_options()
+    options.speed_level, options.loop_vectorization, options.loop_interleaving = 3, True, False
+    made, one = library(), module()
+    builder = llvm.create_pass_builder(made.codegen._tm, options)
+    builder.getModulePassManager().run(one, builder)
+    return options.loop_interleaving is False
+
+
 @pytest.mark.parametrize("text", _CHECKS, ids=[check.__name__.strip("_") for check in _CHECKS.values()])
 def test_numba_is_as_assumed(text, tmp_path):
     import llvmlite
@@ -462,3 +503,18 @@ def test_the_package_compiles_by_its_own_code_library():
     from vanedamp.coupling.numerics.compiler import code_library
 
     assert Compiler not in (code_library.ENTRY, code_library.KERNEL, code_library.INLINED, code_library.LOOPS)
+
+
+def test_other_code_counts_negative_indices_from_the_end():
+    """Ours never does, but for literals: where numba makes an index, it asks whose code it is."""
+    from numba import njit
+
+    from vanedamp.coupling.numerics.compiler.jit import entry
+
+    @entry
+    def last(x, i):
+        return 10 * x[-1] + x[i]
+
+    x = np.arange(3)
+    assert njit(lambda x, i: x[i])(x, -1) == 2
+    assert last(x, 1) == 21
