@@ -257,7 +257,8 @@ def _take_modes(system, subsystems, k, flows, s, count, scratch):
         flows.response[s, j], flows.momentum[s, j] = subsystems.response[k, i], subsystems.momentum[k, i]
         flows.speed[s, j], flows.acceleration[s, j] = subsystems.speed[k, i], subsystems.acceleration[k, i]
         for end in range(2):
-            flows.support[s, j, end], flows.reach[s, j, end] = subsystems.support[k, i, end], subsystems.reach[k, i, end]
+            flows.support[s, j, end] = subsystems.support[k, i, end]
+            flows.reach[s, j, end] = subsystems.reach[k, i, end]
         for l in range(2 * n):
             flows.shape[s, j, l], flows.project[s, j, l] = subsystems.shape[k, i, l], subsystems.project[k, i, l]
         for l in range(2 * b):

@@ -165,7 +165,8 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
         "loads": loads, "modes": m, "near": DRIVEN, "eigenvalue": eigenvalue,
         "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
         "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
-        "push": push, "impulse_response": system.J[:, :n] @ project[:, 1, :n].T,
+        "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(kept) > 0, "push": push,
+        "impulse_response": system.J[:, :n] @ project[:, 1, :n].T,
     }  # fmt: skip
     for name, value in values.items():
         getattr(stack, name)[(k, *map(slice, np.shape(value)))] = value
