@@ -27,6 +27,7 @@ from numba.extending import (
     intrinsic,
     lower_getattr_generic,
     models,
+    overload,
     register_model,
     typeof_impl,
     unbox,
@@ -191,12 +192,22 @@ def _load(builder: Any, place: Any, never: Any) -> Any:
     return whole
 
 
-@intrinsic
-def changed(typing_context, record, name, number):
+def changed(record: Named, name: str, number: float) -> Named:
     """Return a record with another number in a field: `changed(system, "period", 0.5)`, in compiled functions.
 
-    It stays as it is until the next change at the same place in the code.
+    There it stays as it is until the next change at the same place in the code.
     """
+    return record._replace(**{name: number})  # type: ignore[attr-defined, no-any-return]
+
+
+@overload(changed, inline="always", prefer_literal=True)
+def _changed_compiled(record, name, number):
+    return lambda record, name, number: _changed(record, name, number)
+
+
+@intrinsic
+def _changed(typing_context, record, name, number):
+    """Put a copy of the fields, with another number, on the stack."""
 
     def code(context, builder, signature, values):
         kind = context.get_value_type(record).pointee

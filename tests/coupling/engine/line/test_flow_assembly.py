@@ -268,18 +268,17 @@ def test_known_subsystems_serve_all_frequencies():
         now = system._replace(
             omega=factor * system.omega, period=system.period / factor, frequency=factor * system.frequency
         )
-        flows = empty_flows(system, 1)
+        flows, k = empty_flows(system, len(keys)), [known.place(now, key) for key in keys]
         for s, key in enumerate(keys):
-            flows = add_flow(flows, now, key, known, scratch)
+            assert fill(now, known.stack, k[s], flows, s, scratch)
             assert np.array_equal(flows.active_set[s], key)
-        k = [known.place(now, key) for key in keys]
         assert len(set(k)) == known.stack.met.sum() == len({key.tobytes() for key in keys})
         for s, key in enumerate(keys):
             alone = add_flow(empty_flows(now, 1), now, key)
             # filled before at another frequency, and now at this one
             assert fill(system, known.stack, k[s], flows, s, scratch)
             assert fill(now, known.stack, k[s], flows, s, scratch)
-            for name, part in alone._asdict().items():
+            for name, part in alone._replace(subsystem=np.array([k[s] + 1]))._asdict().items():
                 listed = slice(alone.slow_count[0] if name.startswith("slow") and part.ndim > 1 else None)
                 assert np.array_equal(np.atleast_1d(getattr(flows, name)[s])[listed], np.atleast_1d(part[0])[listed])
     assert known
