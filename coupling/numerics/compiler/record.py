@@ -197,7 +197,7 @@ def changed(record: Named, name: str, number: float) -> Named:
 
     There it stays as it is until the next change at the same place in the code.
     """
-    return record._replace(**{name: number})  # type: ignore[attr-defined, no-any-return]
+    return record._replace(**{name: number})  # type: ignore[attr-defined]
 
 
 @overload(changed, inline="always", prefer_literal=True)
