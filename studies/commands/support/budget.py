@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
@@ -18,8 +19,8 @@ from vanedamp.studies.terminal import duration
 if TYPE_CHECKING:
     from vanedamp.studies.optimisation.study import Study
 
-#: s of a run, in addition to its periods
-RUN = 2.5e-3
+#: s of a run, in addition to its periods: alone, and of a sweep whose points run as one (coupling.sweep.alike)
+RUN, TOGETHER = 2.5e-3, 1e-4
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
@@ -89,9 +90,14 @@ def sweep_seconds(scene: Scene, workers: int) -> float:
     return scene.points * run_seconds(scene) / workers
 
 
+def beginning(scene: Scene) -> float:
+    """Return the processor time of a run in addition to its periods, s: of each point of a scene with a sweep."""
+    return TOGETHER if scene.sweep and len(columned(scene, scene.sweep)) == len(scene.sweep) else RUN
+
+
 def run_seconds(scene: Scene) -> float:
     """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
-    return RUN + scene.time.simulated * scene.solver.seconds_per_period
+    return beginning(scene) + scene.time.simulated * scene.solver.seconds_per_period
 
 
 def _check_time(key: str, what: str, seconds: float) -> None:

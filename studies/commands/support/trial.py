@@ -34,10 +34,10 @@ from vanedamp.studies.terminal import stage
 _SCENES, _SECONDS = 12, 4.0
 
 
-def mean_cost(scenes: Sequence[Scene]) -> float:
+def mean_cost(scenes: Sequence[Scene], begins: float = RUN) -> float:
     """Return the mean processor time of the runs of some scenes without open choices, s, from trials of a few seconds.
 
-    Scenes that cannot run are left out; nan if none can.
+    begins: of each in addition to its periods, s. Scenes that cannot run are left out; nan if none can.
     """
     compile_engine([*scenes[:1], *scenes[-1:]])
     found, left = [], _SECONDS
@@ -45,7 +45,7 @@ def mean_cost(scenes: Sequence[Scene]) -> float:
         for number, scene in enumerate(scenes):
             begun = time.process_time()
             with suppress(*OF_A_POINT):
-                found.append(_cost(scene, left / (len(scenes) - number)))
+                found.append(begins + _cost(scene, left / (len(scenes) - number)))
             left = max(left - (time.process_time() - begun), 0.0)
     return float(np.mean(found)) if found else float("nan")
 
@@ -59,7 +59,7 @@ def tried(count: int) -> list[int]:
 
 
 def _cost(scene: Scene, seconds: float) -> float:
-    """Return the processor time of a run, s, from a trial of about `seconds`.
+    """Return the processor time of the periods of a run, s, from a trial of about `seconds`.
 
     A run that takes longer is tried from near its steady state: little happens while it begins. Where contacts close in
     a new combination, the exact engines assemble a subsystem. A second trial, which has them all, tells this cost,
@@ -68,21 +68,21 @@ def _cost(scene: Scene, seconds: float) -> float:
     periods = scene.time.simulated
     whole = _follow(run_of(scene), periods, 0.3 * seconds)
     if whole[-1][0] == periods or whole[-1] == whole[-2]:
-        return RUN + whole[-1][1]
+        return whole[-1][1]
     start = _near_steady(scene)
     run, again = run_of(scene, start=start), run_of(scene, start=start)
     first = _follow(run, periods, 0.5 * seconds)
     last = first[-1][0]
     reuse_subsystems(again, run)
     if first[-1] == first[-2]:  # the run has ended early
-        return RUN + first[-1][1]
+        return first[-1][1]
     motion = _follow(again, last, math.inf, [mark for mark, _ in first])
     half = max(number for number, (mark, _) in enumerate(first[:-1]) if 2 * mark <= last or number == 1)
     before = first[half][0]
     moving = (motion[-1][1] - motion[half][1]) / (last - before)
     assembled, earlier = (max(first[number][1] - motion[number][1], 1e-9) for number in (-1, half))
     growth = min(max(math.log(assembled / earlier) / math.log(last / before), 0.0), 1.0)
-    return RUN + motion[-1][1] + (periods - last) * moving + assembled * (periods / last) ** growth
+    return motion[-1][1] + (periods - last) * moving + assembled * (periods / last) ** growth
 
 
 def _follow(run: Run, periods: int, seconds: float, marks: Sequence[int] = ()) -> list[tuple[int, float]]:
