@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,6 +24,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.plane import Plane
 from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
@@ -151,8 +153,13 @@ class EventDrivenRun(ABC):
         found |= {"changes": int(self.counters[EVENTS]), "subsystems": int(np.count_nonzero(self.flows.modes))}
         return Outcome(
             self.whole, self.records, int(self.counters[PERIOD]), self.listed, OPEN_LEDGER, found, self.chunks,
-            self.rows_of(self.whole), plane=self._plane(),
+            self._rows_of_log, plane=self._plane(),
         )  # fmt: skip
+
+    @cached_property
+    def _rows_of_log(self) -> Rows:
+        rows: Rows = self.rows_of(self.whole)
+        return rows
 
     def _plane(self) -> Plane | None:
         """Return what bodies in the plane add to the outcome."""

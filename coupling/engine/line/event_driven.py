@@ -46,6 +46,9 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
+#: the function compiled for the lengths of common scenes
+_COMMON: list[Any] = []
+
 
 def is_common(system: LineSystem, modes: int) -> bool:
     """Whether this is the most common scene, for whose lengths the engine is compiled.
@@ -73,9 +76,13 @@ class EngineRun(EventDrivenRun):
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
         self.job, self.statistics = new_job(), UNJUDGED
-        self._run = run
-        if is_common(system, modes) and hasattr(run, "sized"):
-            self._run = run.sized(*self._records(), 0, 0)
+        self._run = self._common_run() if is_common(system, modes) and hasattr(run, "sized") else run
+
+    def _common_run(self) -> Any:
+        """Return the function compiled for the lengths of common scenes, which are the same for all of them."""
+        if not _COMMON:
+            _COMMON.append(run.sized(*self._records(), 0, 0))
+        return _COMMON[0]
 
     def _records(self) -> tuple[Any, ...]:
         return (
