@@ -7,9 +7,9 @@ than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
 are numba's own but not documented; one function of numba is replaced, and does for other code what it did (`_index`).
-Where a version of numba lacks one of them, numba's compiler is taken:
-slower, with the same results. numba's own means do not replace it: numba 0.68 compiles the engine of sliders in 201 s
-in place of 41 s with its option `forceinline`; without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
+Where a version of numba lacks one of them, numba's compiler is taken: slower, with the same results. numba's own means
+do not replace it: numba 0.68 compiles the engine of sliders in 201 s in place of 41 s with its option `forceinline`;
+without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
 """
 
 from __future__ import annotations
@@ -158,7 +158,8 @@ class _Entry(_FromZero):
         # whole vectors one by one: by numba's means four at once, and what does not fill four number by number. Its
         # passes before the others are for reference counting
         tuning = llvm.create_pipeline_tuning_options()
-        tuning.speed_level, tuning.loop_vectorization, tuning.loop_interleaving = config.OPT, True, False  # type: ignore[attr-defined]
+        tuning.speed_level = config.OPT  # type: ignore[attr-defined]
+        tuning.loop_vectorization, tuning.loop_interleaving = True, False
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)
 
