@@ -22,7 +22,7 @@ from vanedamp.modal.subspace import Rows
 
 #: ways to find modes: by factors of the stiffness, iteratively, or as the memory allows
 SOLVERS = ("factor", "iterative", "auto")
-# relative residuals: as block Lanczos has them on factors; of spare modes; of further ones that begin at random
+# relative residuals: as block Lanczos has them on factors; of spare modes; of further ones
 _TOLERANCE, _SPARE, _GUARD = 1e-11, 3, 4
 _LIMITS = (_TOLERANCE, _TOLERANCE**0.5, 0.1)
 # the shift of free bodies over the one with factors: the round-off of a rigid mode is measured against it
@@ -71,8 +71,8 @@ class Iteration:
     fixed            DOFs of these nodes that are held
     vertices         as in SystemMatrices
 
-    Three spare modes, and four further ones that begin at random, guard against missed modes: each of these would have
-    to be missed as well. That is no proof.
+    All vectors begin at random, but for rigid motions. Spare ones, and further ones to a digit, guard against missed
+    modes: a mode is missed only if all of them miss it. That is no proof.
     """
 
     def __init__(

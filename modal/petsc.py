@@ -201,7 +201,7 @@ def _assist(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
 
 def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
     with contextlib.ExitStack() as stack:
-        operators = [stack.enter_context(owned(_distributed(matrix))) for matrix in matrices]
+        operators = [stack.enter_context(owned(_operator(task, matrix))) for matrix in matrices]
         return _TASKS[task](stack, operators, *arguments)
 
 
@@ -303,6 +303,13 @@ def _upper_triangle(matrix: sparse.csr_array) -> Any:
     ends = np.r_[0, np.cumsum(kept, dtype=PETSc.IntType)][matrix.indptr]
     csr = (ends.astype(PETSc.IntType), matrix.indices[kept].astype(PETSc.IntType), matrix.data[kept])
     return PETSc.Mat().createSBAIJ(size=matrix.shape, bsize=1, csr=csr, comm=PETSc.COMM_SELF)
+
+
+def _operator(task: str, matrix: sparse.csr_array | None) -> Any:
+    """Return a PETSc matrix for a task; the caller destroys it."""
+    if task == "inertia" and matrix is not None and parallel.COMM.size == 1:
+        return _upper_triangle(matrix)  # half the memory
+    return _distributed(matrix)
 
 
 def _distributed(matrix: sparse.csr_array | None) -> Any:
