@@ -23,11 +23,12 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.engine.antiderivatives import antiderivative, fill_forms, growth_rates, products
 from vanedamp.coupling.engine.line.complex_modes import IllConditioned, RealModes, complex_modes, real_modes
-from vanedamp.coupling.engine.line.peaks import GRIDS
-from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MOVES_ALIKE, SLOW, UNFELT
+from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MOVES_ALIKE, UNFELT
+from vanedamp.coupling.engine.peaks import GRIDS, grid_factors
 from vanedamp.coupling.engine.run import grown
-from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
+from vanedamp.coupling.numerics.codes import WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
 from vanedamp.coupling.system.line_system import LineSystem
@@ -81,11 +82,9 @@ class Flows(NamedTuple):
     # sizes of modes, and steps of the search for the peak
     speed: Annotated[np.ndarray, "s m"]  # largest speed of a mode over all rows and the response
     acceleration: Annotated[np.ndarray, "s m"]  # largest of its terms, whether closed rows hold them or not
-    grid_factor: Annotated[np.ndarray, "s grids m", complex]  # of its amplitude over a step of each grid (line.peaks)
+    grid_factor: Annotated[np.ndarray, "s grids m", complex]  # of its amplitude over a step of each grid (peaks)
 
-    # Antiderivatives of the energies' terms, as forms of c: a segment's integral is the form at its end minus
-    # the form at its start. Where the rate by which a product of two modes changes vanishes relative to the frequency,
-    # the form would cancel: such pairs are left out of the forms, and listed.
+    # antiderivatives of the energies' terms, as forms of c, and lists of what is left out of them (antiderivatives)
     linear: Annotated[np.ndarray, "s m maps"]  # linear maps, by the columns of numerics.codes
     loss: Annotated[np.ndarray, "s 2m 2m"]  # viscous loss of two modes, by their real and imaginary parts in turns
     dashpot: Annotated[np.ndarray, "s 2m 2m"]  # loss in the dashpots of contacts
@@ -248,8 +247,7 @@ def _fill(flows: Flows, system: LineSystem, s: int, subsystem: Subsystem) -> Non
         [np.abs(functional) @ np.abs(full[:n]), np.abs(system.of_structure.response) @ np.abs(full[:n])]
     ).max(axis=0)
     flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
-    steps = 0.125 * system.period * 0.5 ** np.arange(GRIDS)
-    flows.grid_factor[s, :, :m] = np.exp(np.outer(steps, flows.eigenvalue[s, :m]))
+    flows.grid_factor[s, :, :m] = grid_factors(flows.eigenvalue[s, :m], system.period)
     _fill_forces(flows, system, s, full[structure], rigid, sprung)
     _fill_energy(flows, system, s, full[structure], body)
 
@@ -287,10 +285,10 @@ def _fill_forces(
     flows: Flows, system: LineSystem, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray
 ) -> None:
     m = flows.modes[s]
-    rate, load, e = flows.eigenvalue[s, :m], _growth(flows, s), len(system.frequency)
+    rate, load, e = flows.eigenvalue[s, :m], growth_rates(flows, s), len(system.frequency)
     spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]
     push = -spring * flows.motion[s, sprung, :m] - dashpot * flows.velocity[s, sprung, :m]
-    flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, _antiderivative(push, 1 / rate, load)
+    flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, antiderivative(push, 1 / rate, load)
     if not len(rigid):
         return
     pull = system.of_structure.J @ np.hstack([-np.diag(system.of_structure.stiffness), -system.of_structure.damping])
@@ -337,19 +335,9 @@ def _excite(
     return (eigenvalue[order], shape[:, order], project[order]), harmonic, driver[first], growth[first]
 
 
-def _growth(flows: Flows, s: int) -> np.ndarray:
-    """Return the rates (m, e) at which each harmonic makes the modes grow that it drives."""
-    m, driven = flows.modes[s], flows.driven[s]
-    growth = np.zeros((m, len(driven) - 1), complex)
-    for h in range(len(driven) - 1):
-        at = slice(driven[h], driven[h + 1])
-        growth[at, h] = flows.load[s, at]
-    return growth
-
-
 def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
     """Return the time derivative of functionals (..., m) of the amplitudes."""
-    m, growth = flows.modes[s], _growth(flows, s)
+    m, growth = flows.modes[s], growth_rates(flows, s)
     rate: np.ndarray = functional * flows.eigenvalue[s, :m]
     rate[..., : growth.shape[1]] += functional @ growth
     return rate
@@ -357,72 +345,22 @@ def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
 
 def _fill_energy(flows: Flows, system: LineSystem, s: int, full: np.ndarray, body: np.ndarray) -> None:
     n, m, e = system.modes, flows.modes[s], len(system.frequency)
-    velocity, rate, load = full[n:], flows.eigenvalue[s, :m], _growth(flows, s)
-    body_rate = _rate(flows, s, body)
+    velocity, body_rate = full[n:], _rate(flows, s, body)
     response, momentum = flows.response[s, :m], system.of_bodies.mass @ body_rate
     speeds = np.vstack([velocity, body_rate])
-    work, work_back = system.load @ speeds, system.load.conj() @ speeds
     free = system.of_bodies.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
-    # a harmonic and the modes that it drives turn together: a product of one with a conjugate one is slow
-    frame = np.r_[0:e, np.full(m - e, -1)]
-    for h in range(e):
-        frame[flows.driven[s, h] : flows.driven[s, h + 1]] = h
-    together = (frame[:, None] == frame) & (frame >= 0)
-    along, _ = _reciprocal(rate + rate[:e, None], system.period)
-    against, _ = _reciprocal(rate - rate[:e, None], system.period, together[:e])
-    back, _ = _reciprocal(rate.conj() - rate[0], system.period)
-    single, slow_single = _reciprocal(rate, system.period)
-    mean = 2 * _antiderivative(response, single, load)
-    free_momentum = free @ flows.velocity[s, : len(free), :m]
-    response_back, momentum_back = (_antiderivative(part.conj(), back, load.conj()) for part in (response, momentum))
-    flows.work[s, :, :m], flows.momentum[s, :m] = work_back, momentum
-    flows.linear[s, :m, :WORK_MAP] = np.hstack([  # in the order of numerics.codes
-        _real_map(0.5 * _antiderivative(response, against[0], load), 0.5 * response_back),
-        _real_map(0.5 * _antiderivative(momentum, against[0], load), 0.5 * momentum_back),
-        np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
-    ])  # fmt: skip
-    for h in range(e):
-        with_load = _antiderivative(work[h], along[h], load)
-        with_conjugate = _antiderivative(work_back[h], against[h], load)
-        on_x, on_y = 0.5 * (with_load + with_conjugate), 0.5j * (with_load - with_conjugate)
-        of_harmonic = slice(WORK_MAP + 4 * h, WORK_MAP + 4 * (h + 1))
-        flows.linear[s, :m, of_harmonic] = np.column_stack([on_x.real, -on_x.imag, on_y.real, -on_y.imag])
     sprung = np.isfinite(system.spring) & flows.force[s].any(axis=1)
-    push, damper = flows.velocity[s, sprung, :m], np.diag(system.dashpot[sprung])
-    reciprocal, slow = zip(
-        _reciprocal(rate[:, None] + rate, system.period),
-        _reciprocal(rate[:, None] + rate.conj(), system.period, together),
-        strict=True,
-    )
-    forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
-    products = [
-        [left.T @ middle @ right for right in (left, left.conj())]
-        for left, middle in ((velocity, system.of_structure.damping), (push, damper), (response[None], np.eye(1)))
-    ]
-    integral: list[np.ndarray] = [np.zeros(0)] * 2
-    for form, product in zip(forms[0], products, strict=True):
-        for kind, other in ((SUM, load), (DIFFERENCE, load.conj())):
-            product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
-        form[s, : 2 * m, : 2 * m] = _real_form(*integral)
+    push = flows.velocity[s, sprung, :m]
+    fill_forms(
+        flows, s, system, momentum, free @ flows.velocity[s, : len(free), :m], speeds,
+        {
+            "loss": products(velocity, system.of_structure.damping @ velocity),
+            "dashpot": products(push, system.dashpot[sprung, None] * push),
+            "square": products(response[None], response[None]),
+        },
+    )  # fmt: skip
     flows.damped[s] = system.dashpot[sprung].any()
     flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + e
-    # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
-    # is taken at once (line.energy_balance)
-    calm = np.abs(rate) * system.period < SLOW / 2
-    products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
-    listed = [(j, k, kind, -1) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
-    # a mode that is slow relative to a harmonic, or to modes that it drives, is seen from the harmonic's frame
-    listed = [(*pair[:3], frame[pair[1]] if pair[2] == DIFFERENCE and pair[0] >= e else -1) for pair in listed]
-    count = len(listed)
-    for i, (j, k, kind, _) in enumerate(listed):
-        half = 0.5 if j == k else 1.0
-        for form, product in zip(forms[1], products, strict=True):
-            form[s, i] = half * product[kind][j, k]
-    listed += [(j, 0, SINGLE, -1) for j in np.flatnonzero(slow_single)]
-    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_single]
-    listed += [(j, 0, CALM, -1) for j in np.flatnonzero(calm)]
-    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 4)
-    flows.slow_count[s] = len(listed)
     _fill_kicks(flows, s)
 
 
@@ -434,47 +372,6 @@ def _fill_kicks(flows: Flows, s: int) -> None:
         flows.kick[s, :, place, : 2 * m] = change @ form[s, : 2 * m, : 2 * m]
     maps = flows.linear[s, :m].reshape(m, -1, 2)
     flows.kick_maps[s] = change @ maps.swapaxes(1, 2).reshape(2 * m, -1)
-
-
-def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Return 1/rate, 0 where a product with this rate hardly changes over a period or is in `together`; and where."""
-    slow = (np.abs(rate) * period < SLOW) | together
-    return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
-
-
-def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Return the functional (..., m) of the amplitudes with a given rate; `reciprocal` of the rates of its terms.
-
-    By parts: a driven mode's rate has a term in its harmonic, by `load` (m, e).
-    """
-    integral, e = functional * reciprocal, load.shape[1]
-    integral[..., :e] -= integral @ load * reciprocal[:e]
-    return integral
-
-
-def _antiderivatives(
-    product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same for a form (m, m), with the loads on its two factors: the part of slow pairs, and the form."""
-    rest, integral, e = product, product * reciprocal, left.shape[1]
-    for _ in range(2 if left.any() else 0):  # the second time for pairs of harmonics
-        rest = product.copy()
-        rest[:e] -= left.T @ integral
-        rest[:, :e] -= integral @ right
-        integral = rest * reciprocal
-    return rest, integral
-
-
-def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return coefficients (..., 4) of the map a c + b conj(c): its real part by Re c and Im c, its imaginary part."""
-    return np.stack([(a + b).real, (b - a).imag, (a + b).imag, (a - b).real], axis=-1)
-
-
-def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Return the matrix (2m, 2m) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
-    m = len(both)
-    form = 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
-    return form.reshape(m, m, 2, 2).swapaxes(1, 2).reshape(2 * m, 2 * m)
 
 
 def _attachment(system: LineSystem, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

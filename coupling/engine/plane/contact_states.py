@@ -365,19 +365,19 @@ def _decide_later(system, st, scratch, count):
     """
     u, size = len(system.rest), len(st.q)
     for i in range(size):
-        scratch.ahead[1, i] = scratch.free[i]
+        scratch.later[1, i] = scratch.free[i]
         for r in range(2 * u):
-            scratch.ahead[1, i] += system.J[r, i] * scratch.impulse[r] / system.mass[i]
-    moment = _before_end(system, st, scratch, count, scratch.ahead[1], system.moment * _SOONER ** scratch.attempt[0])
+            scratch.later[1, i] += system.J[r, i] * scratch.impulse[r] / system.mass[i]
+    moment = _before_end(system, st, scratch, count, scratch.later[1], system.moment * _SOONER ** scratch.attempt[0])
     for i in range(size):
-        total = scratch.ahead[1, i]
-        scratch.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
-        scratch.ahead[1, i] = st.v[i] + moment * total
+        total = scratch.later[1, i]
+        scratch.later[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
+        scratch.later[1, i] = st.v[i] + moment * total
     if len(system.tangential) > 0:
-        move_sliders(system, st.state, scratch.ahead[0], scratch.ahead[1])
+        move_sliders(system, st.state, scratch.later[0], scratch.later[1])
     for p in range(count):
         scratch.first[p], scratch.doubt[p] = scratch.verdict[p], scratch.doubtful[p]
-    terms = loaded_acceleration(system, st, scratch, scratch.ahead[0], scratch.ahead[1], st.time[0] + moment)
+    terms = loaded_acceleration(system, st, scratch, scratch.later[0], scratch.later[1], st.time[0] + moment)
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL_LATER):
         return False
     # which of contacts that depend on each other carry the force is decided for all of them together

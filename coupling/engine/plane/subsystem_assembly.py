@@ -12,11 +12,13 @@ All is computed in coordinates sqrt(M) q, where the mass matrix is one.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eig, null_space, orth
 
+from vanedamp.coupling.engine.antiderivatives import fill_forms, products
+from vanedamp.coupling.engine.peaks import GRIDS, grid_factors
 from vanedamp.coupling.engine.plane.tolerances import (
     APART,
     FASTEST,
@@ -29,10 +31,10 @@ from vanedamp.coupling.engine.plane.tolerances import (
     STIFFEST,
 )
 from vanedamp.coupling.engine.run import IllConditioned, grown
-from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, WORK_MAP
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import FLOOR, System
 
 #: bytes that the flows of one run may take
 _ROOM = 2**28
@@ -40,48 +42,68 @@ _ROOM = 2**28
 
 @record
 class Flows(NamedTuple):
-    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
+    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included.
 
-    key: np.ndarray  # (s, u) int: the states
-    modes: np.ndarray  # (s,) int, 0: a free index
-    eigenvalue: np.ndarray  # (s, m)
-    project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
-    offset: np.ndarray  # (s, m)
-    in_phase: np.ndarray  # (s, m, e): contribution of the real part of the phase of each harmonic to c
-    in_quadrature: np.ndarray  # (s, m, e): of the imaginary part
-    motion: np.ndarray  # (s, N, m): q of each mode
-    rows: np.ndarray  # (s, 2u, m): J motion
-    bend: np.ndarray  # (s, N): constant acceleration
-    bend_held: np.ndarray  # (s, N, N): and the addition by displacements held by constraints
-    force: np.ndarray  # (s, 2u, m)
-    force_constant: np.ndarray  # (s, 2u)
-    force_held: np.ndarray  # (s, 2u, N)
-    self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
-    close_gaps: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
-    stop_rows: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
-    held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
-    drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
-    loss: np.ndarray  # (s, m, m): G^T C G
-    loss_apart: np.ndarray  # (s, m, m): G^T C conj G
-    growth: np.ndarray  # (s,) largest rate of growth, 1/s
-    fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
+    Forms, and what enters them, are those of line.subsystem_assembly.Flows; no mode is driven.
+    """
+
+    key: Annotated[np.ndarray, "s u", int]  # the states
+    modes: Annotated[np.ndarray, "s", int]  # 0: a free index
+    eigenvalue: Annotated[np.ndarray, "s m", complex]
+    inverse: Annotated[np.ndarray, "s m", complex]  # 1/eigenvalue
+    project: Annotated[np.ndarray, "s m 2N", complex]  # c = project (q, q') - offset - harmonics
+    offset: Annotated[np.ndarray, "s m", complex]
+    in_phase: Annotated[np.ndarray, "s m e", complex]  # contribution of the real part of each harmonic's phase to c
+    in_quadrature: Annotated[np.ndarray, "s m e", complex]  # of the imaginary part
+    motion: Annotated[np.ndarray, "s N m", complex]  # q of each mode
+    velocity: Annotated[np.ndarray, "s N m", complex]  # its rate
+    rows: Annotated[np.ndarray, "s 2u m", complex]  # J motion
+    bend: Annotated[np.ndarray, "s N"]  # constant acceleration
+    bend_held: Annotated[np.ndarray, "s N N"]  # and the addition by displacements held by constraints
+    force: Annotated[np.ndarray, "s 2u m", complex]
+    force_constant: Annotated[np.ndarray, "s 2u"]
+    force_held: Annotated[np.ndarray, "s 2u N"]
+    self_stress: Annotated[np.ndarray, "s 2u 2u"]  # projector of forces on those that balance each other
+    close_gaps: Annotated[np.ndarray, "s N u"]  # displacement that closes gaps of closed contacts
+    stop_rows: Annotated[np.ndarray, "s N 2u"]  # velocity that stops their gaps and the slips that stick
+    held: Annotated[np.ndarray, "s u", bool]  # whether constraints hold the slip of a unit that counts as slipping
+    growth: Annotated[np.ndarray, "s"]  # largest rate of growth, 1/s
+    fastest: Annotated[np.ndarray, "s"]  # largest |real| + |imaginary part| of an eigenvalue, 1/s
+    airborne: Annotated[np.ndarray, "s b", bool]  # whether a body touches no floor
+    rocks: Annotated[np.ndarray, "s b", bool]  # whether the rate of a body's tilt in its cavity changes
+    rubs: Annotated[np.ndarray, "s", bool]  # whether friction or compliant contacts take energy
+
+    response: Annotated[np.ndarray, "s m", complex]
+    momentum: Annotated[np.ndarray, "s m", complex]
+    work: Annotated[np.ndarray, "s e m", complex]
+    driven: Annotated[np.ndarray, "s phases", int]
+    load: Annotated[np.ndarray, "s m", complex]
+    grid_factor: Annotated[np.ndarray, "s grids m", complex]
+    linear: Annotated[np.ndarray, "s m maps"]
+    loss: Annotated[np.ndarray, "s 2m 2m"]
+    dashpot: Annotated[np.ndarray, "s 2m 2m"]
+    square: Annotated[np.ndarray, "s 2m 2m"]
+    friction: Annotated[np.ndarray, "s 2m 2m"]  # loss of all units
+    lost: Annotated[np.ndarray, "s c 2m 2m"]  # of friction and dashpot of each of c compliant contacts
+    damped: Annotated[np.ndarray, "s", bool]
+    uncoupled: Annotated[np.ndarray, "s", bool]
+    slow_count: Annotated[np.ndarray, "s", int]
+    slow: Annotated[np.ndarray, "s pairs 4", int]
+    slow_loss: Annotated[np.ndarray, "s pairs", complex]
+    slow_dashpot: Annotated[np.ndarray, "s pairs", complex]
+    slow_square: Annotated[np.ndarray, "s pairs", complex]
+    slow_friction: Annotated[np.ndarray, "s pairs", complex]
+    slow_lost: Annotated[np.ndarray, "s pairs c", complex]
 
 
 def empty_flows(system: System, capacity: int = 8) -> Flows:
     """Storage for `capacity` flows."""
-    size, u, e = len(system.mass), len(system.rest), len(system.frequency)
-    springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
-    m = e + 2 * len(_stretched(system, springs))
-    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
-    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
-    return Flows(
-        key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
-        project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
-        rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
-        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), close_gaps=f(size, u), stop_rows=f(size, 2 * u),
-        held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
-        fastest=f(),
-    )  # fmt: skip
+    u, e, sprung = len(system.rest), len(system.frequency), np.isfinite(system.spring)
+    m = e + 2 * len(_stretched(system, np.vstack([system.J[:u][sprung], system.elongation])))
+    return room(Flows, {
+        "s": capacity, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
+        "grids": GRIDS, "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()), "pairs": m * (m + 3),
+    })  # fmt: skip
 
 
 def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
@@ -96,7 +118,40 @@ def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
     s = int(np.argmin(flows.modes != 0))
     for name, value in flow.items():
         getattr(flows, name)[(s, *map(slice, np.shape(value)))] = value
+    _fill_energy(flows, system, s)
     return flows
+
+
+def _fill_energy(flows: Flows, system: System, s: int) -> None:
+    """Set what the energy balance and the peaks of flow s need."""
+    u, m, e, state = len(system.rest), int(flows.modes[s]), len(system.frequency), flows.key[s]
+    rate, motion, velocity = flows.eigenvalue[s, :m], flows.motion[s, :, :m], flows.velocity[s, :, :m]
+    flows.response[s, :m] = system.response @ motion
+    flows.response[s, :e] += system.table
+    flows.driven[s] = e
+    flows.grid_factor[s, :, :m] = grid_factors(rate, system.period)
+    rubs = (np.arange(u) >= system.contacts) | (system.friction > 0)
+    slips = rubs & np.isin(state, (SLIP_LEFT, SLIP_RIGHT)) & ~flows.held[s]
+    compliant = np.flatnonzero(np.isfinite(system.spring))
+    pressed = state[compliant] < OPEN
+    slip, drag = flows.rows[s, u:, :m] * rate * slips[:, None], -flows.force[s, u:, :m]
+    push = flows.rows[s, compliant, :m] * rate * pressed[:, None]
+    damping = system.dashpot[compliant, None] * push
+    losing, taking = np.stack([push, slip[compliant]], axis=1), np.stack([damping, drag[compliant]], axis=1)
+    response, momentum = flows.response[s, None, :m], system.mass[system.along] @ velocity[system.along]
+    fill_forms(
+        flows, s, system, momentum, momentum, velocity,
+        {
+            "loss": products(velocity, system.damping @ velocity), "dashpot": products(push, damping),
+            "square": products(response, response), "friction": products(slip, drag), "lost": products(losing, taking),
+        },
+    )  # fmt: skip
+    flows.damped[s], flows.rubs[s] = pressed.any(), pressed.any() or slips.any()
+    on_floor = system.body[(state != OPEN) & (state != LEAVING) & (system.surface == FLOOR)]
+    flows.airborne[s] = ~np.isin(np.arange(system.bodies), on_floor)
+    tilt = np.eye(len(system.mass))[system.tilt] - system.turn
+    parts = np.hstack([motion, flows.bend[s, :, None], flows.bend_held[s]])
+    flows.rocks[s] = (np.abs(tilt @ parts) > CANCELLED * (np.abs(tilt) @ np.abs(parts))).any(axis=1)
 
 
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
@@ -240,18 +295,15 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
 
     force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
     force_constant[len(state) + contacts.slides] = contacts.known
-    speeds = motion * rate
-    damped = system.damping @ speeds
     return {
-        "key": state, "modes": len(rate), "eigenvalue": rate, "project": after_harmonics(free),
+        "key": state, "modes": len(rate), "eigenvalue": rate, "inverse": 1 / rate, "project": after_harmonics(free),
         "offset": after_harmonics(project[:, :k] @ rest), "in_phase": after_harmonics(project @ full.real),
         "in_quadrature": after_harmonics(-(project @ full.imag)),
-        "motion": motion, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
+        "motion": motion, "velocity": motion * rate, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
         "bend": bend / root, "bend_held": bend_held / root[:, None] * root,
         "force": contacts.spread(carried @ net, -spring @ strained - dashpot @ (strained * rate)),
         "force_constant": force_constant,
         "force_held": contacts.spread(carried @ net_held * root, -spring @ (held + inner.T @ rest_held) * root),
-        "drag": damped, "loss": speeds.T @ damped, "loss_apart": speeds.T @ damped.conj(),
         "growth": max(eigenvalue.real.max(initial=0.0), 0.0), "fastest": (np.abs(rate.real) + np.abs(rate.imag)).max(),
     } | contacts.projectors()  # fmt: skip
 
