@@ -8,7 +8,7 @@ changes vanishes relative to the frequency, the form would cancel: such pairs ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,12 +40,14 @@ def fill_forms(
     rate, load, response = flows.eigenvalue[s, :m], growth_rates(flows, s), flows.response[s, :m]
     frame, together = _frames(flows.driven[s], m)
     single, slow_single = _reciprocal(rate, system.period)
-    _fill_maps(flows, s, system, momentum, free_momentum, speeds, antiderivative(response, single, load), together[:e])
     reciprocal, slow = zip(
         _reciprocal(rate[:, None] + rate, system.period),
         _reciprocal(rate[:, None] + rate.conj(), system.period, together),
         strict=True,
     )
+    flows.momentum[s, :m] = momentum
+    means = np.array([2 * antiderivative(response, single, load), free_momentum])
+    _fill_maps(flows, s, load, means, system.load @ speeds, system.load.conj() @ speeds, reciprocal)
     left_out = {}
     for name, (both, mixed) in forms.items():
         both, of_both = _antiderivatives(both, reciprocal[SUM], load, load)
@@ -77,30 +79,30 @@ def _frames(driven: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray]:
 
     A harmonic and the modes that it drives turn together: a product of one with a conjugate one is slow.
     """
-    e = len(driven) - 1
-    frame = np.r_[0:e, np.full(m - e, -1)]
+    e, frame = len(driven) - 1, np.full(m, -1)
+    frame[:e] = range(e)
     for h in range(e):
         frame[driven[h] : driven[h + 1]] = h
     return frame, (frame[:, None] == frame) & (frame >= 0)
 
 
 def _fill_maps(
-    flows: Any, s: int, system: Any, momentum: np.ndarray, free_momentum: np.ndarray, speeds: np.ndarray,
-    mean: np.ndarray, together: np.ndarray,
+    flows: Any, s: int, load: np.ndarray, means: np.ndarray, work: np.ndarray, work_back: np.ndarray,
+    reciprocal: Sequence[np.ndarray],
 ) -> None:  # fmt: skip
-    """Set the linear maps, in the order of numerics.codes; mean (m,): antiderivative of the response."""
-    m, e = flows.modes[s], len(system.frequency)
-    rate, load, response, mean = flows.eigenvalue[s, :m], growth_rates(flows, s), flows.response[s, :m], 2 * mean
-    along, _ = _reciprocal(rate + rate[:e, None], system.period)
-    against, _ = _reciprocal(rate - rate[:e, None], system.period, together)
-    back, _ = _reciprocal(rate.conj() - rate[0], system.period)
-    work, work_back = system.load @ speeds, system.load.conj() @ speeds
-    response_back, momentum_back = (antiderivative(part.conj(), back, load.conj()) for part in (response, momentum))
-    flows.work[s, :, :m], flows.momentum[s, :m] = work_back, momentum
+    """Set the linear maps, in the order of numerics.codes.
+
+    means (2, m): twice the antiderivative of the response, and the momentum of free bodies; work, work_back (e, m):
+    powers of the loads and of their conjugates; reciprocal: of the rates of products.
+    """
+    e, m = work.shape
+    along, against, back = reciprocal[SUM][:e], reciprocal[DIFFERENCE][:, :e].T, reciprocal[SUM][0].conj()
+    both = np.array([flows.response[s, :m], flows.momentum[s, :m]])
+    on_phase, on_back = antiderivative(both, against[0], load), antiderivative(both.conj(), back, load.conj())
+    flows.work[s, :, :m] = work_back
     flows.linear[s, :m, :WORK_MAP] = np.hstack([
-        _real_map(0.5 * antiderivative(response, against[0], load), 0.5 * response_back),
-        _real_map(0.5 * antiderivative(momentum, against[0], load), 0.5 * momentum_back),
-        np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
+        *_real_map(0.5 * on_phase, 0.5 * on_back),
+        np.column_stack([means[0].real, -means[0].imag, means[1].real, -means[1].imag]),
     ])  # fmt: skip
     for h in range(e):
         with_load = antiderivative(work[h], along[h], load)

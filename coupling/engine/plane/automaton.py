@@ -378,18 +378,19 @@ def _stop_held_rows(system, flows, st):
 def _project(system, flows, st, s):
     """Bring back gaps, and speeds of rows at rest, from round-off to zero."""
     u, size = len(system.rest), len(st.q)
-    for r in range(2 * u):
-        st.rate[r] = row_speed(system, r, st.v) if _at_rest(system, st, r) else 0.0
-    for r in range(2 * u):
-        if st.rate[r] != 0.0:
-            for i in range(size):
-                st.v[i] -= flows.stop_rows[s, i, r] * st.rate[r]
-    for r in range(system.contacts):
-        st.rate[r] = gap(system, r, st.q) if is_rigid(system, r) and st.state[r] != OPEN else 0.0
-    for r in range(system.contacts):
-        if st.rate[r] != 0.0:
-            for i in range(size):
-                st.q[i] -= flows.close_gaps[s, i, r] * st.rate[r]
+    if flows.holds[s]:
+        for r in range(2 * u):
+            st.rate[r] = row_speed(system, r, st.v) if _at_rest(system, st, r) else 0.0
+        for r in range(2 * u):
+            if st.rate[r] != 0.0:
+                for i in range(size):
+                    st.v[i] -= flows.stop_rows[s, i, r] * st.rate[r]
+        for r in range(system.contacts):
+            st.rate[r] = gap(system, r, st.q) if is_rigid(system, r) and st.state[r] != OPEN else 0.0
+        for r in range(system.contacts):
+            if st.rate[r] != 0.0:
+                for i in range(size):
+                    st.q[i] -= flows.close_gaps[s, i, r] * st.rate[r]
     for i in range(size):  # the smallest doubles are slow
         st.q[i] = st.q[i] if abs(st.q[i]) > _TINY else 0.0
         st.v[i] = st.v[i] if abs(st.v[i]) > _TINY else 0.0
@@ -555,10 +556,7 @@ def _begin_segment(system, flows, st):
         for j in range(flows.modes[s]):
             rate = flows.velocity[s, i, j] * st.amplitude[j]
             part += abs(rate.real) + abs(rate.imag)
-        largest = 0.0
-        for r in range(len(system.J)):
-            largest = max(largest, abs(system.J[r, i]))
-        swing = max(swing, part * largest)
+        swing = max(swing, part * st.reach[i])
     st.scale[0] = max(swing, system.speed)
 
 

@@ -43,11 +43,16 @@ def free_acceleration(system, scratch, q, v, time):
     """
     size = len(q)
     for i in range(size):
-        total, terms = system.weight[i], abs(system.weight[i])
-        for h in range(len(system.frequency)):
-            angle, load = system.frequency[h] * time, system.load[h, i]
-            total += (load * complex(math.cos(angle), math.sin(angle))).real
-            terms += abs(load.real) + abs(load.imag)
+        scratch.free[i], scratch.terms[i] = system.weight[i], abs(system.weight[i])
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * time
+        phase = complex(math.cos(angle), math.sin(angle))
+        for i in range(size):
+            load = system.load[h, i]
+            scratch.free[i] += (load * phase).real
+            scratch.terms[i] += abs(load.real) + abs(load.imag)
+    for i in range(size):
+        total, terms = scratch.free[i], scratch.terms[i]
         for k in range(size):
             spring, dashpot = system.stiffness[i, k] * q[k], system.damping[i, k] * v[k]
             total -= spring + dashpot
@@ -190,7 +195,7 @@ def decide(system, st, scratch, scale):
     sliders, slow = len(system.tangential), AT_REST * scale
     if len(system.tangential) > 0:
         _hold_sliders(system, st, scratch, slow)
-    count = ZERO
+    count, decided = ZERO, sliders == 0
     for r in range(len(system.rest) - sliders):
         if _is_undecided(system, st, scratch, r, slow):
             scratch.listed[count], scratch.way[count] = (
@@ -198,6 +203,12 @@ def decide(system, st, scratch, scale):
                 direction(system, st, r, slow) if has_friction(system, r) else 0,
             )
             count += 1
+        decided = decided and count == 0 and scratch.resting[r] == 0
+    if decided:  # gaps and speeds have decided all
+        for row in range(len(scratch.impulse)):
+            scratch.impulse[row] = 0.0
+        _take_decisions(system, st, scratch, count, False)
+        return True
     terms = loaded_acceleration(system, st, scratch, st.q, st.v, st.time[0])
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL):
         return False

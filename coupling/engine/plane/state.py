@@ -34,6 +34,7 @@ class State(NamedTuple):
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
+    reach: np.ndarray  # (N,) largest entry of each coordinate in the rows
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
     pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
     lost: np.ndarray  # (u,) its loss since then, J
@@ -118,7 +119,8 @@ def new_state(system: System, modes: int, initial: Motion) -> State:
     return State(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
-        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
+        rate=np.zeros(2 * u), scale=np.zeros(1), reach=np.abs(system.J).max(axis=0, initial=0.0),
+        last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)),
         amplitude=np.zeros(modes, complex), change=np.zeros(2 * modes), offset=np.zeros(1),
         bend=np.zeros(size), force=np.zeros(2 * u),

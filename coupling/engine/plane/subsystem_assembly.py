@@ -32,7 +32,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
 )
 from vanedamp.coupling.engine.run import IllConditioned, grown
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, WORK_MAP
-from vanedamp.coupling.numerics.compiler.record import record, room
+from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
 from vanedamp.coupling.system.system import FLOOR, System
 
@@ -40,7 +40,7 @@ from vanedamp.coupling.system.system import FLOOR, System
 _ROOM = 2**28
 
 
-@record
+@record_with(free_axes=1)
 class Flows(NamedTuple):
     """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included.
 
@@ -51,6 +51,7 @@ class Flows(NamedTuple):
     modes: Annotated[np.ndarray, "s", int]  # 0: a free index
     eigenvalue: Annotated[np.ndarray, "s m", complex]
     inverse: Annotated[np.ndarray, "s m", complex]  # 1/eigenvalue
+    size: Annotated[np.ndarray, "s m"]  # |eigenvalue|
     project: Annotated[np.ndarray, "s m 2N", complex]  # c = project (q, q') - offset - harmonics
     offset: Annotated[np.ndarray, "s m", complex]
     in_phase: Annotated[np.ndarray, "s m e", complex]  # contribution of the real part of each harmonic's phase to c
@@ -67,6 +68,7 @@ class Flows(NamedTuple):
     close_gaps: Annotated[np.ndarray, "s N u"]  # displacement that closes gaps of closed contacts
     stop_rows: Annotated[np.ndarray, "s N 2u"]  # velocity that stops their gaps and the slips that stick
     held: Annotated[np.ndarray, "s u", bool]  # whether constraints hold the slip of a unit that counts as slipping
+    holds: Annotated[np.ndarray, "s", bool]  # whether contacts hold any row
     growth: Annotated[np.ndarray, "s"]  # largest rate of growth, 1/s
     fastest: Annotated[np.ndarray, "s"]  # largest |real| + |imaginary part| of an eigenvalue, 1/s
     airborne: Annotated[np.ndarray, "s b", bool]  # whether a body touches no floor
@@ -130,26 +132,29 @@ def _fill_energy(flows: Flows, system: System, s: int) -> None:
     flows.response[s, :e] += system.table
     flows.driven[s] = e
     flows.grid_factor[s, :, :m] = grid_factors(rate, system.period)
-    rubs = (np.arange(u) >= system.contacts) | (system.friction > 0)
-    slips = rubs & np.isin(state, (SLIP_LEFT, SLIP_RIGHT)) & ~flows.held[s]
+    forms = {
+        "loss": products(velocity, system.damping @ velocity),
+        "square": products(*2 * [flows.response[s, None, :m]]),
+    }
+    slips = ((state == SLIP_LEFT) | (state == SLIP_RIGHT)) & ~flows.held[s]
+    slips &= (np.arange(u) >= system.contacts) | (system.friction > 0)
     compliant = np.flatnonzero(np.isfinite(system.spring))
     pressed = state[compliant] < OPEN
-    slip, drag = flows.rows[s, u:, :m] * rate * slips[:, None], -flows.force[s, u:, :m]
-    push = flows.rows[s, compliant, :m] * rate * pressed[:, None]
-    damping = system.dashpot[compliant, None] * push
-    losing, taking = np.stack([push, slip[compliant]], axis=1), np.stack([damping, drag[compliant]], axis=1)
-    response, momentum = flows.response[s, None, :m], system.mass[system.along] @ velocity[system.along]
-    fill_forms(
-        flows, s, system, momentum, momentum, velocity,
-        {
-            "loss": products(velocity, system.damping @ velocity), "dashpot": products(push, damping),
-            "square": products(response, response), "friction": products(slip, drag), "lost": products(losing, taking),
-        },
-    )  # fmt: skip
     flows.damped[s], flows.rubs[s] = pressed.any(), pressed.any() or slips.any()
-    on_floor = system.body[(state != OPEN) & (state != LEAVING) & (system.surface == FLOOR)]
-    flows.airborne[s] = ~np.isin(np.arange(system.bodies), on_floor)
-    tilt = np.eye(len(system.mass))[system.tilt] - system.turn
+    if flows.rubs[s]:
+        slip, drag = flows.rows[s, u:, :m] * rate * slips[:, None], -flows.force[s, u:, :m]
+        push = flows.rows[s, compliant, :m] * rate * pressed[:, None]
+        damping = system.dashpot[compliant, None] * push
+        losing, taking = np.stack([push, slip[compliant]], axis=1), np.stack([damping, drag[compliant]], axis=1)
+        forms |= {
+            "dashpot": products(push, damping), "friction": products(slip, drag), "lost": products(losing, taking),
+        }  # fmt: skip
+    momentum = system.mass[system.along] @ velocity[system.along]
+    fill_forms(flows, s, system, momentum, momentum, velocity, forms)
+    flows.airborne[s] = True
+    flows.airborne[s, system.body[(state != OPEN) & (state != LEAVING) & (system.surface == FLOOR)]] = False
+    tilt = -system.turn
+    tilt[np.arange(len(tilt)), system.tilt] += 1.0
     parts = np.hstack([motion, flows.bend[s, :, None], flows.bend_held[s]])
     flows.rocks[s] = (np.abs(tilt @ parts) > CANCELLED * (np.abs(tilt) @ np.abs(parts))).any(axis=1)
 
@@ -165,7 +170,7 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     touched = np.flatnonzero(both.any(axis=0))
     if not len(touched):
         return np.zeros((0, len(root)))
-    if np.linalg.matrix_rank(both[:, touched]) == len(touched):
+    if len(touched) == 1 or np.linalg.matrix_rank(both[:, touched]) == len(touched):
         return np.eye(len(root))[touched]
     basis: np.ndarray = orth(both.T, rcond=RANK).T
     return basis
@@ -188,7 +193,7 @@ class _Contacts:
         self.touching = np.flatnonzero((state != OPEN) & rigid)
         self.stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
         self.slides = np.flatnonzero((units >= system.contacts) & (way != 0))
-        self.kept = np.r_[self.closed, u + self.stick]
+        self.kept = np.concatenate([self.closed, u + self.stick])
         self.drag, self.known = way * system.friction, -(way * system.limit)[self.slides]
         sliding, push = (
             rows[which] - self.drag[which, None] * rows[u + which] for which in (self.closed, self.pressed)
@@ -200,7 +205,7 @@ class _Contacts:
 
     def spread(self, kept: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
         """Return the forces (2u, ...) of all rows from those of the kept rows (k, ...) and of springs (p, ...)."""
-        acting, count = np.r_[self.closed, self.pressed], len(self.closed)
+        acting, count = np.concatenate([self.closed, self.pressed]), len(self.closed)
         forces = np.zeros((2 * self.u, *kept.shape[1:]), kept.dtype)
         forces[self.closed], forces[self.pressed] = kept[:count], pushes
         forces[self.u + acting] = -(self.drag[acting] * forces[acting].T).T
@@ -216,11 +221,15 @@ class _Contacts:
             lever = np.linalg.norm(self.wrench, axis=0)
             balanced = null_space(self.wrench / lever, rcond=SINGULAR)
             self_stress[:, kept] = self.spread(balanced @ balanced.T / lever[:, None] * lever)
-        for target, which in ((close_gaps, self.touching), (stop_rows, np.r_[self.touching, u + self.stick])):
-            target[:, which] = np.linalg.pinv(rows[which], rcond=SINGULAR) / root[:, None]
-        free = drawn - drawn @ np.linalg.pinv(rows[kept], rcond=SINGULAR) @ rows[kept]
-        held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
-        return {"self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held}
+        holds, held = len(self.touching) + len(self.stick) > 0, np.zeros(u, bool)
+        if holds:
+            for target, which in ((close_gaps, self.touching), (stop_rows, np.r_[self.touching, u + self.stick])):
+                target[:, which] = np.linalg.pinv(rows[which], rcond=SINGULAR) / root[:, None]
+            free = drawn - drawn @ np.linalg.pinv(rows[kept], rcond=SINGULAR) @ rows[kept]
+            held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
+        return {
+            "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held, "holds": holds,
+        }  # fmt: skip
 
 
 def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
@@ -258,7 +267,7 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
-    rate = np.r_[1j * system.frequency, eigenvalue]
+    rate = np.concatenate([1j * system.frequency, eigenvalue])
     # constant part, of loads and of displacements that constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
     rest, rest_held = still @ weight, -still @ stiffness @ held
@@ -296,7 +305,8 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
     force_constant[len(state) + contacts.slides] = contacts.known
     return {
-        "key": state, "modes": len(rate), "eigenvalue": rate, "inverse": 1 / rate, "project": after_harmonics(free),
+        "key": state, "modes": len(rate), "eigenvalue": rate, "inverse": 1 / rate, "size": np.abs(rate),
+        "project": after_harmonics(free),
         "offset": after_harmonics(project[:, :k] @ rest), "in_phase": after_harmonics(project @ full.real),
         "in_quadrature": after_harmonics(-(project @ full.imag)),
         "motion": motion, "velocity": motion * rate, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
