@@ -212,20 +212,25 @@ class _Contacts:
         forces[self.u + self.stick] = kept[count:]
         return forces
 
-    def projectors(self) -> dict[str, np.ndarray]:
+    def projectors(self) -> dict[str, Any]:
         """Return the entries of Flows that correct gaps, slips and forces."""
         u, rows, root, kept, drawn = self.u, self.rows, self.root, self.kept, self.drawn
         self_stress = np.zeros((2 * u, 2 * u))
-        close_gaps, stop_rows = np.zeros((len(root), u)), np.zeros((len(root), 2 * u))
-        if len(kept):
+        close_gaps, stop_rows, held = np.zeros((len(root), u)), np.zeros((len(root), 2 * u)), np.zeros(u, bool)
+        if len(kept) > 1:  # one force alone balances none
             lever = np.linalg.norm(self.wrench, axis=0)
             balanced = null_space(self.wrench / lever, rcond=SINGULAR)
             self_stress[:, kept] = self.spread(balanced @ balanced.T / lever[:, None] * lever)
-        holds, held = len(self.touching) + len(self.stick) > 0, np.zeros(u, bool)
-        if holds:
-            for target, which in ((close_gaps, self.touching), (stop_rows, np.r_[self.touching, u + self.stick])):
-                target[:, which] = np.linalg.pinv(rows[which], rcond=SINGULAR) / root[:, None]
-            free = drawn - drawn @ np.linalg.pinv(rows[kept], rcond=SINGULAR) @ rows[kept]
+        stopped = np.concatenate([self.touching, u + self.stick])
+        if holds := len(stopped) > 0:
+            inverse = np.linalg.pinv(rows[stopped], rcond=SINGULAR)
+            stop_rows[:, stopped] = inverse / root[:, None]
+            own, forced = (
+                inverse if len(which) == len(stopped) else np.linalg.pinv(rows[which], rcond=SINGULAR)
+                for which in (self.touching, kept)
+            )
+            close_gaps[:, self.touching] = own / root[:, None]
+            free = drawn - drawn @ forced @ rows[kept]
             held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
         return {
             "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held, "holds": holds,
