@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Clock, in_turns, seconds
-from vanedamp.coupling.engine.line.automaton import amplitude_changes
+from vanedamp.coupling.engine.amplitudes import amplitude_changes
 from vanedamp.coupling.engine.line.energy_balance import account
 from vanedamp.coupling.engine.line.event_driven import EngineRun, is_common
 from vanedamp.coupling.engine.line.event_functions import next_event

@@ -35,7 +35,7 @@ BOUNDED, EXPANDED, ROOT = np.arange(20, 23)
 # the sum with one conjugate, or that of one mode only; CALM: a mode whose square is integrated with others
 SUM, DIFFERENCE, SINGLE, CALM = range(4)
 
-# first columns of the linear maps of the amplitudes (line.subsystem_assembly.Flows.linear): real maps of two numbers
+# first columns of the linear maps of the amplitudes (Flows.linear): real maps of two numbers
 # have four columns, of one number two; WORK_MAP: of harmonic h from WORK_MAP + 4 h on
 HARMONIC_MAP, MOMENTUM_MAP, MEAN_MAP, FREE_MOMENTUM_MAP, WORK_MAP = 0, 4, 8, 10, 12
 

@@ -37,6 +37,14 @@ DEFECTIVE = 1e7
 #: largest relative residual of an eigenpair, and largest relative error of a state that is split into modes and summed
 LOST = 1e-9
 
+# --- integrals and peaks of a segment
+#: |growth rate of a product of modes| times the period, below which its integral is not taken from its antiderivative
+SLOW = 1e-2
+#: error of a peak's height, times the height, at which its search ends
+PEAK = 1e-13
+#: term of a series, times the sum so far, below which the series ends
+LAST_TERM = 1e-18
+
 # --- searches for roots
 #: Newton's correction, times the root: below the first the polynomial's remainder is checked, below the second, whose
 #: error is about its square, the root is found

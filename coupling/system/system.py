@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.scene.shapes.shape import SIDES
 
 #: names of a unit's counterparts, also of elements assembled so far
@@ -46,7 +46,7 @@ class Part(NamedTuple):
     J: np.ndarray  # (rows, k)
 
 
-@record
+@record_with(sizes=("modes", "bodies", "contacts"))
 class System(NamedTuple):
     """Matrices of a scene: N coordinates, n of them modes, e harmonics, u units, b bodies, d friction dampers.
 

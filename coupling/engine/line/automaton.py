@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.engine.amplitudes import amplitude_changes, row_change
 from vanedamp.coupling.engine.line.compliant_contacts import begin_contact, change_contact, spring_force
 from vanedamp.coupling.engine.line.contact_states import (
     add_force,
@@ -68,14 +69,6 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.compiler.jit import comparing, inlined, kernel, summing
-from vanedamp.coupling.numerics.exponentials import (
-    exp_minus_line,
-    exp_minus_one,
-    is_long,
-    long_minus_line,
-    secular,
-    whole_vectors,
-)
 from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
 from vanedamp.coupling.response.records import FRICTION
 
@@ -470,42 +463,6 @@ def _largest(amplitude, acceleration, speed, count):
 
 
 @inlined
-def amplitude_changes(flows, st, scratch, tau):
-    """Set the changes of the active modes' amplitudes over the segment."""
-    s, e = st.counters[FLOW], flows.driven.shape[1] - 1
-    count = whole_vectors(st.counters[ACTIVE], len(st.amplitude))
-    if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[ACTIVE], tau):
-        _grow(long_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
-    else:
-        _grow(exp_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
-    if flows.driven[s, e] > e:
-        _add_driven_growth(
-            flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
-        )
-
-
-@summing
-def _grow(term, eigenvalue, amplitude, count, tau, gain, bend):
-    """Set the changes of amplitudes over a time, and the same less their tangents, by this function of z."""
-    for j in range(count):
-        rate, c = eigenvalue[j], amplitude[j]
-        z = complex(rate.real * tau, rate.imag * tau)
-        first = exp_minus_one(z)
-        gain[j] = c * first
-        bend[j] = c * term(z, first)
-
-
-@kernel
-def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
-    """Add the growth of the modes that the harmonics drive: the first ones, always active."""
-    for h in range(len(driven) - 1):
-        for j in range(driven[h], driven[h + 1]):
-            growth, beyond = secular(eigenvalue[j], eigenvalue[h], tau)
-            gain[j] += load[j] * phase[h] * growth
-            bend[j] += load[j] * phase[h] * beyond
-
-
-@inlined
 def _advance_motion(system, flows, st, scratch, tau):
     """Advance rows and amplitudes by tau."""
     s, count, friction = st.counters[FLOW], st.counters[ACTIVE], system.friction_rows
@@ -515,7 +472,7 @@ def _advance_motion(system, flows, st, scratch, tau):
             r < friction and (state == STICK or state == HELD)
         ):
             continue
-        shift, speed = _row_change(flows.motion[s, r], flows.velocity[s, r], scratch.bend, scratch.gain, count)
+        shift, speed = row_change(flows.motion[s, r], flows.velocity[s, r], scratch.bend, scratch.gain, count)
         shift += tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau)
         speed += st.free_acceleration[r] * tau
         st.velocity[r] += speed
@@ -539,16 +496,6 @@ def _add_gains(gain, factor, first, last, amplitude, change):
         amplitude[j] += complex(x, y)
         change[2 * j] += x
         change[2 * j + 1] += y
-
-
-@summing
-def _row_change(motion, velocity, bend, gain, count):
-    """Return what the modes add to displacement and velocity of a row."""
-    shift, speed = 0.0, 0.0
-    for j in range(count):
-        shift += motion[j].real * bend[j].real - motion[j].imag * bend[j].imag
-        speed += velocity[j].real * gain[j].real - velocity[j].imag * gain[j].imag
-    return shift, speed
 
 
 @inlined

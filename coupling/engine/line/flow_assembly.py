@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.energy_forms import set_energies
-from vanedamp.coupling.engine.line.peaks import GRIDS
+from vanedamp.coupling.engine.line.form_assembly import set_energies
 from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import FAR
+from vanedamp.coupling.engine.peaks import GRIDS
 from vanedamp.coupling.numerics.codes import DONE, ILL_CONDITIONED, NEEDS_FLOW
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.numerics.compiler.record import record, room

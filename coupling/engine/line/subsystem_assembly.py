@@ -19,8 +19,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
-from vanedamp.coupling.engine.line.peaks import GRIDS
 from vanedamp.coupling.engine.line.subsystems import Known, most_modes
+from vanedamp.coupling.engine.peaks import GRIDS
 from vanedamp.coupling.engine.run import IllConditioned, with_free_place
 from vanedamp.coupling.numerics.codes import WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room

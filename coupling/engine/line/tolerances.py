@@ -28,8 +28,6 @@ MOVES_ALIKE = 1e-12
 # --- modes
 #: acceleration of a mode, times the largest of all modes, below which the mode is inactive until the next impact
 INACTIVE = 1e-14
-#: |growth rate of a product of modes| times the period, below which its integral is not taken from its antiderivative
-SLOW = 1e-2
 #: |i omega_h - lambda| times the period, below which a harmonic drives a mode. Beyond, the steady-state response is at
 #: most 1/DRIVEN times the growth in one period: less than two digits cancel. Driven modes cost time: a wider bound
 #: would slow down scenes more than 0.3 % off their resonance. numerics.exponentials.secular relies on it
@@ -47,10 +45,6 @@ NEARLY_EQUAL = 1e2
 #: the last bit, as it can be close to two eigenvalues that nearly coalesce
 SHIFTS = (4 * float(np.finfo(float).eps), 1e-10, 1e-6)
 
-# --- searches and series
-#: error of a peak's height, times the height, at which its search ends
-PEAK = 1e-13
-#: term of a series, times the sum so far, below which the series ends
-LAST_TERM = 1e-18
+# --- samples
 #: distance of a sampling time before a segment's start, times the sampling step, that is round-off
 SAMPLE = 1e-12

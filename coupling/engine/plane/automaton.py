@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.engine.plane.contact_states import decide, move_sliders
+from vanedamp.coupling.engine.plane.energy_balance import account, move, response_at
 from vanedamp.coupling.engine.plane.event_functions import next_event
 from vanedamp.coupling.engine.plane.impacts import collide, log_event, log_impact, stop_wedged
-from vanedamp.coupling.engine.plane.quadrature import add_up, motion_at, response_at
 from vanedamp.coupling.engine.plane.tolerances import (
     ALMOST_CLOSED,
     AT_REST,
@@ -20,6 +20,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
 from vanedamp.coupling.engine.root_search import ENDLESS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
+    ACTIVE,
     AT_HIGH,
     AT_LOW,
     AT_ONCE,
@@ -162,11 +163,12 @@ def _begin_flow(system, flows, st, log, scratch):
 @inlined
 def _move(system, flows, st, rec, scratch, tau):
     """Advance the motion by tau > 0, with its integrals and samples."""
-    add_up(system, flows, st, rec, scratch, tau)
-    _sample(system, flows, st, rec, scratch, tau)
-    motion_at(system, flows, st, scratch, tau, scratch.ahead[0], scratch.ahead[1])
-    for i in range(len(st.q)):
-        st.q[i], st.v[i] = scratch.ahead[0, i], scratch.ahead[1, i]
+    q, v = scratch.later[0], scratch.later[1]
+    _sample(system, flows, st, rec, scratch, tau, q, v)
+    move(system, flows, st, scratch, tau, q, v)
+    account(system, flows, st, rec, scratch, tau, q, v)
+    for i in range(len(q)):
+        st.q[i], st.v[i] = q[i], v[i]
     for r in range(len(st.fresh)):
         st.fresh[r] = 0
     st.counters[AT_ONCE] = 0
@@ -376,18 +378,19 @@ def _stop_held_rows(system, flows, st):
 def _project(system, flows, st, s):
     """Bring back gaps, and speeds of rows at rest, from round-off to zero."""
     u, size = len(system.rest), len(st.q)
-    for r in range(2 * u):
-        st.rate[r] = row_speed(system, r, st.v) if _at_rest(system, st, r) else 0.0
-    for r in range(2 * u):
-        if st.rate[r] != 0.0:
-            for i in range(size):
-                st.v[i] -= flows.stop_rows[s, i, r] * st.rate[r]
-    for r in range(system.contacts):
-        st.rate[r] = gap(system, r, st.q) if is_rigid(system, r) and st.state[r] != OPEN else 0.0
-    for r in range(system.contacts):
-        if st.rate[r] != 0.0:
-            for i in range(size):
-                st.q[i] -= flows.close_gaps[s, i, r] * st.rate[r]
+    if flows.holds[s]:
+        for r in range(2 * u):
+            st.rate[r] = row_speed(system, r, st.v) if _at_rest(system, st, r) else 0.0
+        for r in range(2 * u):
+            if st.rate[r] != 0.0:
+                for i in range(size):
+                    st.v[i] -= flows.stop_rows[s, i, r] * st.rate[r]
+        for r in range(system.contacts):
+            st.rate[r] = gap(system, r, st.q) if is_rigid(system, r) and st.state[r] != OPEN else 0.0
+        for r in range(system.contacts):
+            if st.rate[r] != 0.0:
+                for i in range(size):
+                    st.q[i] -= flows.close_gaps[s, i, r] * st.rate[r]
     for i in range(size):  # the smallest doubles are slow
         st.q[i] = st.q[i] if abs(st.q[i]) > _TINY else 0.0
         st.v[i] = st.v[i] if abs(st.v[i]) > _TINY else 0.0
@@ -529,6 +532,16 @@ def _begin_segment(system, flows, st):
             phase = st.amplitude[h]
             total -= flows.in_phase[s, j, h] * phase.real + flows.in_quadrature[s, j, h] * phase.imag
         st.amplitude[j] = total
+    for j in range(flows.modes[s], len(st.amplitude)):
+        st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
+    st.counters[ACTIVE] = flows.modes[s]
+    st.offset[0] = 0.0
+    for i in range(size):
+        st.offset[0] += system.response[i] * st.q[i]
+    for h in range(e):
+        st.offset[0] += (system.table[h] * st.amplitude[h]).real
+    for j in range(flows.modes[s]):
+        st.offset[0] -= (flows.response[s, j] * st.amplitude[j]).real
     for i in range(size):
         st.bend[i] = flows.bend[s, i]
         for k in range(size):
@@ -541,12 +554,9 @@ def _begin_segment(system, flows, st):
     for i in range(size):
         part = abs(st.v[i])
         for j in range(flows.modes[s]):
-            rate = flows.motion[s, i, j] * flows.eigenvalue[s, j] * st.amplitude[j]
+            rate = flows.velocity[s, i, j] * st.amplitude[j]
             part += abs(rate.real) + abs(rate.imag)
-        largest = 0.0
-        for r in range(len(system.J)):
-            largest = max(largest, abs(system.J[r, i]))
-        swing = max(swing, part * largest)
+        swing = max(swing, part * st.reach[i])
     st.scale[0] = max(swing, system.speed)
 
 
@@ -572,18 +582,18 @@ def _within_walls(system, st):
 
 
 @inlined
-def _sample(system, flows, st, rec, scratch, tau):
+def _sample(system, flows, st, rec, scratch, tau, q, v):
     """Take the samples of the segment."""
     periods = len(rec.peak) - 1
     many = len(rec.samples) // periods if periods > 0 else 0
     if many == 0:
         return
-    step, q, v = system.period / many, scratch.ahead[0], scratch.ahead[1]
+    step = system.period / many
     k = math.ceil(st.time[0] / step - SAMPLE)
     while k < many and k * step < st.time[0] + tau:
         row = st.counters[PERIOD] * many + k
         if row < len(rec.samples):
-            motion_at(system, flows, st, scratch, max(k * step - st.time[0], 0.0), q, v)
+            move(system, flows, st, scratch, max(k * step - st.time[0], 0.0), q, v)
             x, _ = response_at(system, q, v, k * step)
             put_sample(system, rec, row, x, q, st.state, OPEN)
         k += 1

@@ -43,11 +43,16 @@ def free_acceleration(system, scratch, q, v, time):
     """
     size = len(q)
     for i in range(size):
-        total, terms = system.weight[i], abs(system.weight[i])
-        for h in range(len(system.frequency)):
-            angle, load = system.frequency[h] * time, system.load[h, i]
-            total += (load * complex(math.cos(angle), math.sin(angle))).real
-            terms += abs(load.real) + abs(load.imag)
+        scratch.free[i], scratch.terms[i] = system.weight[i], abs(system.weight[i])
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * time
+        phase = complex(math.cos(angle), math.sin(angle))
+        for i in range(size):
+            load = system.load[h, i]
+            scratch.free[i] += (load * phase).real
+            scratch.terms[i] += abs(load.real) + abs(load.imag)
+    for i in range(size):
+        total, terms = scratch.free[i], scratch.terms[i]
         for k in range(size):
             spring, dashpot = system.stiffness[i, k] * q[k], system.damping[i, k] * v[k]
             total -= spring + dashpot
@@ -190,7 +195,7 @@ def decide(system, st, scratch, scale):
     sliders, slow = len(system.tangential), AT_REST * scale
     if len(system.tangential) > 0:
         _hold_sliders(system, st, scratch, slow)
-    count = ZERO
+    count, decided = ZERO, sliders == 0
     for r in range(len(system.rest) - sliders):
         if _is_undecided(system, st, scratch, r, slow):
             scratch.listed[count], scratch.way[count] = (
@@ -198,6 +203,12 @@ def decide(system, st, scratch, scale):
                 direction(system, st, r, slow) if has_friction(system, r) else 0,
             )
             count += 1
+        decided = decided and count == 0 and scratch.resting[r] == 0
+    if decided:  # gaps and speeds have decided all
+        for row in range(len(scratch.impulse)):
+            scratch.impulse[row] = 0.0
+        _take_decisions(system, st, scratch, count, False)
+        return True
     terms = loaded_acceleration(system, st, scratch, st.q, st.v, st.time[0])
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL):
         return False
@@ -365,19 +376,19 @@ def _decide_later(system, st, scratch, count):
     """
     u, size = len(system.rest), len(st.q)
     for i in range(size):
-        scratch.ahead[1, i] = scratch.free[i]
+        scratch.later[1, i] = scratch.free[i]
         for r in range(2 * u):
-            scratch.ahead[1, i] += system.J[r, i] * scratch.impulse[r] / system.mass[i]
-    moment = _before_end(system, st, scratch, count, scratch.ahead[1], system.moment * _SOONER ** scratch.attempt[0])
+            scratch.later[1, i] += system.J[r, i] * scratch.impulse[r] / system.mass[i]
+    moment = _before_end(system, st, scratch, count, scratch.later[1], system.moment * _SOONER ** scratch.attempt[0])
     for i in range(size):
-        total = scratch.ahead[1, i]
-        scratch.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
-        scratch.ahead[1, i] = st.v[i] + moment * total
+        total = scratch.later[1, i]
+        scratch.later[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
+        scratch.later[1, i] = st.v[i] + moment * total
     if len(system.tangential) > 0:
-        move_sliders(system, st.state, scratch.ahead[0], scratch.ahead[1])
+        move_sliders(system, st.state, scratch.later[0], scratch.later[1])
     for p in range(count):
         scratch.first[p], scratch.doubt[p] = scratch.verdict[p], scratch.doubtful[p]
-    terms = loaded_acceleration(system, st, scratch, scratch.ahead[0], scratch.ahead[1], st.time[0] + moment)
+    terms = loaded_acceleration(system, st, scratch, scratch.later[0], scratch.later[1], st.time[0] + moment)
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL_LATER):
         return False
     # which of contacts that depend on each other carry the force is decided for all of them together

@@ -53,7 +53,7 @@ def next_event(system, flows, st, watched):
         left, last = _LONGEST / flows.fastest[s], -2
     shortest = RESOLUTION * system.period
     eigenvalue, modes = flows.eigenvalue[s], flows.modes[s]
-    grows = math.exp(flows.growth[s] * left)
+    grows = math.exp(flows.growth[s] * left) if flows.growth[s] > 0.0 else 1.0
     count = _list_functions(system, flows, st, watched, s, grows)
     st.counters[SEGMENTS] += 1
     most = st.counters[EVALUATIONS] + MOST
@@ -141,7 +141,7 @@ def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grow
             g = on_slip * flows.rows[s, u + r, j] * rate
         g *= st.amplitude[j]
         watched.g[k, j] = g
-        fast = math.sqrt(rate.real * rate.real + rate.imag * rate.imag)
+        fast = flows.size[s, j]
         bound = (abs(g.real) + abs(g.imag)) * fast
         if order == FORCE:
             value += g.real

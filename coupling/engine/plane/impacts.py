@@ -54,8 +54,7 @@ _FAR = 100.0
 @kernel
 def collide(system, st, rec, log, scratch):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count = len(system.rest), _list_closed(system, st, scratch)
-    tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
+    u, count, tiny = len(system.rest), _list_closed(system, st, scratch), AT_REST * st.scale[0]
     for r in range(2 * u):
         scratch.before_impact[r] = row_speed(system, r, st.v)
     # speeds as they are, round-off included, always have a solution
@@ -164,26 +163,34 @@ def _adds_energy(system, st, scratch):
     By the velocities that they change: of a wedged block, large impulses nearly balance each other.
     """
     loss, there = 0.0, 0.0
+    _push(system, scratch)
     for i in range(len(st.v)):
-        pushed, terms = 0.0, 0.0
-        for r in range(len(scratch.impulse)):
-            part = system.J[r, i] * scratch.impulse[r]
-            pushed += part
-            terms += abs(part)
+        pushed = scratch.free[i]
         loss -= pushed * (st.v[i] + 0.5 * pushed / system.mass[i])
-        there += 0.5 * system.mass[i] * st.v[i] * st.v[i] + CANCELLED_ENERGY * terms * abs(st.v[i])
+        there += 0.5 * system.mass[i] * st.v[i] * st.v[i] + CANCELLED_ENERGY * scratch.terms[i] * abs(st.v[i])
     return loss < -ADDED_ENERGY * there
+
+
+@inlined
+def _push(system, scratch):
+    """Set the momenta that the impulses give (scratch.free), and sizes of the terms that they are sums of."""
+    for i in range(len(scratch.free)):
+        scratch.free[i], scratch.terms[i] = 0.0, 0.0
+    for row in range(len(scratch.impulse)):
+        if scratch.impulse[row] != 0.0:
+            for i in range(len(scratch.free)):
+                part = system.J[row, i] * scratch.impulse[row]
+                scratch.free[i] += part
+                scratch.terms[i] += abs(part)
 
 
 @kernel
 def _apply(system, st, rec, log, scratch, count, tiny):
     """Change the velocities by the impulses; log the impacts of contacts that these push, or that have approached."""
     u = len(system.rest)
+    _push(system, scratch)
     for i in range(len(st.v)):
-        total = 0.0
-        for row in range(2 * u):
-            total += system.J[row, i] * scratch.impulse[row]
-        st.v[i] += total / system.mass[i]
+        st.v[i] += scratch.free[i] / system.mass[i]
     for p in range(count):
         r = scratch.listed[p]
         before, push, drag = scratch.before_impact[r], scratch.impulse[r], scratch.impulse[u + r]

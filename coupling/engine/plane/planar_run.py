@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.plane.automaton import advance, begin
+from vanedamp.coupling.engine.plane import automaton
 from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.engine.run import EventDrivenRun
@@ -20,6 +20,16 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import LEFT, RIGHT, System
+
+
+def is_common(system: System, modes: int) -> bool:
+    """Whether this is the most common scene, for whose lengths the engine is compiled.
+
+    One mode, one block between rigid walls, one harmonic.
+    """
+    one = system.modes == system.bodies == len(system.frequency) == 1 and modes == 3
+    rigid = not len(system.tangential) and np.isinf(system.spring).all()
+    return bool(one and rigid and len(system.rest) == system.contacts == 8)
 
 
 class PlanarRun(EventDrivenRun):
@@ -38,6 +48,11 @@ class PlanarRun(EventDrivenRun):
         self.state, self.watched = new_state(system, modes, initial), new_event_functions(system, modes)
         self.walls = np.zeros((len(records.impacts), system.bodies), np.int64)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
+        self._advance_compiled = automaton.advance
+        if is_common(system, modes) and hasattr(automaton.advance, "sized"):
+            self._advance_compiled = automaton.advance.sized(
+                system, self.flows, self.state, self.watched, records, self.log, self.scratch, 0, 0
+            )
 
     def reuse(self, earlier: PlanarRun) -> None:
         """Take over the flows that an earlier run has met, if it is one of the same system."""
@@ -48,10 +63,10 @@ class PlanarRun(EventDrivenRun):
     def begin(self, max_events: int) -> int:
         """Decide the initial state. Return the code of numerics.codes."""
         self.begun = True
-        return DONE if begin(self.system, self.state, self.records, self.log, self.scratch) else UNDECIDED
+        return DONE if automaton.begin(self.system, self.state, self.records, self.log, self.scratch) else UNDECIDED
 
     def _advance(self, periods: int, max_events: int) -> int:
-        code = int(advance(
+        code = int(self._advance_compiled(
             self.system, self.flows, self.state, self.watched, self.records, self.log, self.scratch, periods, max_events
         ))  # fmt: skip
         self._count_walls(self.log[: self.counters[LOGGED]])
@@ -102,9 +117,10 @@ class PlanarRun(EventDrivenRun):
         """Count the impacts of each body on its walls, by periods."""
         hits = entries[entries[:, 1] == IMPACT]
         units = hits[:, 2].astype(int)
-        walls = np.isin(self.system.surface[units], (LEFT, RIGHT))
+        walls = (self.system.surface[units] == LEFT) | (self.system.surface[units] == RIGHT)
         periods = np.minimum(hits[walls, 0] / self.system.period, len(self.walls) - 1).astype(int)
-        np.add.at(self.walls, (periods, self.system.body[units[walls]]), 1)
+        places = periods * self.system.bodies + self.system.body[units[walls]]
+        self.walls += np.bincount(places, minlength=self.walls.size).reshape(self.walls.shape)
 
     def _plane(self) -> Plane:
         return plane_of(self.system, self.records, self.linearisation, self.walls)

@@ -34,12 +34,15 @@ class State(NamedTuple):
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
+    reach: np.ndarray  # (N,) largest entry of each coordinate in the rows
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
     pushed: np.ndarray  # (2u,) impulse of a compliant contact since it closed, N s
     lost: np.ndarray  # (u,) its loss since then, J
     ledger: np.ndarray  # (6,) J
     # of a segment
-    amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
+    amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics, those beyond the flow's are zero
+    change: np.ndarray  # (2m,) real and imaginary parts of their changes in the segment (energy_forms)
+    offset: np.ndarray  # (1,) constant part of the response, m
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
     force: np.ndarray  # (2u,) constant part of the forces, N
     # (2u,) self-stress of contacts that depend on each other, N: excess of their forces over the least ones
@@ -71,7 +74,7 @@ class Scratch(NamedTuple):
 
     free: np.ndarray  # (N,) acceleration without contact forces
     terms: np.ndarray  # (N,) size of the terms that it is a sum of
-    ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
+    later: np.ndarray  # (2, N) coordinates and velocities a moment later
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
     impulse: np.ndarray  # (2u,)
@@ -96,13 +99,15 @@ class Scratch(NamedTuple):
     part: np.ndarray  # (4u,) int: kind of each of its unknowns
     column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
     attempt: np.ndarray  # (1,) int: how often a decision has been repeated
-    turn: np.ndarray  # (m,) complex
-    # of integrals in closed form (exponential_integrals)
-    moment: np.ndarray  # (3, m) complex: integrals of t^k exp(lambda t)
-    pair: np.ndarray  # (2, m, m) complex: of products of exponentials, and of one with the conjugate of the other
-    constant: np.ndarray  # (4, 3): powers of t in each signal
-    signal: np.ndarray  # (4, m) complex: exponentials in each signal
+    # of a segment's modes: line.state.Scratch
+    gain: np.ndarray  # (m,) complex
+    bend: np.ndarray  # (m,) complex
+    total: np.ndarray  # (2m,)
     wave: np.ndarray  # (m,) complex
+    ahead: np.ndarray  # (m,) complex
+    step_factor: np.ndarray  # (m,) complex
+    growth: np.ndarray  # (m,) complex
+    drive: np.ndarray  # (m,) complex
 
 
 def new_state(system: System, modes: int, initial: Motion) -> State:
@@ -114,9 +119,11 @@ def new_state(system: System, modes: int, initial: Motion) -> State:
     return State(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
-        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
+        rate=np.zeros(2 * u), scale=np.zeros(1), reach=np.abs(system.J).max(axis=0, initial=0.0),
+        last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)),
-        amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
+        amplitude=np.zeros(modes, complex), change=np.zeros(2 * modes), offset=np.zeros(1),
+        bend=np.zeros(size), force=np.zeros(2 * u),
         prestress=np.zeros(2 * u),
     )  # fmt: skip
 
@@ -134,9 +141,9 @@ def new_event_functions(system: System, modes: int) -> EventFunctions:
 def new_scratch(system: System, modes: int) -> Scratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
-    integers = iter(np.zeros((11, u), np.int64))
+    integers, waves = iter(np.zeros((11, u), np.int64)), iter(np.zeros((7, modes), complex))
     return Scratch(
-        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
+        free=np.zeros(size), terms=np.zeros(size), later=np.zeros((2, size)), speed=np.zeros(2 * u),
         before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
         least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
         way=next(integers), slips=next(integers), place=next(integers), verdict=next(integers),
@@ -145,6 +152,6 @@ def new_scratch(system: System, modes: int) -> Scratch:
         span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
         attempt=np.zeros(1, np.int64),
-        moment=np.zeros((3, modes), complex), pair=np.zeros((2, modes, modes), complex), constant=np.zeros((4, 3)),
-        signal=np.zeros((4, modes), complex), turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
+        total=np.zeros(2 * modes), gain=next(waves), bend=next(waves), wave=next(waves), ahead=next(waves),
+        step_factor=next(waves), growth=next(waves), drive=next(waves),
     )  # fmt: skip

@@ -12,11 +12,13 @@ All is computed in coordinates sqrt(M) q, where the mass matrix is one.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eig, null_space, orth
 
+from vanedamp.coupling.engine.antiderivatives import fill_forms, products
+from vanedamp.coupling.engine.peaks import GRIDS, grid_factors
 from vanedamp.coupling.engine.plane.tolerances import (
     APART,
     FASTEST,
@@ -29,56 +31,78 @@ from vanedamp.coupling.engine.plane.tolerances import (
     STIFFEST,
 )
 from vanedamp.coupling.engine.run import IllConditioned, with_free_place
-from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
-from vanedamp.coupling.numerics.compiler.record import record
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, WORK_MAP
+from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import FLOOR, System
 
 
-@record
+@record_with(free_axes=1)
 class Flows(NamedTuple):
-    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
+    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included.
 
-    key: np.ndarray  # (s, u) int: the states
-    modes: np.ndarray  # (s,) int, 0: a free index
-    eigenvalue: np.ndarray  # (s, m)
-    project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
-    offset: np.ndarray  # (s, m)
-    in_phase: np.ndarray  # (s, m, e): contribution of the real part of the phase of each harmonic to c
-    in_quadrature: np.ndarray  # (s, m, e): of the imaginary part
-    motion: np.ndarray  # (s, N, m): q of each mode
-    rows: np.ndarray  # (s, 2u, m): J motion
-    bend: np.ndarray  # (s, N): constant acceleration
-    bend_held: np.ndarray  # (s, N, N): and the addition by displacements held by constraints
-    force: np.ndarray  # (s, 2u, m)
-    force_constant: np.ndarray  # (s, 2u)
-    force_held: np.ndarray  # (s, 2u, N)
-    self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
-    close_gaps: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
-    stop_rows: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
-    held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
-    drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
-    loss: np.ndarray  # (s, m, m): G^T C G
-    loss_apart: np.ndarray  # (s, m, m): G^T C conj G
-    growth: np.ndarray  # (s,) largest rate of growth, 1/s
-    fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
+    Forms, and what enters them, are those of line.subsystem_assembly.Flows; no mode is driven.
+    """
+
+    key: Annotated[np.ndarray, "s u", int]  # the states
+    modes: Annotated[np.ndarray, "s", int]  # 0: a free index
+    eigenvalue: Annotated[np.ndarray, "s m", complex]
+    inverse: Annotated[np.ndarray, "s m", complex]  # 1/eigenvalue
+    size: Annotated[np.ndarray, "s m"]  # |eigenvalue|
+    project: Annotated[np.ndarray, "s m 2N", complex]  # c = project (q, q') - offset - harmonics
+    offset: Annotated[np.ndarray, "s m", complex]
+    in_phase: Annotated[np.ndarray, "s m e", complex]  # contribution of the real part of each harmonic's phase to c
+    in_quadrature: Annotated[np.ndarray, "s m e", complex]  # of the imaginary part
+    motion: Annotated[np.ndarray, "s N m", complex]  # q of each mode
+    velocity: Annotated[np.ndarray, "s N m", complex]  # its rate
+    rows: Annotated[np.ndarray, "s 2u m", complex]  # J motion
+    bend: Annotated[np.ndarray, "s N"]  # constant acceleration
+    bend_held: Annotated[np.ndarray, "s N N"]  # and the addition by displacements held by constraints
+    force: Annotated[np.ndarray, "s 2u m", complex]
+    force_constant: Annotated[np.ndarray, "s 2u"]
+    force_held: Annotated[np.ndarray, "s 2u N"]
+    self_stress: Annotated[np.ndarray, "s 2u 2u"]  # projector of forces on those that balance each other
+    close_gaps: Annotated[np.ndarray, "s N u"]  # displacement that closes gaps of closed contacts
+    stop_rows: Annotated[np.ndarray, "s N 2u"]  # velocity that stops their gaps and the slips that stick
+    held: Annotated[np.ndarray, "s u", bool]  # whether constraints hold the slip of a unit that counts as slipping
+    holds: Annotated[np.ndarray, "s", bool]  # whether contacts hold any row
+    growth: Annotated[np.ndarray, "s"]  # largest rate of growth, 1/s
+    fastest: Annotated[np.ndarray, "s"]  # largest |real| + |imaginary part| of an eigenvalue, 1/s
+    airborne: Annotated[np.ndarray, "s b", bool]  # whether a body touches no floor
+    rocks: Annotated[np.ndarray, "s b", bool]  # whether the rate of a body's tilt in its cavity changes
+    rubs: Annotated[np.ndarray, "s", bool]  # whether friction or compliant contacts take energy
+
+    response: Annotated[np.ndarray, "s m", complex]
+    momentum: Annotated[np.ndarray, "s m", complex]
+    work: Annotated[np.ndarray, "s e m", complex]
+    driven: Annotated[np.ndarray, "s phases", int]
+    load: Annotated[np.ndarray, "s m", complex]
+    grid_factor: Annotated[np.ndarray, "s grids m", complex]
+    linear: Annotated[np.ndarray, "s m maps"]
+    loss: Annotated[np.ndarray, "s 2m 2m"]
+    dashpot: Annotated[np.ndarray, "s 2m 2m"]
+    square: Annotated[np.ndarray, "s 2m 2m"]
+    friction: Annotated[np.ndarray, "s 2m 2m"]  # loss of all units
+    lost: Annotated[np.ndarray, "s c 2m 2m"]  # of friction and dashpot of each of c compliant contacts
+    damped: Annotated[np.ndarray, "s", bool]
+    uncoupled: Annotated[np.ndarray, "s", bool]
+    slow_count: Annotated[np.ndarray, "s", int]
+    slow: Annotated[np.ndarray, "s pairs 4", int]
+    slow_loss: Annotated[np.ndarray, "s pairs", complex]
+    slow_dashpot: Annotated[np.ndarray, "s pairs", complex]
+    slow_square: Annotated[np.ndarray, "s pairs", complex]
+    slow_friction: Annotated[np.ndarray, "s pairs", complex]
+    slow_lost: Annotated[np.ndarray, "s pairs c", complex]
 
 
 def empty_flows(system: System, capacity: int = 8) -> Flows:
     """Storage for `capacity` flows."""
-    size, u, e = len(system.mass), len(system.rest), len(system.frequency)
-    springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
-    m = e + 2 * len(_stretched(system, springs))
-    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
-    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
-    return Flows(
-        key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
-        project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
-        rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
-        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), close_gaps=f(size, u), stop_rows=f(size, 2 * u),
-        held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
-        fastest=f(),
-    )  # fmt: skip
+    u, e, sprung = len(system.rest), len(system.frequency), np.isfinite(system.spring)
+    m = e + 2 * len(_stretched(system, np.vstack([system.J[:u][sprung], system.elongation])))
+    return room(Flows, {
+        "s": capacity, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
+        "grids": GRIDS, "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()), "pairs": m * (m + 3),
+    })  # fmt: skip
 
 
 def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
@@ -90,7 +114,43 @@ def add_flow(flows: Flows, system: System, state: np.ndarray) -> Flows:
     flows, s = with_free_place(flows, flows.modes, lambda size: empty_flows(system, size))
     for name, value in flow.items():
         getattr(flows, name)[(s, *map(slice, np.shape(value)))] = value
+    _fill_energy(flows, system, s)
     return flows
+
+
+def _fill_energy(flows: Flows, system: System, s: int) -> None:
+    """Set what the energy balance and the peaks of flow s need."""
+    u, m, e, state = len(system.rest), int(flows.modes[s]), len(system.frequency), flows.key[s]
+    rate, motion, velocity = flows.eigenvalue[s, :m], flows.motion[s, :, :m], flows.velocity[s, :, :m]
+    flows.response[s, :m] = system.response @ motion
+    flows.response[s, :e] += system.table
+    flows.driven[s] = e
+    flows.grid_factor[s, :, :m] = grid_factors(rate, system.period)
+    forms = {
+        "loss": products(velocity, system.damping @ velocity),
+        "square": products(*2 * [flows.response[s, None, :m]]),
+    }
+    slips = ((state == SLIP_LEFT) | (state == SLIP_RIGHT)) & ~flows.held[s]
+    slips &= (np.arange(u) >= system.contacts) | (system.friction > 0)
+    compliant = np.flatnonzero(np.isfinite(system.spring))
+    pressed = state[compliant] < OPEN
+    flows.damped[s], flows.rubs[s] = pressed.any(), pressed.any() or slips.any()
+    if flows.rubs[s]:
+        slip, drag = flows.rows[s, u:, :m] * rate * slips[:, None], -flows.force[s, u:, :m]
+        push = flows.rows[s, compliant, :m] * rate * pressed[:, None]
+        damping = system.dashpot[compliant, None] * push
+        losing, taking = np.stack([push, slip[compliant]], axis=1), np.stack([damping, drag[compliant]], axis=1)
+        forms |= {
+            "dashpot": products(push, damping), "friction": products(slip, drag), "lost": products(losing, taking),
+        }  # fmt: skip
+    momentum = system.mass[system.along] @ velocity[system.along]
+    fill_forms(flows, s, system, momentum, momentum, velocity, forms)
+    flows.airborne[s] = True
+    flows.airborne[s, system.body[(state != OPEN) & (state != LEAVING) & (system.surface == FLOOR)]] = False
+    tilt = -system.turn
+    tilt[np.arange(len(tilt)), system.tilt] += 1.0
+    parts = np.hstack([motion, flows.bend[s, :, None], flows.bend_held[s]])
+    flows.rocks[s] = (np.abs(tilt @ parts) > CANCELLED * (np.abs(tilt) @ np.abs(parts))).any(axis=1)
 
 
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
@@ -104,7 +164,7 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     touched = np.flatnonzero(both.any(axis=0))
     if not len(touched):
         return np.zeros((0, len(root)))
-    if np.linalg.matrix_rank(both[:, touched]) == len(touched):
+    if len(touched) == 1 or np.linalg.matrix_rank(both[:, touched]) == len(touched):
         return np.eye(len(root))[touched]
     basis: np.ndarray = orth(both.T, rcond=RANK).T
     return basis
@@ -127,7 +187,7 @@ class _Contacts:
         self.touching = np.flatnonzero((state != OPEN) & rigid)
         self.stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
         self.slides = np.flatnonzero((units >= system.contacts) & (way != 0))
-        self.kept = np.r_[self.closed, u + self.stick]
+        self.kept = np.concatenate([self.closed, u + self.stick])
         self.drag, self.known = way * system.friction, -(way * system.limit)[self.slides]
         sliding, push = (
             rows[which] - self.drag[which, None] * rows[u + which] for which in (self.closed, self.pressed)
@@ -139,27 +199,36 @@ class _Contacts:
 
     def spread(self, kept: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
         """Return the forces (2u, ...) of all rows from those of the kept rows (k, ...) and of springs (p, ...)."""
-        acting, count = np.r_[self.closed, self.pressed], len(self.closed)
+        acting, count = np.concatenate([self.closed, self.pressed]), len(self.closed)
         forces = np.zeros((2 * self.u, *kept.shape[1:]), kept.dtype)
         forces[self.closed], forces[self.pressed] = kept[:count], pushes
         forces[self.u + acting] = -(self.drag[acting] * forces[acting].T).T
         forces[self.u + self.stick] = kept[count:]
         return forces
 
-    def projectors(self) -> dict[str, np.ndarray]:
+    def projectors(self) -> dict[str, Any]:
         """Return the entries of Flows that correct gaps, slips and forces."""
         u, rows, root, kept, drawn = self.u, self.rows, self.root, self.kept, self.drawn
         self_stress = np.zeros((2 * u, 2 * u))
-        close_gaps, stop_rows = np.zeros((len(root), u)), np.zeros((len(root), 2 * u))
-        if len(kept):
+        close_gaps, stop_rows, held = np.zeros((len(root), u)), np.zeros((len(root), 2 * u)), np.zeros(u, bool)
+        if len(kept) > 1:  # one force alone balances none
             lever = np.linalg.norm(self.wrench, axis=0)
             balanced = null_space(self.wrench / lever, rcond=SINGULAR)
             self_stress[:, kept] = self.spread(balanced @ balanced.T / lever[:, None] * lever)
-        for target, which in ((close_gaps, self.touching), (stop_rows, np.r_[self.touching, u + self.stick])):
-            target[:, which] = np.linalg.pinv(rows[which], rcond=SINGULAR) / root[:, None]
-        free = drawn - drawn @ np.linalg.pinv(rows[kept], rcond=SINGULAR) @ rows[kept]
-        held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
-        return {"self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held}
+        stopped = np.concatenate([self.touching, u + self.stick])
+        if holds := len(stopped) > 0:
+            inverse = np.linalg.pinv(rows[stopped], rcond=SINGULAR)
+            stop_rows[:, stopped] = inverse / root[:, None]
+            own, forced = (
+                inverse if len(which) == len(stopped) else np.linalg.pinv(rows[which], rcond=SINGULAR)
+                for which in (self.touching, kept)
+            )
+            close_gaps[:, self.touching] = own / root[:, None]
+            free = drawn - drawn @ forced @ rows[kept]
+            held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
+        return {
+            "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held, "holds": holds,
+        }  # fmt: skip
 
 
 def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
@@ -197,7 +266,7 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
-    rate = np.r_[1j * system.frequency, eigenvalue]
+    rate = np.concatenate([1j * system.frequency, eigenvalue])
     # constant part, of loads and of displacements that constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
     rest, rest_held = still @ weight, -still @ stiffness @ held
@@ -234,18 +303,16 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
 
     force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
     force_constant[len(state) + contacts.slides] = contacts.known
-    speeds = motion * rate
-    damped = system.damping @ speeds
     return {
-        "key": state, "modes": len(rate), "eigenvalue": rate, "project": after_harmonics(free),
+        "key": state, "modes": len(rate), "eigenvalue": rate, "inverse": 1 / rate, "size": np.abs(rate),
+        "project": after_harmonics(free),
         "offset": after_harmonics(project[:, :k] @ rest), "in_phase": after_harmonics(project @ full.real),
         "in_quadrature": after_harmonics(-(project @ full.imag)),
-        "motion": motion, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
+        "motion": motion, "velocity": motion * rate, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
         "bend": bend / root, "bend_held": bend_held / root[:, None] * root,
         "force": contacts.spread(carried @ net, -spring @ strained - dashpot @ (strained * rate)),
         "force_constant": force_constant,
         "force_held": contacts.spread(carried @ net_held * root, -spring @ (held + inner.T @ rest_held) * root),
-        "drag": damped, "loss": speeds.T @ damped, "loss_apart": speeds.T @ damped.conj(),
         "growth": max(eigenvalue.real.max(initial=0.0), 0.0), "fastest": (np.abs(rate.real) + np.abs(rate.imag)).max(),
     } | contacts.projectors()  # fmt: skip
 

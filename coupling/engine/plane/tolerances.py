@@ -66,7 +66,5 @@ APART, REFINED = 30.0, 1e-6
 # --- searches
 #: derivative of an event function, times its bound, below which its sign is unknown
 FLAT = 1e-9
-#: size of the last step to a peak, times the piece: the height is wrong by its square
-PEAK = 1e-9
 #: distance of a sampling time before a segment's start, times the sampling step, that is round-off
 SAMPLE = 1e-9

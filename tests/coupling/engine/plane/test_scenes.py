@@ -53,10 +53,11 @@ def test_means_of_an_independent_program(ratio):
     for response in responses:
         assert response.status in (Status.OK, Status.NOT_STEADY)
         assert response.energy_residual < 1e-11
-        # from wall to wall
-        assert 0.95 * 0.5 * X / 4.8e-3 < response.tilt_max[0] <= 0.5 * X / 4.8e-3 * (1 + 1e-9)
     # one start in forty comes to lie flat on its way, whichever the processor chooses: six of eight at least do not
     assert sorted(response.lift_share[0] for response in responses)[2] > 0.98
+    tilts, wall_to_wall = sorted(response.tilt_max[0] for response in responses), 0.5 * X / 4.8e-3
+    assert tilts[2] > 0.95 * wall_to_wall
+    assert tilts[-1] <= wall_to_wall * (1 + 1e-9)
 
 
 def in_the_air(turn):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.engine.line.tolerances import SLOW
 from vanedamp.coupling.numerics.codes import (
     CALM,
     DIFFERENCE,
@@ -16,6 +15,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.elimination import reciprocal
+from vanedamp.coupling.numerics.tolerances import SLOW
 
 
 @kernel

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.line.tolerances import PEAK
+import numpy as np
+
 from vanedamp.coupling.numerics.codes import ACTIVE
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound, whole_vectors
+from vanedamp.coupling.numerics.tolerances import PEAK
 
 #: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are stored
 GRIDS = 5
 
 
+def grid_factors(rate: np.ndarray, period: float) -> np.ndarray:
+    """Return the factors (GRIDS, m) of modes with these eigenvalues over a step of each grid."""
+    factors: np.ndarray = np.exp(np.outer(0.125 * period * 0.5 ** np.arange(GRIDS), rate))
+    return factors
+
+
 @inlined
-def highest(system, flows, st, scratch, s, tau, constant, peak, side):
+def highest(system, flows, st, scratch, s, tau, constant, grows, peak, side):
     """Return the largest |response| on [0, tau] and before; side 1: of the response, -1: of its negative.
+
+    grows: factor by which a mode may grow within tau, 1 for those that decay.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
@@ -25,7 +35,7 @@ def highest(system, flows, st, scratch, s, tau, constant, peak, side):
     x0, v0, x1, v1, size, fourth = _ends(
         flows.response[s], flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count
     )
-    x0, x1, size = constant + x0, constant + x1, abs(constant) + size
+    x0, x1, size, fourth = constant + x0, constant + x1, abs(constant) + size * grows, fourth * grows
     e = flows.driven.shape[1] - 1
     if flows.driven[s, e] > e:
         more = _set_drive(
