@@ -150,9 +150,7 @@ def groups(base: Scene, points: Sequence[Mapping[str, Any]], linked: bool) -> It
         paths = [path for path in paths if not any(part in path for part in _OF_STARTS)]
 
     def key(place: int) -> tuple[Any, ...]:
-        return tuple(
-            pattern(path, value) if path in paths else value for path, value in points[place].items()
-        )
+        return tuple(pattern(path, value) if path in paths else value for path, value in points[place].items())
 
     if not paths:
         yield from (([], [place]) for place in range(len(points)))

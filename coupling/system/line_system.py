@@ -135,4 +135,3 @@ def rows_of_units(system: System) -> np.ndarray:
 def _body_of(moved: np.ndarray) -> np.ndarray:
     """Return which body (k,) widens each gap as it moves on, of rows (k, b) of the bodies; -1: none."""
     return np.where((moved > 0.0).any(axis=1), (moved > 0.0).argmax(axis=1) if moved.shape[1] else -1, -1)
-

@@ -163,9 +163,7 @@ def _set_level(scene: Scene, found: Columns, level: np.ndarray) -> None:
     found.load[:, :, : shapes.shape[1]] = shapes * -1j * level[:, None, None]
 
 
-def _set_restitution(
-    scene: Scene, whole: System, system: LineSystem, found: Columns, restitution: np.ndarray
-) -> None:
+def _set_restitution(scene: Scene, whole: System, system: LineSystem, found: Columns, restitution: np.ndarray) -> None:
     """Set the restitutions of the rows from those of the bodies (k, b)."""
     for row in _rows(whole, system, np.ones(whole.bodies, bool)):
         unit = row - system.friction_rows
