@@ -287,7 +287,8 @@ def _round_off(
     felt = np.abs(np.vstack([functional, system.response[:n], carrier])).max(axis=0)
     size = np.ones((2, n + b))
     size[:, :n] = 1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny))
-    size, vectors, inverse = size.ravel(), shape.reshape(2 * (n + b), -1), project.reshape(-1, 2 * (n + b))
+    m = len(project)
+    size, vectors, inverse = size.ravel(), shape.reshape(2 * (n + b), m), project.reshape(m, 2 * (n + b))
     parts = np.abs(vectors.real) @ np.abs(inverse.real) + np.abs(vectors.imag) @ np.abs(inverse.imag)
     # the search for events uses only the modulus of an amplitude
     whole = np.abs(vectors) @ np.abs(inverse)

@@ -12,11 +12,11 @@ import pytest
 
 from tests.tools.processes import environment
 from tests.tools.sweep_processes import RESONANCE, command, kill_after_a_flush, scene, write
-from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep import worker as module
+from vanedamp.coupling.sweep import schedule
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.sweep.worker import run_points
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.store import StoreError, Variable, save
 from vanedamp.files.toml_input import InputError
@@ -39,7 +39,12 @@ def killed_after(count):
 def runs(monkeypatch):
     """The points that are run from now on."""
     made = []
-    monkeypatch.setattr(module, "simulate", lambda point, start: made.append(point) or simulate(point, start=start))
+
+    def counted(base, choices, points, task):
+        made.extend(points)
+        return run_points(base, choices, points, task)
+
+    monkeypatch.setattr(schedule, "run_points", counted)
     return made
 
 
@@ -123,6 +128,7 @@ import resource, sys
 from tests.tools.processes import environment
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.sweep.worker import run_points
 from vanedamp.files.store import StoreError
 
 def progress(done, total):
