@@ -110,7 +110,7 @@ class Kind:
 _LAST: dict[bytes, Kind] = {}
 
 
-def kind_of(maker: Points, point: Mapping[str, Any], paths: Sequence[str]) -> Kind | None:
+def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind | None:
     """Return the kind of a point's scene; None where it has to be run by itself. The last one is kept."""
     slow = {path: value for path, value in point.items() if path not in paths}
     structure = maker.base.structure
@@ -120,7 +120,8 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: Sequence[str]) -> Ki
         _LAST.clear()
         try:
             chosen = maker.chosen(point)
-            if chosen.start is not None or chosen.scene.time.steady is not None:
+            open_ended = chosen.start is not None or chosen.scene.time.steady is not None
+            if open_ended or columned(chosen.scene, paths) != paths:  # other values may be in the way of a column
                 return None
             _LAST[key] = Kind(chosen.scene)
         except (InputError, ValueError):  # its own run says what is wrong

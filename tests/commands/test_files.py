@@ -259,7 +259,7 @@ def test_files_without_permission(folder):
         ("gmsh", ["mesh", "case.toml", "-o", "block.msh"], "pip install gmsh"),
         ("meshio", ["modal", "case.toml", "--vtk", "modes.vtu"], "pip install meshio"),
         ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
-        ("h5py", ["run", "scene.toml"], "pip install h5py"),
+        ("h5py", ["run", "scene.toml", "-o", "response.h5"], "pip install h5py"),
     ],
 )
 def test_missing_packages(package, arguments, remedy, folder):

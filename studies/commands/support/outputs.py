@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import itertools
 import os
 import stat
@@ -73,6 +74,8 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
         if path.suffix not in endings and path != beside:
             expected = " or ".join(filter(None, endings))
             raise InputError(f"{option} {path}: expected a file name ending in {expected}")
+    if any(path.suffix == ".h5" for _, path in outputs.files):
+        importlib.import_module("h5py")  # loaded when a file is written: whoever lacks it is told before the work
     return outputs
 
 

@@ -102,3 +102,14 @@ def test_a_worker_keeps_the_last_kind(monkeypatch):
     again = run_points(validate(Scene, _ONE, "scene"), NOTHING, _POINTS["frequencies"][1], Task(range(12)))
     assert len(made) == 1
     np.testing.assert_array_equal(first.values, again.values)
+
+
+def test_values_in_the_way_of_a_column_leave_points_to_themselves(monkeypatch):
+    scene = validate(Scene, _ONE, "scene")
+    points = [{"gravity.orientation_deg": a, "excitation.force": f} for a in (0.0, 40.0) for f in (1.0, 2.0)]
+    found, one_by_one = (
+        run_points(scene, NOTHING, points, Task(range(4))),
+        _alone(monkeypatch, scene, points, Task(range(4))),
+    )
+    np.testing.assert_array_equal(found.values, one_by_one.values)
+    assert found.texts == one_by_one.texts
