@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import itertools
 import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, pattern
+from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
 from vanedamp.coupling.engine.line.event_driven import EngineRun
 from vanedamp.coupling.engine.line.scenes import BEGINS, PLACE, STAGE, Job, new_job
 from vanedamp.coupling.methods.registry import run_of
@@ -24,7 +24,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.transient import Transient, most_periods
 from vanedamp.files.store import file_stamp
@@ -115,7 +115,8 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
     slow = {path: value for path, value in point.items() if path not in paths}
     structure = maker.base.structure
     stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
-    key = pickle.dumps((maker.base, maker.choices, slow, paths, stamp, [pattern(path, point[path]) for path in paths]))
+    above = [point[path] > 0.0 for path in paths if tells(path)]
+    key = pickle.dumps((maker.base, maker.choices, slow, paths, stamp, above))
     if key not in _LAST:
         _LAST.clear()
         try:
@@ -129,36 +130,35 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
     return _LAST[key]
 
 
-def are_scenes(maker: Points, points: Sequence[Mapping[str, Any]], paths: Sequence[str]) -> bool:
-    """Return whether the ends of all numbers are those of scenes. Between them others are, too: bounds are linear.
+def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np.ndarray]) -> bool:
+    """Return whether the ends of all numbers (k,) are those of scenes. Between them others are, too: bounds are linear.
 
     What bounds numbers by others, places by gaps, compiled code sees in the start.
     """
     try:
-        for path in paths:
-            numbers = [point[path] for point in points]
-            for end in (min(numbers), max(numbers)):
-                maker.raw({**points[0], path: end})
-    except (InputError, TypeError):
+        for path, values in numbers.items():
+            for end in (values.min(), values.max()):
+                maker.raw({**first, path: float(end)})
+    except InputError:
         return False
     return True
 
 
-def groups(base: Scene, points: Sequence[Mapping[str, Any]], linked: bool) -> Iterator[tuple[list[str], list[int]]]:
+def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list[str], list[int]]]:
     """Yield the paths with columns, and the places of points that differ only in these; linked ones in turn."""
-    paths = columned(base, points[0]) if points else []
+    kept = points.columns
+    paths = [path for path in columned(base, kept) if all(isinstance(value, int | float) for value in kept[path])]
     if linked:
         paths = [path for path in paths if not any(part in path for part in _OF_STARTS)]
-
-    def key(place: int) -> tuple[Any, ...]:
-        return tuple(pattern(path, value) if path in paths else value for path, value in points[place].items())
-
+    telling = [values for path, values in kept.items() if path not in paths]
+    telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
+    keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)
     if not paths:
         yield from (([], [place]) for place in range(len(points)))
     elif linked:
-        yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), key))
+        yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), keys.__getitem__))
     else:
         found: dict[tuple[Any, ...], list[int]] = {}
         for place in range(len(points)):
-            found.setdefault(key(place), []).append(place)
+            found.setdefault(keys[place], []).append(place)
         yield from ((paths, some) for some in found.values())

@@ -57,6 +57,33 @@ class Points:
             raise InputError(f"sweep: at {point}: {str(error).removeprefix('scene: ')}") from None
 
 
+class PointTable(Sequence[dict[str, Any]]):
+    """Values of points by paths, in a column for each path: in place of mappings, of which a task has ten thousands."""
+
+    def __init__(self, columns: Mapping[str, Sequence[Any]]) -> None:
+        """Take columns (k,) by path."""
+        self.columns: dict[str, Any] = {
+            path: np.array(values) if all(type(value) is float for value in values) else list(values)
+            for path, values in columns.items()
+        }
+
+    @classmethod
+    def of(cls, points: Sequence[Mapping[str, Any]]) -> PointTable:
+        """Return the table of points that name the same paths."""
+        if isinstance(points, PointTable):
+            return points
+        return cls({path: [point[path] for point in points] for path in (points[0] if points else ())})
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def __getitem__(self, place: Any) -> Any:
+        """Return the values of a point by their paths."""
+        found = ((path, values[place]) for path, values in self.columns.items())
+        return {path: float(value) if isinstance(value, np.floating) else value for path, value in found}
+
+
 class Chain(NamedTuple):
     """Points in the order in which they run; each begins with the state of the one before if they are `linked`."""
 
@@ -105,6 +132,12 @@ class Grid:
             found[path] = self.axes[path][place]
         return found
 
+    def table(self, points: Sequence[int]) -> PointTable:
+        """Return the values of the axes at some points."""
+        places = np.unravel_index(np.asarray(points, np.int64), self.shape)
+        axes = zip(self.axes.items(), places, strict=True)
+        return PointTable({path: [values[place] for place in own.tolist()] for (path, values), own in axes})
+
     def chains(self) -> Iterator[Chain]:
         """Yield all points, in chains that can run side by side."""
         if self.along is None:
@@ -129,6 +162,10 @@ class PointList:
     def values(self, index: int) -> Mapping[str, Any]:
         """Return the values that a point changes in the base."""
         return self._points[index]
+
+    def table(self, points: Sequence[int]) -> PointTable:
+        """Return the values that some points change in the base."""
+        return PointTable.of([self._points[point] for point in points])
 
     def chains(self) -> Iterator[Chain]:
         """Yield all points as one chain."""

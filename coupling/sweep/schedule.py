@@ -92,7 +92,7 @@ def _workers(executor: Executor | None) -> int:
 
 
 def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Future[TaskResult]:
-    points = [grid.values(point) for point in task.points]
+    points = grid.table(task.points)
     if executor is None:
         future: Future[TaskResult] = Future()
         future.set_result(run_points(grid.base, grid.choices, points, task))

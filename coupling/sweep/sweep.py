@@ -34,7 +34,7 @@ from vanedamp.coupling.sweep.worker import (
 )
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
-from vanedamp.files.store import frozen
+from vanedamp.files.store import frozen, read_only
 from vanedamp.files.toml_input import InputError, validate
 
 #: takes the number of points of a list that are done
@@ -99,7 +99,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
         energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
-        **{name: frozen(columns[name]) for name in MEASURES},
+        **{name: read_only(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
         peaks=linear_tops(grid),

@@ -19,7 +19,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
-from vanedamp.coupling.sweep.grid import Grid, PointList, Points
+from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import StoreError
@@ -74,7 +74,7 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
     point.
     """
     started = time.perf_counter()
-    maker, state = Points(base, choices), task.start if task.linked else None
+    points, maker, state = PointTable.of(points), Points(base, choices), task.start if task.linked else None
     values = np.full((len(points), width_of(base)), np.nan)
     texts = [("", "")] * len(points)
     for paths, places in groups(base, points, task.linked):
@@ -84,15 +84,15 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
             final, texts[place] = _run(maker, points[place], start, values[place])
             return final
 
-        some = [points[place] for place in places]
-        kind = kind_of(maker, some[0], paths) if len(some) > 1 and are_scenes(maker, some, paths) else None
+        numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
+        first, several = points[places[0]], len(places) > 1 and bool(paths)
+        kind = kind_of(maker, first, paths) if several and are_scenes(maker, first, numbers) else None
         if kind is None:
             for place in range(len(places)):
                 final = alone(place, state)
                 # a run that broke off within a period leaves the state that it began with
                 state = final if task.linked and final is not None else state
             continue
-        numbers = {path: np.array([point[path] for point in some], float) for path in paths}
         job, linear, state = kind.run_all(numbers, state, task.linked, alone)
         ran = np.flatnonzero(job.codes)
         at = np.array(places)[ran]
@@ -137,7 +137,7 @@ class SweepTable:
     """
 
     def __init__(self, size: int, width: int = len(COLUMNS)) -> None:
-        self.values = np.full((size, width), np.nan)
+        self.values = np.full((size, width), np.nan, order="F")  # a result takes its columns as they are
         self.codes = np.zeros((size, len(TEXTS)), np.int32)
         self.done = np.zeros(size, bool)
         self.states: dict[int, RestartState] = {}

@@ -97,9 +97,9 @@ def _pulled(scene: Scene) -> bool:
     return bool(scene.speed) or scene.gravity.orientation_deg != 0.0 or scene.gravity.direction is not None
 
 
-def pattern(path: str, value: float) -> bool:
-    """Return what a number with a column changes beyond it: a body without friction has other linear modes."""
-    return path.endswith(".friction") and value > 0.0
+def tells(path: str) -> bool:
+    """Return whether more than its column tells a number above zero from zero: friction has other linear modes."""
+    return path.endswith(".friction")
 
 
 def columns(
