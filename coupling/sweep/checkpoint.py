@@ -35,22 +35,26 @@ class Checkpoint(SceneCheckpoint):
     def content(self) -> tuple[dict[str, Variable], dict[str, Any], str]:
         """Return variables of the file, and how many points are finished, in words."""
         finished, done = self.finished, np.flatnonzero(self.finished.done)
+        # a copy of most of a million points would take as much memory as all of them
+        kept = slice(None) if 2 * len(done) > len(finished.done) else done
         states = {str(number): state.to_list() for number, state in finished.states.items()}
         texts = np.array([json.dumps(finished.texts), json.dumps(states)], object)
         variables = {
             "point": Variable(done, ("point",)),
-            "values": Variable(finished.values[done], ("point", "column")),
-            "codes": Variable(finished.codes[done], ("point", "text")),
+            "values": Variable(finished.values.T[:, kept], ("column", "kept")),
+            "codes": Variable(finished.codes[kept], ("kept", "text")),
             "texts_and_states": Variable(texts, ("entry",)),
         }
         return variables, {}, f"{finished.count} of {len(finished.done)} points are finished"
 
     def _take(self, path: str, variables: Mapping[str, Any]) -> None:
-        if variables["values"].shape[1] != self.finished.values.shape[1]:
+        values, codes, done = (variables[name] for name in ("values", "codes", "point"))
+        if len(values) != self.finished.values.shape[1]:
             raise InputError(
                 f"{path}: the checkpoint of another version of the software, which kept other measures; nothing was "
                 "done to it: move it away, or delete it to start again"
             )
         texts, states = (json.loads(entry) for entry in variables["texts_and_states"])
-        self.finished.put(variables["point"], variables["values"], variables["codes"], texts)
+        kept = done if values.shape[1] > len(done) else slice(None)
+        self.finished.put(done, values[:, kept].T, codes[kept], texts)
         self.finished.states = {int(number): RestartState.from_list(state) for number, state in states.items()}

@@ -28,6 +28,8 @@ _RATE = 100
 #: tasks of each worker that the points still to be run make at least, so that workers end together; more are dearer to
 #: hand out than they save at the end (`vanedamp bench sweep` simulates it)
 _PER_WORKER = 4
+#: points of a task at most: their values and results wait in the main process
+_MOST = 20_000
 #: workers of an executor that does not tell how many it has
 _UNKNOWN = 256
 
@@ -78,7 +80,7 @@ class TaskSize:
 
     def learn(self, points: int, seconds: float) -> None:
         """Take the time that some points took. A task grows at most fourfold: the first points may be quick ones."""
-        self._most = max(1, min(4 * points, int(points * self._seconds / max(seconds, 1e-9))))
+        self._most = max(1, min(4 * points, int(points * self._seconds / max(seconds, 1e-9)), _MOST))
 
 
 def _workers(executor: Executor | None) -> int:

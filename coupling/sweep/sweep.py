@@ -98,7 +98,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     return Sweep(
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
-        energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
+        energy_share=read_only(finished.values[:, len(MEASURES) : len(COLUMNS)].reshape(*grid.shape, len(LOSSES))),
         **{name: read_only(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
