@@ -30,6 +30,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed, record_with, room
+from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.response.figures import FIGURES, Measured, measure
 from vanedamp.coupling.response.steadiness import judged, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
@@ -37,8 +38,6 @@ from vanedamp.coupling.system.transient import Setup, begin_transient, run_lengt
 
 #: slices of a run (line.automaton) after which Python sees interrupts
 _SLICES = 64
-#: gap, over the free travel, down to which a contact is closed at the start
-_CLOSED = 1e-12
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
 # those left out and the longest run; the code that ends it; slices since Python has seen it; whether a scene begins
@@ -195,7 +194,7 @@ def _is_outside(system, st, columns, k, linked):
             if k == 0 or (not rigid(system, r) and columns.free_travel[k, r] == columns.free_travel[k - 1, r]):
                 continue
             if system.left_body[r] >= 0 or system.right_body[r] >= 0:
-                least = -_CLOSED * system.free_travel[r]
+                least = -SIMULTANEOUS * system.free_travel[r]
         if st.displacement[r] < least:
             return True
     return False
