@@ -239,10 +239,12 @@ def _check_speeds(points: Points, axes: Mapping[str, Sequence[Any]]) -> None:
 def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
     """Return scenes that decide whether all points are scenes. Raises InputError for a point that is none.
 
-    What has a column (engine.line.columns) has bounds that are linear in all such numbers: where the corners of the
-    grid are scenes, so is what lies between. A frequency is good or bad whatever the other values are.
+    The frequency, and what has a column (engine.line.columns), has bounds that are linear in all such numbers: where
+    the corners of the grid are scenes, so is what lies between.
     """
-    known = [path for path in columned(points.base, axes) if _ordered(axes[path])]
+    known = {path for path in columned(points.base, axes) if _ordered(axes[path])}
+    if points.base.excitation.waveform is None and _ordered(axes.get(FREQUENCY, ("",))):
+        known.add(FREQUENCY)
     ends = dict(axes) | {path: (min(axes[path]), max(axes[path])) for path in known}
     with suppress(InputError):  # raised below, at the first point that is no scene
         return [points.raw(dict(zip(axes, values, strict=True))) for values in itertools.product(*ends.values())]
