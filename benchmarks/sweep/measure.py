@@ -172,7 +172,7 @@ QUICK = SweepScaling((200, 300), 1, ((400, 20),), (100, 300), 40, 20, (1, 2, 100
 
 
 def _seconds(job: Job) -> float:
-    return 4.0 + job.points * (1.2e-3 + 5e-6 * job.periods) / job.workers
+    return 4.0 + job.points * (1e-5 + 1.6e-6 * job.periods) / job.workers
 
 
 def _name(job: Job) -> str:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import pickle
+import threading
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -106,8 +108,14 @@ class Kind:
         return np.transpose(found)
 
 
-#: the kind that ran last, and what it was made of
-_LAST: dict[bytes, Kind] = {}
+class _Last(threading.local):
+    """The kind that ran last in a thread, and what it was made of."""
+
+    key = b""
+    kind: Kind | None = None
+
+
+_LAST = _Last()
 
 
 def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind | None:
@@ -117,17 +125,14 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
     stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
     above = [point[path] > 0.0 for path in paths if tells(path)]
     key = pickle.dumps((maker.base, maker.choices, slow, paths, stamp, above))
-    if key not in _LAST:
-        _LAST.clear()
-        try:
+    if key != _LAST.key:
+        _LAST.key, _LAST.kind = key, None
+        with suppress(InputError, ValueError):  # its own run says what is wrong
             chosen = maker.chosen(point)
-            open_ended = chosen.start is not None or chosen.scene.time.steady is not None
-            if open_ended or columned(chosen.scene, paths) != paths:  # other values may be in the way of a column
-                return None
-            _LAST[key] = Kind(chosen.scene)
-        except (InputError, ValueError):  # its own run says what is wrong
-            return None
-    return _LAST[key]
+            settled = chosen.start is None and chosen.scene.time.steady is None
+            if settled and columned(chosen.scene, paths) == paths:  # other values may be in the way of a column
+                _LAST.kind = Kind(chosen.scene)
+    return _LAST.kind
 
 
 def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np.ndarray]) -> bool:

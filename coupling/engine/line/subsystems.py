@@ -6,6 +6,7 @@ others move freely. Each subsystem is found once, by numpy; line.flow_assembly s
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from typing import Annotated, Any, NamedTuple
 
@@ -121,17 +122,25 @@ class Known:
 _DECIDING = ("mass", "stiffness", "damping", "response", "floor", "J", "spring", "dashpot")
 #: structures whose subsystems are kept
 _KEPT = 8
-_OF_STRUCTURES: OrderedDict[tuple[bytes, ...], Known] = OrderedDict()
+
+
+class _Structures(threading.local):
+    """The latest structures of a thread, and the subsystems that its runs have met."""
+
+    def __init__(self) -> None:
+        self.known: OrderedDict[tuple[bytes, ...], Known] = OrderedDict()
+
+
+_STRUCTURES = _Structures()
 
 
 def known_of(system: LineSystem) -> Known:
-    """Return the subsystems of a system's structure: those that any run with it has met, of the latest structures."""
-    key = tuple(getattr(system, name).tobytes() for name in _DECIDING)
-    known = _OF_STRUCTURES.pop(key, None) or Known(system)
-    _OF_STRUCTURES[key] = known
-    while len(_OF_STRUCTURES) > _KEPT:
-        _OF_STRUCTURES.popitem(last=False)
-    return known
+    """Return the subsystems of a system's structure: those that any run with it has met in this thread."""
+    key, kept = tuple(getattr(system, name).tobytes() for name in _DECIDING), _STRUCTURES.known
+    kept[key] = kept.pop(key) if key in kept else Known(system)
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)
+    return kept[key]
 
 
 def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
 from vanedamp.coupling.model_order.choices import NOTHING
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep import alike, worker
+from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import Task, run_points
 from vanedamp.files.toml_input import validate
 
@@ -97,7 +100,7 @@ def test_a_worker_keeps_the_last_kind(monkeypatch):
     scene, made = validate(Scene, _ONE, "scene"), []
     kind = alike.Kind
     monkeypatch.setattr(alike, "Kind", lambda scene: made.append(1) or kind(scene))
-    alike._LAST.clear()
+    alike._LAST.key = b""
     first = run_points(scene, NOTHING, _POINTS["frequencies"][1], Task(range(12)))
     again = run_points(validate(Scene, _ONE, "scene"), NOTHING, _POINTS["frequencies"][1], Task(range(12)))
     assert len(made) == 1
@@ -113,3 +116,14 @@ def test_values_in_the_way_of_a_column_leave_points_to_themselves(monkeypatch):
     )
     np.testing.assert_array_equal(found.values, one_by_one.values)
     assert found.texts == one_by_one.texts
+
+
+def test_threads_do_not_share_what_they_keep():
+    """Many threads sweep the same scene at once: each point is what it is by itself."""
+    tables = _ONE | {"sweep": {"excitation.frequency": {"start": 15.0, "stop": 16.5, "num": 200}}}
+    scene = validate(Scene, tables, "scene")
+    with ThreadPoolExecutor(4) as threads:
+        found = sweep(scene, threads)
+    alone = sweep(scene)
+    assert (found.status == alone.status).all()
+    np.testing.assert_array_equal(found.amplitude_mean, alone.amplitude_mean)

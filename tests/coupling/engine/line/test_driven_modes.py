@@ -194,7 +194,7 @@ def test_driven_or_not_is_the_same(name, monkeypatch, driven, tmp_path):
     assert any(driven)
     driven.clear()
     monkeypatch.setattr(subsystems, "DRIVEN", 0.0)
-    monkeypatch.setattr(subsystems, "_OF_STRUCTURES", OrderedDict())  # kept with the other bound
+    monkeypatch.setattr(subsystems._STRUCTURES, "known", OrderedDict())  # kept with the other bound
     two = simulate(case, events=True, samples_per_period=16)
     assert not any(driven)
     assert len(one.event_list) == len(two.event_list) > 10
