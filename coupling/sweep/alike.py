@@ -47,6 +47,7 @@ class Kind:
         run = run_of(scene)
         if not isinstance(run, EngineRun):
             raise ValueError("not a scene of the engine for sliders")
+        run.check()
         self.scene, self.run, self.start = scene, run, start_of(scene, run.whole)
         transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)
         (setup, free, stuck), (loose, held) = transient.numbers, transient.parts

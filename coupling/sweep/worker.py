@@ -6,6 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import StoreError
+from vanedamp.files.toml_input import InputError
 
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
@@ -87,13 +89,17 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
         numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
         first, several = points[places[0]], len(places) > 1 and bool(paths)
         kind = kind_of(maker, first, paths) if several and are_scenes(maker, first, numbers) else None
-        if kind is None:
+        found = None
+        if kind is not None:
+            with suppress(InputError):  # a start that does not fit: the runs say so
+                found = kind.run_all(numbers, state, task.linked, alone)
+        if found is None:
             for place in range(len(places)):
                 final = alone(place, state)
                 # a run that broke off within a period leaves the state that it began with
                 state = final if task.linked and final is not None else state
             continue
-        job, linear, state = kind.run_all(numbers, state, task.linked, alone)
+        job, linear, state = found
         ran = np.flatnonzero(job.codes)
         at = np.array(places)[ran]
         values[at] = _rows(job.figures[ran], linear[ran])

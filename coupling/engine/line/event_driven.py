@@ -96,17 +96,19 @@ class EngineRun(EventDrivenRun):
             self.flows, self._stack_begun = earlier.flows, earlier._stack_begun
 
     def begin(self, max_events: int) -> int:
-        """Decide the initial state and record it. Return the code of numerics.codes.
+        """Decide the initial state and record it. Return the code of numerics.codes. Raises InputError as `check`."""
+        self.begun = True
+        self.check()
+        return self.advance(0, max_events)
 
-        Raises InputError for a structure that is critically damped without any contact.
-        """
-        self.begun, modes = True, self.system.of_structure
+    def check(self) -> None:
+        """Raise InputError for a structure that is critically damped without any contact."""
+        modes = self.system.of_structure
         if not self.known:
             try:
                 complex_modes(np.sqrt(modes.stiffness), modes.damping)
             except IllConditioned as error:
                 raise InputError(f"structure: {error}; change its damping slightly") from None
-        return self.advance(0, max_events)
 
     def _advance(self, periods: int, max_events: int) -> int:
         if self._stack_begun != self.known.begun:  # by another run

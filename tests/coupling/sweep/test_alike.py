@@ -118,6 +118,14 @@ def test_values_in_the_way_of_a_column_leave_points_to_themselves(monkeypatch):
     assert found.texts == one_by_one.texts
 
 
+def test_a_critically_damped_structure_is_refused_as_by_itself(monkeypatch):
+    tables = _ONE | {"structure": _ONE["structure"] | {"damping_ratio": 1.0}}
+    scene, points, task = validate(Scene, tables, "scene"), _POINTS["frequencies"][1], Task(range(12))
+    found, one_by_one = run_points(scene, NOTHING, points, task), _alone(monkeypatch, scene, points, task)
+    assert found.texts == one_by_one.texts
+    assert found.texts[0][0].startswith("error: InputError: structure: a mode is critically damped")
+
+
 def test_threads_do_not_share_what_they_keep():
     """Many threads sweep the same scene at once: each point is what it is by itself."""
     tables = _ONE | {"sweep": {"excitation.frequency": {"start": 15.0, "stop": 16.5, "num": 200}}}
