@@ -99,9 +99,9 @@ def run(
             used = st.counters[PERIOD]
             _set_start(system, st, watched, columns, k)
             if at[COUNT] > 0:
+                _clear(rec, used)
                 if _is_outside(system, st, columns, k, at[LINKED]):
                     return OUTSIDE
-                _clear(rec, used)
                 begin_transient(setup, loose, held, free, stuck)
                 at[DROPPED], at[GOAL], at[MOST] = run_length(setup, free, stuck)
                 goal = at[GOAL]

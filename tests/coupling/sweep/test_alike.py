@@ -96,6 +96,19 @@ def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
     assert "position: 0.0031 lies outside" in found.texts[2][0]
 
 
+def test_runs_after_a_refused_point_are_those_by_themselves(monkeypatch):
+    """A place is bounded by a gap: compiled code refuses one point between others, which know nothing of it."""
+    scene, calls = validate(Scene, _ONE, "scene"), []
+    pairs = [(6e-3, 9e-4), (4e-3, -5e-4), (2e-3, 2.5e-3), (3e-3, 2e-4), (2e-3, -2e-3), (5e-3, 1e-3)]
+    points, task = [{"cavity.c.gap": gap, "damper.0.position": x} for gap, x in pairs], Task(range(6))
+    one_by_one, run = _alone(monkeypatch, scene, points, task), worker._run
+    monkeypatch.setattr(worker, "_run", lambda *args: calls.append(args[1]) or run(*args))
+    found = run_points(scene, NOTHING, points, task)
+    np.testing.assert_array_equal(found.values, one_by_one.values)
+    assert found.texts == one_by_one.texts
+    assert calls == [points[2], points[4]]
+
+
 def test_a_worker_keeps_the_last_kind(monkeypatch):
     scene, made = validate(Scene, _ONE, "scene"), []
     kind = alike.Kind
