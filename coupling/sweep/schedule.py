@@ -29,7 +29,7 @@ _RATE = 100
 #: hand out than they save at the end (`vanedamp bench sweep` simulates it)
 _PER_WORKER = 4
 #: points of a task at most: their values and results wait in the main process
-_MOST = 20_000
+_MOST = 10_000
 #: workers of an executor that does not tell how many it has
 _UNKNOWN = 256
 
