@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vanedamp.studies.optimisation.study import Study
 
 #: s of a run, in addition to its periods: alone, and of a sweep whose points run as one (coupling.sweep.alike)
-RUN, TOGETHER = 1.5e-3, 1e-4
+RUN, TOGETHER = 1.5e-3, 1e-5
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
