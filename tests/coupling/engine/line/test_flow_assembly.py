@@ -140,7 +140,7 @@ def test_newtons_law(places):
         close(place.functional("motion"), system.J @ q, np.abs(system.J) @ np.abs(q))
         close(place.functional("velocity"), place.functional("motion") @ G, np.abs(q @ G))
         key, rigid = place.active_set, np.isinf(system.spring)
-        assert not place.functional("motion")[key & rigid].any()
+        close(place.functional("motion")[key & rigid], 0.0, np.abs(system.J[key & rigid]) @ np.abs(q), 1e-12)
         assert not force[~key].any()
         soft = key & ~rigid
         stretch = system.J[soft] @ q
@@ -201,7 +201,8 @@ def test_quadratic_forms_are_antiderivatives_of_powers(places):
             (place.square, place.slow_square, x.sum().real ** 2 - x[calm].sum().real ** 2),
         ):
             rate, terms = power_of(form, place, c)
-            close(rate + of_pairs(place, parts, c), power, terms + abs(power))
+            # the form of a calm mode is divided by its small rate, and then multiplied by it
+            close(rate + of_pairs(place, parts, c), power, terms + abs(power), 1e-9)
 
 
 def mapped(place, first, c):

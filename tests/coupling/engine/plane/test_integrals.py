@@ -70,16 +70,21 @@ def by_quadrature(run, periods):
     return total
 
 
-@pytest.mark.parametrize(("stiffness", "dashpot"), [(0.2, 0.01), (2e-8, 0.0)], ids=["sprung", "slow mode"])
-def test_closed_forms_are_what_quadrature_finds(tmp_path, stiffness, dashpot):
-    """Of modes as good as equal, and of one that hardly moves within a period."""
+@pytest.mark.parametrize(
+    ("stiffness", "dashpot", "bound"), [(0.2, 0.01, 1e-11), (2e-8, 0.0, 1e-8)], ids=["sprung", "slow mode"]
+)
+def test_closed_forms_are_what_quadrature_finds(tmp_path, stiffness, dashpot, bound):
+    """Of modes as good as equal, and of one that hardly moves within a period.
+
+    The slow mode's amplitude, speed over frequency, is 1e5 times the motion: so are the last bits of its shape.
+    """
     several = scene(tmp_path, 7, 2, stiffness, dashpot)
     run = run_of(several, events=True)
     expected, records = by_quadrature(run, 2), run.records
     energies = records.ledger[2, [EXCITATION, VISCOUS, FRICTION]]
-    np.testing.assert_allclose(energies, expected[:3].real, rtol=0, atol=1e-11 * np.abs(energies).max())
+    np.testing.assert_allclose(energies, expected[:3].real, rtol=0, atol=bound * np.abs(energies).max())
     for found, wanted in zip((records.momentum, records.harmonic, records.square), expected[3:], strict=True):
-        np.testing.assert_allclose(found.sum(), wanted, rtol=1e-10)
+        np.testing.assert_allclose(found.sum(), wanted, rtol=10 * bound)
 
 
 def test_a_structure_of_many_modes(tmp_path):
