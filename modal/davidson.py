@@ -21,6 +21,8 @@ _ROUNDS = 300
 _AT_ONCE = 4
 # round-off of an entry of a residual, relative to the product on the diagonal
 _ROUND_OFF = 64.0 * np.finfo(float).eps
+# rounds in which an estimate has not halved; then it has converged if it is within so many times its round-off
+_STALE, _NEAR = 10, 64.0
 # relative change of an eigenvalue after which a converged pair is another one
 _SAME = 1e-10
 # directions shorter than this, relative, are round-off
@@ -51,6 +53,7 @@ def lowest_eigenpairs(
     space = _Ritz(stiffness, mass, diagonal.size, max(directions(wanted), len(start)))
     space.extend(start)
     settled, before = np.full(wanted, np.nan), np.empty((0, wanted))
+    least, stale = np.full(wanted, np.inf), np.zeros(wanted, int)
     for _ in range(_ROUNDS):
         values, turns = space.ritz()
         heights = values[:wanted] - floor
@@ -68,7 +71,10 @@ def lowest_eigenpairs(
             # noise that the preconditioner takes for stiff shapes; and its part along the lowest one
             largest = (rows * rows) @ diagonal
             round_off = _ROUND_OFF**2 * largest / heights[some] * (1.0 + largest / heights[0] / diagonal.size)
-            done = (sizes >= 0.0) & (sizes <= np.maximum(limits[some] ** 2, round_off))
+            shrinks = sizes < 0.5 * least[some]
+            least[some], stale[some] = np.where(shrinks, sizes, least[some]), np.where(shrinks, 0, stale[some] + 1)
+            ends = (stale[some] >= _STALE) & (sizes <= _NEAR * round_off)
+            done = (sizes >= 0.0) & (ends | (sizes <= np.maximum(limits[some] ** 2, round_off)))
             settled[some] = np.where(done, values[some], np.nan)
             if not done.all():
                 space.extend(corrections[~done])
