@@ -22,7 +22,7 @@ _AT_ONCE = 4
 # round-off of an entry of a residual, relative to the product on the diagonal
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 # rounds in which an estimate has not halved; then it has converged if it is within so many times its round-off
-_STALE, _NEAR = 10, 64.0
+_STALE, _NEAR = 10, 1e4
 # relative change of an eigenvalue after which a converged pair is another one
 _SAME = 1e-10
 # directions shorter than this, relative, are round-off
