@@ -159,10 +159,6 @@ class PointList:
         self.base, self.size, self._points = base, len(points), points
         self.choices = NOTHING
 
-    def values(self, index: int) -> Mapping[str, Any]:
-        """Return the values that a point changes in the base."""
-        return self._points[index]
-
     def table(self, points: Sequence[int]) -> PointTable:
         """Return the values that some points change in the base."""
         return PointTable.of([self._points[point] for point in points])

@@ -182,7 +182,7 @@ class Curve:
         for some in (first, sorted(set(range(self.size)) - set(first))):
             for start in range(0, len(some), together):
                 task = Task(some[start : start + together])
-                values = [self._grid.values(point) for point in task.points]
+                values = self._grid.table(task.points)
                 future = submit(run_points, self._grid.base, self._grid.choices, values, task)
                 self._futures.append(future)
                 future.add_done_callback(partial(self._add, task))
