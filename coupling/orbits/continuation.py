@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.passage import change, forecast
 from vanedamp.coupling.orbits.bifurcations import bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
 from vanedamp.coupling.orbits.newton import (
@@ -22,7 +23,6 @@ from vanedamp.coupling.orbits.newton import (
     with_symmetry,
 )
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
-from vanedamp.coupling.orbits.passage import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 

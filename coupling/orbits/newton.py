@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import lstsq
 
+from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
-from vanedamp.coupling.orbits.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 

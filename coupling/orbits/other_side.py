@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
+from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import (
     Orbit,
@@ -26,7 +27,6 @@ from vanedamp.coupling.orbits.newton import (
     near,
     point_of,
 )
-from vanedamp.coupling.orbits.passage import Passage
 
 #: note on a body that reaches a wall and has free travel on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"

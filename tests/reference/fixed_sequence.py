@@ -1,6 +1,6 @@
 """A motion in 40 digits that passes given events in a given order, and its derivative by differences of 1e-16.
 
-Nothing is decided and nothing searched: names of events (orbits.event_names) say which function of the state vanishes
+Nothing is decided and nothing searched: names of events say which function of the state vanishes
 next and what changes there. Equations of motion are set up from the scene's numbers, constraints as a whole matrix.
 Structures are rigid, or prescribed (then bodies move relative to them).
 """

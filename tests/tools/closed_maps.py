@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
+from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
 from vanedamp.files.toml_input import InputError
 
 #: state (k,) and parameter -> state, derivative (k, k), crossings, clearance

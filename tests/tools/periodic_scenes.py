@@ -20,7 +20,7 @@ import numpy as np
 
 from tests.tools.planar_laws import crowd, jenkins, tables
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_scene
-from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene

@@ -16,9 +16,9 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.reference.orbit_upright_body import UprightBody
 from tests.tools.closed_form_scenes import ball, scene
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits.newton import OrbitStatus
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
-from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.simulation import simulate

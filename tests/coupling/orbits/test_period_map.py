@@ -9,7 +9,7 @@ import pytest
 from tests.reference.fixed_sequence import FixedSequence
 from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scene
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
-from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError

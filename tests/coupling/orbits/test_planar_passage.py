@@ -10,14 +10,14 @@ from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
 from tests.tools.planar import initial_motion, planar_scene
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
 from vanedamp.coupling.orbits.multipliers import decided
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
-from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
-from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import Walk

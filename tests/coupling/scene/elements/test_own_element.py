@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.law import Element

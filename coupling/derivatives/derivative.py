@@ -1,6 +1,6 @@
 """The derivative of a passage by its start, event by event, from the equations of motion, apart from the engine's.
 
-It is the product, in the order of time, of the propagators of segments (orbits.dynamics) and of the saltation matrices
+It is the product, in the order of time, of the propagators of segments and of the saltation matrices
 of events (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 Systems, 2004, chapter 7). The engine decides everything: times, contact states, impulses. The derivative checks itself:
 at every event the motion that its own flows predict must be the engine's, and coordinates at rest must stay so.
@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.jump import Jump, Untrusted, impact
+from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.orbits.dynamics import Dynamics, Flow, presses
-from vanedamp.coupling.orbits.jump import Jump, Untrusted, impact
-from vanedamp.coupling.orbits.passage import PassageStatus
-from vanedamp.coupling.orbits.start import Start
 from vanedamp.coupling.response.segment import Event, Segment
 
 #: largest difference of the engine's motion and the own flows', relative to a coordinate's size, and that size

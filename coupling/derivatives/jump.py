@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.dynamics import DEPENDENT
+from vanedamp.coupling.derivatives.dynamics import DEPENDENT
 from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.jump import impact
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
-from vanedamp.coupling.orbits.dynamics import Dynamics, Flow, presses
-from vanedamp.coupling.orbits.frame import Frame
-from vanedamp.coupling.orbits.jump import impact
-from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.response.segment import Event, Segment
 from vanedamp.coupling.system.system import FLOOR
 
@@ -35,7 +35,7 @@ class Start:
     def derivative(self, event: Event, segment: Segment, flow: Flow, u: np.ndarray) -> tuple[np.ndarray, PassageStatus]:
         """Return the derivative (2N, k) of u at the start of the first segment, and its defect, if any.
 
-        event: at time zero. Raises Untrusted (orbits.jump).
+        event: at time zero. Raises Untrusted (derivatives.jump).
         """
         dynamics, status = self.dynamics, PassageStatus.OK
         given, M = dynamics.from_state @ self._given, dynamics.from_state @ self._clipped(segment)

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.linalg import expm, null_space
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.minima import least_minimum
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.orbits.frame import Frame
-from vanedamp.coupling.orbits.minima import least_minimum
 from vanedamp.coupling.response.segment import Segment
 
 #: singular values below this are zero: rows that depend on each other
