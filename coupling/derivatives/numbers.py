@@ -124,7 +124,7 @@ def numbers_of(
     data, start = scene.to_dict(), begins or (lambda _, frame: np.zeros(len(frame.to_state)))
     parts = Parts.of(dynamics, start(scene, dynamics.frame))
     here, values, sizes, found = parts.flat(), [], [], []
-    scale = _scales(parts)
+    scale = _scales(parts, dynamics)
     for path in paths:
         value = _number(data, path)
 
@@ -159,11 +159,10 @@ def _number(data: dict[str, object], path: str) -> float:
         raise InputError(f"numbers: {str(error).removeprefix('scene: ')}") from None
 
 
-def _scales(parts: Parts) -> np.ndarray:
+def _scales(parts: Parts, dynamics: Dynamics) -> np.ndarray:
     """Return the size of each entry (n,): the largest of its array, by which its round-off is judged."""
-    return np.concatenate([
-        np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts
-    ])  # fmt: skip
+    sizes = [np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts]
+    return np.concatenate([*sizes[:-1], np.maximum(np.abs(parts.start), dynamics.scale)])
 
 
 def _size(path: str, dynamics: Dynamics) -> float:

@@ -35,17 +35,19 @@ class Watch(Protocol):
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
-    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; half_way: (k,) the
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment;
+    given: as in Start; half_way: (k,) the
     state half a period after the start, None if the engine has not come so far.
     """
 
     def __init__(
         self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
         numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
+        given: bool = False,
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole = dynamics, names, derivative
         self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
-        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns), numbers)
+        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns, given), numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: np.ndarray | None = None
 

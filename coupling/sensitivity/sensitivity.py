@@ -97,13 +97,15 @@ class _Motion:
         self.dynamics = Dynamics(self.frame, self.frame.sizes() if scale is None else scale)
         self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, speed, begins, derived)
 
-    def pass_through(self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures) -> Passage:
-        """Return the passage from a state (k,) that numbers turn by (k, P)."""
+    def pass_through(
+        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None, given: bool
+    ) -> Passage:
+        """Return the passage from a state (k,) that numbers turn by (k, P); given: as in derivatives.start.Start."""
         system = self.frame.system
         start, records = fitted(system, self.frame.restart_of(state)), new_records(system, periods, 0)
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
         names = EventNames(self.scene, system)
-        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turns, measures)
+        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turns, measures, given)
         return walk.passage(run, periods)
 
 
@@ -125,7 +127,7 @@ def _of_run(scene: Scene, paths: tuple[str, ...], options: dict, start: RestartS
     state = begins(scene, moving.frame)
     periods, dropped = scene.time.simulated, scene.time.dropped
     measures = Measures(moving.dynamics, moving.numbers, dropped, **options)
-    passage = moving.pass_through(state, moving.numbers.parts.start.T, periods, measures)
+    passage = moving.pass_through(state, moving.numbers.parts.start.T, periods, measures, True)
     return _result(moving, measures, passage, periods, passage.state, passage.by_number, *_parted(moving, passage))
 
 
@@ -169,7 +171,7 @@ def _of_ring_down(found: RingDown, paths: tuple[str, ...], options: dict) -> Sen
         moving.dynamics, numbers, 0, **options, sampled=Functionals(row[None], own[:, None])
     )  # fmt: skip
     periods = moving.scene.time.simulated
-    passage = moving.pass_through(state, turned, periods, measures)
+    passage = moving.pass_through(state, turned, periods, measures, True)
     return _result(moving, measures, passage, periods, passage.state, passage.by_number, *_parted(moving, passage))
 
 
@@ -198,13 +200,13 @@ def _of_orbit(orbit: Orbit, paths: tuple[str, ...], options: dict) -> Sensitivit
     except NotSmooth as error:
         return _nothing(paths, SensitivityStatus.UNDETERMINED, str(error))
     numbers, still = moving.numbers, np.zeros((len(orbit.state), len(paths)))
-    first = moving.pass_through(orbit.state, still, orbit.periods, None)
+    first = moving.pass_through(orbit.state, still, orbit.periods, None, False)
     status, note = _MEANING[first.status]
     turns = still
     if status is SensitivityStatus.OK:
         turns, status, note = _moved(orbit, first, numbers)
     measures = Measures(moving.dynamics, numbers, 0, **options)
-    passage = moving.pass_through(orbit.state, turns * numbers.size, orbit.periods, measures)
+    passage = moving.pass_through(orbit.state, turns * numbers.size, orbit.periods, measures, False)
     if status is SensitivityStatus.OK and not _balanced(measures):
         status, note = SensitivityStatus.UNDETERMINED, "the derivatives of the energies do not balance"
     return _result(moving, measures, passage, orbit.periods, orbit.state, turns, status, note)
