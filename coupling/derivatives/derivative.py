@@ -30,7 +30,7 @@ _LAW = 1e-9
 #: speed that an engine has taken from a row by no impulse, relative to the fastest, beyond round-off
 _CAUGHT = 1e-11
 #: derivative by a number, relative to number and coordinate, to which round-off is relative at least
-_LEAST_TURN = 1e-4
+_LEAST_TURN = 1e-2
 #: largest motion of rows at rest by the derivative, relative to its terms
 _STILL = 1e-7
 #: an event is tangential if its function would come back from beyond zero within this fraction of its scale
