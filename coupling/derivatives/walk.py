@@ -35,9 +35,9 @@ class Watch(Protocol):
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
-    turns: (k, P) how numbers change the start; watch: is called with the course of every segment;
-    given: as in Start; half_way: (k,) the
-    state half a period after the start, None if the engine has not come so far.
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
+    a search for the clearance; given: as in Start; half_way: (k,) the state half a period after the start, None if the
+    engine has not come so far.
     """
 
     def __init__(
@@ -87,9 +87,10 @@ class PassageWalk:
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue
-            least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
-            if least < self._clearance[0]:
-                self._clearance = least, self._names.possible(unit, what)
+            if self._watch is None:
+                least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
+                if least < self._clearance[0]:
+                    self._clearance = least, self._names.possible(unit, what)
             before = self._followed(Before(segment, segment.event, flow, z, M))
         return before
 
