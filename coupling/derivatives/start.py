@@ -122,11 +122,10 @@ class Start:
     def _turned(self, what: str, rows: np.ndarray, z: np.ndarray, M: np.ndarray) -> np.ndarray:
         """Return whether numbers change some functionals (m,), "gap" or "speed", at the start."""
         functional, own = getattr(self.dynamics, what)[rows], M[:, len(self._given) :]
-        turned, terms = functional[:, : len(own)] @ own, np.abs(functional[:, : len(own)]) @ np.abs(own)
+        turned = functional[:, : len(own)] @ own
         if self._numbers is not None:
-            of = (getattr(self._numbers.parts, what)[:, rows] @ z).T
-            turned, terms = turned + of, terms + np.abs(of)
-        return np.asarray(np.any(np.abs(turned) > _NEAR * terms, axis=1))
+            turned = turned + (getattr(self._numbers.parts, what)[:, rows] @ z).T
+        return np.asarray(np.abs(turned).max(axis=1, initial=0.0) > _NEAR * np.abs(functional) @ self.dynamics.typical)
 
     def _loose(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
         """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.

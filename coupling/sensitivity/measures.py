@@ -46,7 +46,9 @@ class Measures:
         self.peaks: list[Peak] = []
         self.impacts: list[Impact] = []
         self._times, self.samples = list(times), list[tuple[float, np.ndarray, np.ndarray]]()
-        self._since, self._begun, self._course = np.zeros(self._P), None, None
+        self._since: np.ndarray = np.zeros(self._P)
+        self._begun: Before | None = None
+        self._course: Course | None = None
 
     # --- what a walk calls
 
@@ -83,9 +85,9 @@ class Measures:
         for value, turns in summits(self._response, series, begun.z, Z, course, duration):
             peak.add(value, turns)
         for z, at, moves in ((begun.z, Z, self._since), (*end, shift)):
-            value, turns = self._response.of(z[None], at[None])
+            x, of_x = self._response.of(z[None], at[None])
             rate = float(self._response.rows[0] @ begun.flow.X @ z)
-            peak.add(float(value[0, 0]), turns[0, 0] + rate * moves)
+            peak.add(float(x[0, 0]), of_x[0, 0] + rate * moves)
         self._sample(begun, series, Z)
         if segment.period >= self.first:
             self._integrate(begun, Z, course, end, shift)
