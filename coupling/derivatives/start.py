@@ -31,6 +31,8 @@ class Start:
         given: bool = False,
     ) -> None:  # fmt: skip
         self._fixed = given
+        #: derivative (2N, P) by numbers before units that are at rest stop what these would move
+        self.unheld = np.zeros((dynamics.one, 0))
         self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
         self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
         self._turns = np.zeros((len(state), 0 if numbers is None else len(numbers))) if turns is None else turns
@@ -66,6 +68,7 @@ class Start:
             M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
         if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z):
             status = PassageStatus.GRAZING
+        self.unheld = M[:, k:]
         M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
         return M[:, :k], M[:, k:], status
 
