@@ -32,9 +32,9 @@ class NotSmooth(ArithmeticError):
 def derivative(function: Callable[[float], np.ndarray], at: float, size: float, here: np.ndarray) -> np.ndarray:
     """Return the derivative (n,) of a function of a number.
 
-    here: its value (n,) at the number; size: of the number, over which the function changes by its own size. At the
-    end of the range, where the function raises InputError beyond, the derivative is one-sided. Raises InputError for a
-    number without neighbours on either side, and NotSmooth.
+    here: its value (n,) at the number, of the order of 1; size: of the number, over which the function changes by as
+    much. At the end of the range, where the function raises InputError beyond, the derivative is one-sided. Raises
+    InputError for a number without neighbours on either side, and NotSmooth.
     """
     step, refused = _STEP * size, None
     try:
@@ -60,7 +60,7 @@ def _central(function: Callable[[float], np.ndarray], at: float, step: float, he
         return np.asarray(sum(w * (up - down) for w, (up, down) in zip(weights, known, strict=False)) / step)
 
     low, high = formula(2), formula(4)
-    size = np.maximum(np.abs(here), np.maximum(*np.abs(known[0])))
+    size = np.maximum(1.0, np.maximum(*np.abs(known[0])))
     (up, down), (farther, back) = known[:2]
     bend = np.abs((farther + back - 2 * here) - 4 * (up + down - 2 * here))
     if np.any(bend > _KINK * (np.abs(up - here) + np.abs(down - here)) + 8 * _NOISE * size):
@@ -76,7 +76,7 @@ def _one_sided(function: Callable[[float], np.ndarray], at: float, step: float, 
         np.asarray(sum(w * value for w, value in zip(weights, values, strict=False)) / step)
         for weights in _ONE_SIDED.values()
     )
-    return _checked(low, high, step, np.abs(values).max(axis=0))
+    return _checked(low, high, step, np.maximum(1.0, np.abs(values).max(axis=0)))
 
 
 def _checked(low: np.ndarray, high: np.ndarray, step: float, size: np.ndarray) -> np.ndarray:
