@@ -37,8 +37,10 @@ from vanedamp.files.toml_input import InputError
 
 #: error that is none; estimates of the differences' errors count so many times
 OFF, DOUBT = 1e-7, 20.0
-#: periods of a run from its own start; the most of an orbit
-RUN, LONGEST = 2, 4
+#: periods of a run from its own start; the most of an orbit; the most numbers that are compared one by one
+RUN, LONGEST, SINGLY = 2, 4, 8
+#: impacts slower than this part of the fastest are not compared: the engine completes chatters among them
+SLOW = 1e-4
 
 
 class Error(NamedTuple):
@@ -142,7 +144,9 @@ def _checked(kind: str, subject: str, scene: Scene, given: Orbit | Scene, period
     if whole is not None and not whole.off and whole.doubt * DOUBT <= OFF:
         checked.compared, checked.errors = len(numbers), [whole]
         return checked
-    for path, weights in zip(numbers, np.diag(sizes), strict=True):
+    names = list(numbers)
+    for j in np.random.default_rng(len(numbers)).permutation(len(numbers))[:SINGLY]:
+        path, weights = names[j], sizes[j] * (np.arange(len(numbers)) == j)
         error = compared(weights, path)
         if error is None:
             checked.unknown.append(path)
@@ -184,10 +188,12 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
 
 
 def _by_instant(time: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Return the order of impacts by their times; of several at one instant the fastest."""
+    """Return the order of impacts by their times, without slow ones; of several at one instant the fastest."""
+    speed = np.abs(speed)
     instant = np.round(time / (np.abs(time).max(initial=0.0) or 1.0), 10)
-    order = np.lexsort((-np.abs(speed), instant))
-    return order[np.unique(instant[order], return_index=True)[1]]
+    order = np.lexsort((-speed, instant))
+    order = order[np.unique(instant[order], return_index=True)[1]]
+    return order[speed[order] >= SLOW * speed.max(initial=0.0)]
 
 
 def table(found: list[Checked]) -> str:
