@@ -32,7 +32,7 @@ SURE = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: round-off of a run's results relative to their sizes, apart from what its derivatives multiply
 _ROUND_OFF = 3e-15
 #: events per period after which a run is given up
-MOST_EVENTS = 1000
+MOST_EVENTS = 200
 FIGURES = (
     "amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic", "phase", "attached_mass_fraction"
 )  # fmt: skip
