@@ -26,6 +26,8 @@ MOST_EVENTS = 40000
 _NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down")
 #: keys whose number has no derivative: they choose, or count
 _CHOICES = ("order", "tolerance", "modes", "resonance_near")
+#: keys that say at 0 that there is no such thing
+_ABSENT = ("normal_motion", "rotation", "centrifugal_deg", "centrifugal_stiffness")
 #: bounds of keys, at which there is no derivative on both sides
 _LEAST = {"friction": 0.0, "force": 0.0, "base_acceleration": 0.0, "lift": 0.0, "acceleration": 0.0, "amplitude": 0.0,
           "restitution": 0.0, "dashpot": 0.0, "damping": 0.0, "damping_ratio": 0.0, "normal_load": 0.0, "speed": 0.0,
@@ -151,7 +153,11 @@ def numbers_of(scene: Scene, start: bool) -> dict[str, tuple[float, float]]:
     """
     found = {}
     for path, value in _numbers(scene.to_dict(), ""):
-        if path.split(".")[0] in _NO_NUMBERS or _at_bound(path, value):
+        if (
+            path.split(".")[0] in _NO_NUMBERS
+            or _at_bound(path, value)
+            or (path.split(".")[-1] in _ABSENT and not value)
+        ):
             continue
         if not _of_start(path) or (start and not _at_rest(path, value)):
             size = _size(scene, path, value)
@@ -187,7 +193,11 @@ def _at_rest(path: str, value: float) -> bool:
 
 def _at_bound(path: str, value: float) -> bool:
     key = path.split(".")[-1]
-    return (key in _LEAST and value <= _LEAST[key]) or (key == "restitution" and value >= 1.0)
+    return (
+        (key in _LEAST and value <= _LEAST[key])
+        or (key == "restitution" and value >= 1.0)
+        or (key in _ABSENT and value == 0.0)
+    )
 
 
 def _size(scene: Scene, path: str, value: float) -> float:
