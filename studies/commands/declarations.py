@@ -133,6 +133,10 @@ COMMANDS = (
             input_file("SCENE.toml"), output_file("RESPONSE.h5"), json_file,
             argument("--events", action="store_true", help="keep the list of events"),
             argument("--samples", type=count, default=0, metavar="N", help="keep N samples of every period"),
+            argument(
+                "--exponents", type=count, metavar="N",
+                help="Lyapunov exponents by N periods after the run, at least 32: periodic, quasi-periodic or chaotic",
+            ),
         ),
         writes={"output": _RECORD}, reads=_SCENE,
     ),

@@ -92,7 +92,7 @@ def sweep_seconds(scene: Scene, workers: int) -> float:
 
 def beginning(scene: Scene) -> float:
     """Return the processor time of a run in addition to its periods, s: of each point of a scene with a sweep."""
-    return TOGETHER if scene.sweep and len(columned(scene, scene.sweep)) == len(scene.sweep) else RUN
+    return TOGETHER if scene.axes and len(columned(scene, scene.axes)) == len(scene.axes) else RUN
 
 
 def run_seconds(scene: Scene) -> float:
