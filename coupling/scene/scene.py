@@ -91,12 +91,11 @@ class Time:
 _SAME_PERIOD = 1e-4
 #: where a scene names files, relative to its own
 _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
-
-
-#: keys of the [sweep] table that are no axes, with their least values
+#: fewest periods that tell Lyapunov exponents
 LEAST_EXPONENTS = 32
-_NO_AXIS = "a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}"
+#: keys of the [sweep] table that are no axes, with their least values
 _KEPT = {"sections": 1, "exponents": LEAST_EXPONENTS}
+_NO_AXIS = "a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}"
 
 
 def _several(axis: Any) -> Any:

@@ -90,22 +90,23 @@ def bifurcation_figure(sweep: Sweep) -> go.Figure:
         rows=rows * len(panels), cols=1, shared_xaxes="all", subplot_titles=titles,
         row_heights=[_TALL, _LOW][:rows] * len(panels), vertical_spacing=0.6 * _BETWEEN / height,
     )  # fmt: skip
-    drawn, quantities = set[str](), list(panels[0].sections)
+    quantities = list(panels[0].sections)
+    listed = set[tuple[str, str]]()  # in the legend
     for number, panel in enumerate(panels):
         row = rows * number + 1
         for quantity, word, x, y in _clouds(panel, _MOST_POINTS // len(panels)):
-            first = quantity == quantities[0]
             figure.add_scatter(
                 x=factor * x, y=1e6 * y, mode="markers", marker={"size": 2.5, "color": _COLOURS[word]}, name=word,
-                legendgroup=word, showlegend=first and word not in drawn, visible=first, meta=quantity,
-                hovertemplate="%{x:.6g}: %{y:.5g} µm", row=row, col=1,
+                legendgroup=word, showlegend=(quantity, word) not in listed, visible=quantity == quantities[0],
+                meta=quantity, hovertemplate="%{x:.6g}: %{y:.5g} µm", row=row, col=1,
             )  # fmt: skip
-            drawn.add(word)
+            listed.add((quantity, word))
         figure.update_yaxes(title_text="start of periods, µm", row=row, col=1)
         if panel.exponent is not None:
+            bars = {"array": panel.confidence, "width": 0, "thickness": 1, "color": "#94a3b8"}
             figure.add_scatter(
-                x=factor * panel.x, y=panel.exponent, error_y={"array": panel.confidence, "width": 0, "thickness": 1},
-                mode="markers", marker={"size": 3, "color": [_COLOURS[word or "undecided"] for word in panel.motion]},
+                x=factor * panel.x, y=panel.exponent, error_y=bars,
+                mode="markers", marker={"size": 4, "color": [_COLOURS[word or "undecided"] for word in panel.motion]},
                 showlegend=False, hovertemplate="%{x:.6g}: %{y:.4g} 1/s<extra></extra>", row=row + 1, col=1,
             )  # fmt: skip
             figure.add_hline(y=0.0, line={"color": "#334155", "width": 1}, row=row + 1, col=1)

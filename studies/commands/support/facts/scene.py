@@ -24,7 +24,7 @@ from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep
+from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds
 from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
 from vanedamp.studies.commands.support.trial import mean_cost, tried
@@ -169,7 +169,8 @@ def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
     yield Fact("run_seconds", mean_cost([lasting]) if scene.moved else None, "s", told)
     if whole.axes:
         points, cores = whole.points, available_cores()
-        cost = mean_cost(list(_some_points(whole)), beginning(whole)) * math.ceil(points / cores)
+        cost = mean_cost(list(_some_points(whole)), beginning(whole)) + exponent_seconds(whole)
+        cost *= math.ceil(points / cores)
         yield Fact("sweep_points", points)
         yield Fact("sweep_seconds", cost, "s", f"on {cores} cores, by trials of {len(tried(points))} points")
 
