@@ -31,8 +31,8 @@ from vanedamp.files.toml_input import InputError
 #: fraction of the periods in which directions align themselves first, which are left out
 _ALIGNING = 0.1
 #: longest period that is looked for, in excitation periods; repetitions, and their largest difference in sizes of the
-#: coordinates, that make one; difference from which on more periods change nothing
-_LONGEST, _REPETITIONS, _SAME, _SETTLED = 16, 8, 1e-6, 1e-10
+#: coordinates, that make one; difference from which on more periods change nothing; of derivatives that are the same
+_LONGEST, _REPETITIONS, _SAME, _SETTLED, _CONSTANT = 16, 8, 1e-6, 1e-10, 1e-9
 #: growth per period below which an exponent counts as zero
 _ZERO = 0.02
 #: change of a direction by all periods below which it is neutral
@@ -59,7 +59,8 @@ class Exponents:
     status      "ok", or why there is none (PassageStatus): the worst that a period met
     motion      in a word
     exponents   (m,) 1/s; -inf for directions that a stick or a chatter erases; empty without a derivative
-    confidence  (m,) 1/s, half widths of the 95 % confidence intervals; of a motion that repeats, what the last
+    confidence  (m,) 1/s, half widths of the 95 % confidence intervals by the scatter of the growth, to which the
+                alignment of directions may add some 1 / (periods period); of a motion that repeats, what the last
                 repetition has changed; nan: unknown
     repeats     after how many excitation periods the motion repeats; 0 if it does not
     neutral     number of neutral directions
@@ -168,14 +169,17 @@ def _found(D: np.ndarray, states: np.ndarray) -> _Found:
     kept = _decided(D)
     D, states = kept.T @ D @ kept, states @ kept
     repeats, neutral = _repetition(states, _SAME), len(kept) - kept.shape[1]
-    if not repeats:
+    # linear motion has the same derivative in every period, whether it repeats or not
+    same = repeats or _repetition(D.reshape(len(D), -1), _CONSTANT)
+    if not same:
         exponents, confidence = _of_growth(D)
         return _Found(exponents, confidence, _word(exponents, confidence, len(D)), 0, neutral)
-    exponents, confidence = _of_multipliers(D, repeats)
-    # a run may come as close to an orbit that it leaves again
-    stable = not len(exponents) or exponents[0] <= _SAME
-    word = Motion.PERIODIC if stable else Motion.UNDECIDED
-    settled = stable and _repetition(states, _SETTLED) == repeats
+    exponents, confidence = _of_multipliers(D, same)
+    largest = exponents[0] if len(exponents) else -math.inf
+    word = Motion.PERIODIC if repeats or largest < -_SAME else Motion.QUASI_PERIODIC
+    if largest > _SAME:  # a run may come as close to an orbit that it leaves again
+        word = Motion.UNDECIDED
+    settled = word is Motion.PERIODIC and _repetition(states, _SETTLED) == repeats > 0
     return _Found(exponents, confidence, word, repeats, neutral, settled)
 
 
@@ -197,7 +201,7 @@ def _decided(D: np.ndarray) -> np.ndarray:
 
 
 def _repetition(states: np.ndarray, same: float) -> int:
-    """Return after how many periods states (n + 1, m), in sizes of the coordinates, repeat; 0 if they do not."""
+    """Return after how many periods states (n + 1, m), or derivatives, repeat; 0 if they do not."""
     n = len(states) - 1
     for k in range(1, min(_LONGEST, n // 2) + 1):
         span = min(_REPETITIONS * k, n - k)

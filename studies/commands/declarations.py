@@ -13,6 +13,7 @@ from vanedamp.studies.commands.support.arguments import (
     json_file,
     mode_count,
     output_file,
+    period_count,
     ratio,
     resume,
     spot_count,
@@ -134,7 +135,7 @@ COMMANDS = (
             argument("--events", action="store_true", help="keep the list of events"),
             argument("--samples", type=count, default=0, metavar="N", help="keep N samples of every period"),
             argument(
-                "--exponents", type=count, metavar="N",
+                "--exponents", type=period_count, metavar="N",
                 help="Lyapunov exponents by N periods after the run, at least 32: periodic, quasi-periodic or chaotic",
             ),
         ),
