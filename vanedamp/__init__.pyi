@@ -6,11 +6,13 @@ from vanedamp import meshes as meshes
 from vanedamp import modal as modal
 from vanedamp import rom as rom
 from vanedamp import studies as studies
+from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection as MatrixDirection
 from vanedamp.coupling.exponents.lyapunov import Exponents as Exponents
 from vanedamp.coupling.exponents.lyapunov import lyapunov as lyapunov
 from vanedamp.coupling.methods import Method as Method
 from vanedamp.coupling.orbits.branch import Branches as Branches
 from vanedamp.coupling.orbits.orbits import find_orbit as find_orbit
+from vanedamp.coupling.orbits.orbits import orbit_at as orbit_at
 from vanedamp.coupling.orbits.orbits import orbits as orbits
 from vanedamp.coupling.response.response import Response as Response
 from vanedamp.coupling.response.response import Status as Status
@@ -19,6 +21,8 @@ from vanedamp.coupling.scene.registration import register as register
 from vanedamp.coupling.scene.scene import Scene as Scene
 from vanedamp.coupling.scene.shapes.shape import Shape as Shape
 from vanedamp.coupling.scene.waveform import Waveform as Waveform
+from vanedamp.coupling.sensitivity.sensitivity import sensitivity as sensitivity
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity as Sensitivity
 from vanedamp.coupling.simulation import simulate as simulate
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states
