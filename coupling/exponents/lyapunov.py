@@ -251,7 +251,7 @@ def _word(found: np.ndarray, error: np.ndarray, periods: int) -> Motion:
     Neighbours on a torus part in proportion to time: by a factor n in n periods, which is no exponent.
     """
     least = math.log(periods) / periods
-    bound = error[0] + least
+    bound = least + (error[0] if math.isfinite(found[0]) else 0.0)
     if found[0] > bound:
         return Motion.CHAOTIC
     if found[0] < -bound:

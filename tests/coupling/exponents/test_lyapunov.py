@@ -59,6 +59,13 @@ def test_a_body_that_sticks_is_no_direction():
     assert found.exponents == pytest.approx([-0.08, -0.08, -math.inf], abs=1e-10)
 
 
+def test_a_body_in_free_flight_on_a_shaker_has_none():
+    shaker = {"model": "prescribed", "displacement_amplitude": 1e-3}
+    found = lyapunov(scene(structure=shaker, excitation={"frequency": 1.0}, time={"periods": 9}, **BODY), 32)
+    assert found.neutral == 2 and len(found.exponents) == 0 and math.isnan(found.largest)
+    assert found.motion is Motion.PERIODIC and found.status is PassageStatus.OK
+
+
 def test_an_undamped_oscillator_at_another_frequency_is_quasi_periodic():
     found = lyapunov(oscillator(0.0).replace({"initial.displacement": 0.3}), 300)
     assert found.repeats == 0 and found.motion is Motion.QUASI_PERIODIC

@@ -17,6 +17,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.sweep.worker import parts_of, width_of
 from vanedamp.files.toml_input import InputError
 
 AXES = {"cavity.c1.gap": [5e-4, 2e-4], "excitation.frequency": [15.6, 15.9]}
@@ -86,6 +87,27 @@ def test_the_file_has_dimensions_and_units_and_reads_as_the_record(result, tmp_p
     plain = result.to_json()
     assert plain["exponent"] == result.exponents["exponent"].tolist() and plain["units"]["exponent"] == "1/s"
     assert plain["motion"] == result.exponents["motion"].tolist() and "section_slip" not in plain
+
+
+def test_linked_runs_begin_where_those_without_do():
+    up = {"continuation": {"direction": "up"}}
+    plain, sections, both = (
+        sweep(kept(**numbers).replace(up)) for numbers in ({}, {"sections": 4}, {"sections": 4, "exponents": 32})
+    )
+    np.testing.assert_array_equal(sections.amplitude_mean, plain.amplitude_mean)
+    np.testing.assert_array_equal(both.amplitude_mean, plain.amplitude_mean)
+    np.testing.assert_array_equal(both.sections["section_slip"], sections.sections["section_slip"])
+
+
+def test_columns_of_a_point_follow_each_other():
+    block = {"cavity": "c1", "mass": 0.05, "shape": "block", "length": 0.01, "height": 0.01}
+    data = scene(sweep=AXES | {"sections": 3, "exponents": 32}, damper=[block], cavity=[
+        {"name": "c1", "gap": 5e-4, "play": 1e-4},
+    ])  # fmt: skip
+    parts = parts_of(data)
+    assert [part.stop - part.start for part in parts.values()] == [4, 6, 12]
+    assert parts["in_plane"].stop == parts["exponents"].start and parts["exponents"].stop == parts["sections"].start
+    assert width_of(data) == parts["sections"].stop
 
 
 def test_points_of_a_checkpoint_keep_them(result, tmp_path):
