@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
+from pydantic.json_schema import SkipJsonSchema
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.contact_laws.newton import Newton
@@ -93,8 +94,11 @@ _SAME_PERIOD = 1e-4
 _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
 #: fewest periods that tell Lyapunov exponents
 LEAST_EXPONENTS = 32
-#: keys of the [sweep] table that are no axes, with their least values
-_KEPT = {"sections": 1, "exponents": LEAST_EXPONENTS}
+#: keys of the [sweep] table that are no axes: their least values, and what they mean
+_KEPT = {
+    "sections": (1, "number of Poincare sections to keep of every point: those of its last periods"),
+    "exponents": (LEAST_EXPONENTS, "number of periods after each run over which its Lyapunov exponents are found"),
+}
 _NO_AXIS = "a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}"
 
 
@@ -116,10 +120,17 @@ def _form(axis: Any) -> str:
 Axis = Annotated[
     Annotated[Range, Tag("range")]
     | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1), Tag("list")]
-    | Annotated[Whole, Tag("count")],
+    | Annotated[SkipJsonSchema[Whole], Tag("count")],
     Discriminator(_form),
     BeforeValidator(_several),
 ]
+
+
+def _describe_kept(schema: dict[str, Any]) -> None:
+    """Add the keys that are no axes to the JSON Schema of the [sweep] table."""
+    schema["properties"] = {
+        key: {"type": "integer", "minimum": least, "description": text} for key, (least, text) in _KEPT.items()
+    }
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -164,10 +175,8 @@ class Scene(OpenRecord, Displayed):
     """method of time integration, and its options"""
     continuation: Continuation = field(default_factory=Continuation)
     """how the runs of a sweep begin"""
-    sweep: dict[str, Axis] = field(default_factory=dict)
-    """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values;
-    `sections`: number of Poincare sections to keep of every point, of its last periods; `exponents`: number of periods
-    after a run, at least 32, by which its Lyapunov exponents are found"""
+    sweep: Annotated[dict[str, Axis], Field(json_schema_extra=_describe_kept)] = field(default_factory=dict)
+    """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
     orbit: Orbit | None = None
     """periodic motion that `vanedamp orbits` finds and follows"""
     ramp: Ramp | None = None
@@ -200,8 +209,8 @@ class Scene(OpenRecord, Displayed):
         self._check_structure()
         self._check_elements()
         for path, axis in self.sweep.items():
-            if path in _KEPT and not (isinstance(axis, int) and axis >= _KEPT[path]):
-                raise ValueError(f"sweep.{path}: expected a whole number of periods, at least {_KEPT[path]}")
+            if path in _KEPT and not (isinstance(axis, int) and axis >= _KEPT[path][0]):
+                raise ValueError(f"sweep.{path}: expected a whole number of periods, at least {_KEPT[path][0]}")
             if isinstance(axis, int) and path not in _KEPT:
                 raise ValueError(f"sweep.{path}: {_NO_AXIS}")
 

@@ -103,19 +103,24 @@ def bifurcation_figure(sweep: Sweep) -> go.Figure:
             listed.add((quantity, word))
         figure.update_yaxes(title_text="start of periods, µm", row=row, col=1)
         if panel.exponent is not None:
-            bars = {"array": panel.confidence, "width": 0, "thickness": 1, "color": "#94a3b8"}
-            figure.add_scatter(
-                x=factor * panel.x, y=panel.exponent, error_y=bars,
-                mode="markers", marker={"size": 4, "color": [_COLOURS[word or "undecided"] for word in panel.motion]},
-                showlegend=False, hovertemplate="%{x:.6g}: %{y:.4g} 1/s<extra></extra>", row=row + 1, col=1,
-            )  # fmt: skip
-            figure.add_hline(y=0.0, line={"color": "#334155", "width": 1}, row=row + 1, col=1)
-            figure.update_yaxes(title_text="exponent, 1/s", row=row + 1, col=1)
+            _add_exponents(figure, panel, factor, row + 1)
     figure.update_xaxes(title_text=axis_title(axis, unit), row=rows * len(panels), col=1)
     figure.update_layout(legend={"itemsizing": "constant"})
     if len(quantities) > 1:
         figure.update_layout(updatemenus=[_menu(figure, quantities)])
     return dressed(figure, height=height + _BETWEEN)
+
+
+def _add_exponents(figure: go.Figure, panel: Panel, factor: float, row: int) -> None:
+    """Draw the largest exponents of a panel with their intervals."""
+    bars = {"array": panel.confidence, "width": 0, "thickness": 1, "color": "#94a3b8"}
+    colours = [_COLOURS[word or "undecided"] for word in panel.motion]
+    figure.add_scatter(
+        x=factor * panel.x, y=panel.exponent, error_y=bars, mode="markers", marker={"size": 4, "color": colours},
+        showlegend=False, hovertemplate="%{x:.6g}: %{y:.4g} 1/s<extra></extra>", row=row, col=1,
+    )  # fmt: skip
+    figure.add_hline(y=0.0, line={"color": "#334155", "width": 1}, row=row, col=1)
+    figure.update_yaxes(title_text="exponent, 1/s", row=row, col=1)
 
 
 def _clouds(panel: Panel, most: int) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
