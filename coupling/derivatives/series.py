@@ -8,10 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import matrix_balance
 
 from vanedamp.coupling.numerics.compiler.jit import entry
 
-#: norm of X over a panel, and terms of a series then: 3^32/32! < 1e-19
+#: norm of X, balanced, over a panel, and terms of a series then: 3^32/32! < 1e-19
 _NORM, _TERMS = 3.0, 32
 #: nodes and weights of Gauss and Legendre on a panel (0 to 1): they integrate the motion and its squares to round-off
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
@@ -36,7 +37,9 @@ class Series:
 
     def __init__(self, X: np.ndarray, D: np.ndarray) -> None:
         self.X = X
-        self._norm = float(min(np.abs(X).sum(axis=0).max(), np.abs(X).sum(axis=1).max()))
+        # units of the constants, in which stiff springs have loads far above what they move, are no rates
+        balanced = np.abs(matrix_balance(X, permute=False)[0])
+        self._norm = float(min(balanced.sum(axis=0).max(), balanced.sum(axis=1).max()))
         rows, columns = np.nonzero(X)
         number, at, of = np.nonzero(D)
         self._X = rows, columns, X[rows, columns]
