@@ -20,8 +20,6 @@ KINDS = (
     "reduced compliant", "reduced jenkins", "rotating", "planar", "planar poisson", "planar viscoelastic",
     "planar compliant", "crowd", "crowd jenkins", "crowd poisson",
 )  # fmt: skip
-#: least restitution of a compliant contact, above exp(-2), where its damping is critical
-UNDERDAMPED = 0.15
 #: events after which a run is given up: some motions end in chatters without an end
 MOST_EVENTS = 40000
 #: tables whose numbers are none of the motion
@@ -49,9 +47,6 @@ def scene_of(seed: int, folder: Path) -> tuple[str, Scene]:
         if rng.random() < 0.3:
             mass, stiffness = data["structure"]["mass"], data["structure"]["stiffness"]
             data["structure"]["damping"] = 2 * data["structure"].pop("damping_ratio") * math.sqrt(mass * stiffness)
-    if data.get("contact", {}).get("law") == "compliant":  # overdamped ones are stiff: minutes each
-        for damper in data["damper"]:
-            damper["restitution"] = max(damper["restitution"], UNDERDAMPED)
     data["solver"] = data.get("solver", {}) | {"max_events": MOST_EVENTS}
     data["time"] = {"periods": 100, "transient": 0}
     return kind, validate(Scene, data, "scene")
