@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +23,16 @@ from vanedamp.files.store import finite, frozen
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.checkpoint import Checkpoint
+from vanedamp.studies.optimisation.gradient import descend
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
-from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.tolerances import estimate
 from vanedamp.studies.terminal import stage
 
 #: generations of a search, at least
 _GENERATIONS = 5
-#: of a design as it is
-NO_DEVIATION = {"mass": 0.0, "gap": 0.0, "excitation": 0.0, "restitution": 0.0, "friction": 0.0, "orientation_deg": 0.0}
+#: designs from which gradients start, at most, and how far apart they are, as a fraction of the variables' ranges
+_STARTS, _APART = 4, 0.1
 _Deviation = Mapping[str, float]
 
 
@@ -59,9 +61,10 @@ def _measures(study: Study) -> tuple[str, str]:
 def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
     started, table = time.perf_counter(), study.table
     with stage("search as designed"):
-        first = trial.search(False, None)
+        descent = descend(trial, trial.starts(trial.search(False, None)))
+        first = descent.design
     with stage("search within tolerances"):
-        second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
+        second = trial.search(True, trial.generation(first)) if len(trial.sample) > 1 else first
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
@@ -76,6 +79,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     best = {"nominal": nominal.design, "robust": robust.design}
     responses = {name: trial.response(design) for name, design in best.items()}
     headlines = {name: trial.headline(design, responses[name][0]) for name, design in best.items()}
+    with stage("derivatives by tolerances"):
+        estimates = {name: estimate(study, best[name], responses[name][0], trial.sample, trial.within) for name in best}
     took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": tables(table), "scene": study.scene.to_dict()},
@@ -83,8 +88,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         amplitude=study.amplitude,
         reference=study.reference,
         resonance_frequency=study.resonance.frequency,
-        nominal=nominal,
-        robust=robust,
+        nominal=replace(nominal, estimate=estimates["nominal"]),
+        robust=replace(robust, estimate=estimates["robust"]),
         map_mass_ratio=frozen(masses),
         map_gap_ratio=frozen(gaps),
         map_amplitude=frozen(amplitudes),
@@ -96,6 +101,7 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
+        gradient=descent.to_json(),
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
@@ -147,6 +153,17 @@ class _Trial:
         damped, undamped = self._run([design], self.sample[:1])
         return damped[0, 0], undamped[0, 0]
 
+    def tried(self, design: Design) -> tuple[float, np.ndarray]:
+        """Return the amplitude of a design as it is, and those at the frequencies (f,), nan where a run is not ok."""
+        damped, undamped = self._run([design], self.sample[:1])
+        amplitude = float(self._judged(damped, undamped)[0])
+        self.history.append((design, amplitude, False))
+        return amplitude, damped[0, 0]
+
+    def within(self, design: Design, deviation: _Deviation) -> float:
+        """Return the amplitude of a design that is off by a deviation."""
+        return float(self._judged(*self._run([design], [deviation]))[0])
+
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
         known, (undamped, fixed, peaks) = self.study.reference * damped, self.study.linear(design, self.sample[0])
@@ -176,11 +193,27 @@ class _Trial:
         )  # fmt: skip
         return self._design(minimum.x)
 
-    def best_designs(self, best: Design) -> np.ndarray:
-        """Return the best designs so far (s, variables), that one first, as the first generation of another search."""
+    def _best_designs(self, best: Design) -> list[Design]:
+        """Return the designs so far, that one first, then the others from the best to the worst."""
         ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
-        distinct = list(dict.fromkeys(design for design, _, _ in ordered))
-        return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
+        return list(dict.fromkeys(design for design, _, _ in ordered))
+
+    def generation(self, best: Design) -> np.ndarray:
+        """Return the best designs so far (s, variables), that one first, as the first generation of another search."""
+        return self._columns(self._best_designs(best))
+
+    def _columns(self, designs: Sequence[Design]) -> np.ndarray:
+        return np.array([[getattr(design, name) for name in self._variables] for design in designs], float)
+
+    def starts(self, best: Design) -> list[Design]:
+        """Return some of the best designs so far that are not close to each other, that one first."""
+        bounds = np.array([getattr(self.study.table.variables, name) for name in self._variables]).reshape(-1, 2)
+        chosen: list[Design] = []
+        for design in self._best_designs(best):
+            others = self._columns([design]) - self._columns(chosen).reshape(len(chosen), -1)
+            if np.all(np.abs(others / np.ptp(bounds, axis=1)).max(axis=1, initial=0.0) >= _APART):
+                chosen.append(design)
+        return chosen[:_STARTS]
 
     def _tried(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes of `judge`, and keep them in the history."""
@@ -196,7 +229,11 @@ class _Trial:
 
     def judge(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes (d,) of designs within the tolerances, or as they are."""
-        table, (damped, undamped) = self.study.table, self._run(designs, self.sample if robust else self.sample[:1])
+        return self._judged(*self._run(designs, self.sample if robust else self.sample[:1]))
+
+    def _judged(self, damped: np.ndarray, undamped: np.ndarray) -> np.ndarray:
+        """Return the amplitudes (d,) of what counts of runs (d, s, f)."""
+        table = self.study.table
         # a design with a run that is not ok has damped nothing
         bad = np.isnan(damped)
         damped = np.where(bad, np.fmax(undamped, 1.0), damped)
