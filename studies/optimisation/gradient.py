@@ -44,12 +44,12 @@ class Descent(NamedTuple):
 
     before, after: amplitudes of the best first design and of the last one; steps: designs that were tried, and taken:
     of these; orbits: found on the way, with their derivatives; without: number of responses that counted and had no
-    derivatives, by the reason.
+    derivatives, by the reason. None: there was no search.
     """
 
     design: Design
-    before: float
-    after: float
+    before: float | None = None
+    after: float | None = None
     steps: int = 0
     taken: int = 0
     orbits: int = 0
@@ -67,9 +67,11 @@ def descend(trial: Trial, starts: Sequence[Design]) -> Descent:
     """
     study, best = trial.study, starts[0]
     names = [name for name in _PATHS if len(set(getattr(study.table.variables, name))) > 1]
+    if not names or not study.table.gradient_steps:
+        return Descent(best)
     before, response = trial.tried(best)
     found, without = Descent(best, before, before), Counter[str]()
-    for start in starts if names and study.table.gradient_steps else ():
+    for start in starts:
         amplitude, response = (before, response) if start is best else trial.tried(start)
         surface = _Surface(study, names, start, response)
         design, after, steps, taken = _descended(
@@ -136,9 +138,11 @@ class _Surface:
 
     def consider(self, response: np.ndarray) -> None:
         """Find derivatives, at the place, of the responses that count or may count with amplitudes (f,)."""
-        near = ~(response < _NEAR * np.nanmax(response)) if self._worst else np.ones(len(response), bool)
-        for f in np.flatnonzero(near).tolist():
-            if f in self._slopes or f in self._missing:
+        if np.isnan(response).any():
+            return
+        for f in np.argsort(-response, kind="stable").tolist():
+            near = not self._worst or response[f] >= _NEAR * response.max()
+            if not near or f in self._slopes or f in self._missing:
                 continue
             amplitude, ahead = self._study.reference * float(self._response[f]), self._ahead.get(f)
             if ahead is not None and ahead.agrees(amplitude):
@@ -149,6 +153,8 @@ class _Surface:
                 self._slopes[f], self.orbits = found, self.orbits + 1
             else:
                 self._missing[f] = found
+                if self._worst and not self._slopes:
+                    return  # the worst one has none
 
     @property
     def without(self) -> Counter[str]:

@@ -50,6 +50,21 @@ class Optimum:
         """The same within the tolerances."""
         return 1.0 - self.amplitude_tolerances
 
+    @property
+    def to_first_order(self) -> str:
+        """What derivatives say of the tolerances, in words; empty without tolerances."""
+        found = self.estimate
+        if found and found["worst"] is None:
+            at, [reason] = found["frequency_hz"], found["without"]
+            return f"no tolerances to first order: the response at {at:.6g} Hz has none ({_words(reason)})"
+        if not found:
+            return ""
+        most, added = next(iter(found["by"].items()))
+        return (
+            f"tolerances to first order: at worst {1 - found['worst']:.1%} gained (runs there: "
+            f"{1 - found['run']:.1%}), in the mean {1 - found['mean']:.1%}; {most} costs most, {added:.2%}"
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
         return self.design._asdict() | {
@@ -111,6 +126,26 @@ class Optimisation:
     gradient: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def remarks(self) -> list[str]:
+        """What derivatives led to, and what they say of the tolerances, in words."""
+        remarks, found = [], self.gradient
+        if found.get("taken"):
+            remarks.append(
+                f"the gradient leads from {found['before']:.4f} to {found['after']:.4f} of the amplitude without "
+                f"bodies in {found['taken']} steps, which runs confirm"
+            )
+        elif found.get("without"):
+            counted = ", ".join(f"{count} {_words(reason)}" for reason, count in found["without"].items())
+            remarks.append(f"the gradient leads no further; responses that count without derivatives: {counted}")
+        optima = {"as designed": self.nominal} if self.robust == self.nominal else self.optima
+        return remarks + [f"{name}, {text}" for name, optimum in optima.items() if (text := optimum.to_first_order)]
+
+    @property
+    def optima(self) -> dict[str, Optimum]:
+        """Both optima by what they are best for."""
+        return {"as designed": self.nominal, "within the tolerances": self.robust}
+
     def to_json(self) -> dict[str, Any]:
         """Return plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
@@ -144,3 +179,7 @@ class Optimisation:
             robust=Optimum.of(json.loads(attributes["robust"])),
             **{name: json.loads(attributes.get(name, "{}")) for name in _TABLES},
         )
+
+
+def _words(reason: str) -> str:
+    return reason.replace("_", " ")

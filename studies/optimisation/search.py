@@ -207,11 +207,13 @@ class _Trial:
 
     def starts(self, best: Design) -> list[Design]:
         """Return some of the best designs so far that are not close to each other, that one first."""
-        bounds = np.array([getattr(self.study.table.variables, name) for name in self._variables]).reshape(-1, 2)
+        if not self._variables:
+            return [best]
+        ranges = np.array([np.ptp(getattr(self.study.table.variables, name)) for name in self._variables])
         chosen: list[Design] = []
         for design in self._best_designs(best):
-            others = self._columns([design]) - self._columns(chosen).reshape(len(chosen), -1)
-            if np.all(np.abs(others / np.ptp(bounds, axis=1)).max(axis=1, initial=0.0) >= _APART):
+            apart = [np.abs(np.diff(self._columns([design, other]), axis=0) / ranges).max() for other in chosen]
+            if min(apart, default=np.inf) >= _APART:
                 chosen.append(design)
         return chosen[:_STARTS]
 

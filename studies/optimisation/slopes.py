@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.orbits.newton import Orbit
-from vanedamp.coupling.orbits.orbits import find_orbit
+from vanedamp.coupling.orbits.orbits import find_orbit, settled_orbit
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.orbit import Orbit as OrbitTable
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sensitivity.sensitivity import sensitivity, steady_orbit
+from vanedamp.coupling.sensitivity.sensitivity import sensitivity
 from vanedamp.coupling.sensitivity.sensitivity_record import SensitivityStatus
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError
@@ -38,8 +38,9 @@ class Slope(NamedTuple):
 
     def near(self, scene: Scene, paths: Sequence[str], measure: str, change: np.ndarray) -> Slope | None:
         """Return the slope in a scene whose numbers differ by (P,) from this one's; None if the orbit is lost."""
-        given, table = self.orbit.map, OrbitTable(periods=self.orbit.periods)
+        given = self.orbit.map
         assert given is not None
+        table = OrbitTable(parameter=given.parameter, periods=given.periods)
         start = given.restart_of(self.orbit.state + self.moves @ change)
         try:
             found = slope_of(find_orbit(replace(scene, orbit=table), start), paths, measure)
@@ -58,7 +59,7 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
         return _NOT_OK
     if deflects(scene, assemble(scene)):
         return _DEFLECTS
-    orbit = steady_orbit(scene)
+    orbit = settled_orbit(scene)
     found = _NOT_PERIODIC if orbit is None else slope_of(orbit, paths, measure)
     return _NOT_PERIODIC if isinstance(found, Slope) and not found.agrees(amplitude) else found
 

@@ -86,7 +86,7 @@ class Tolerances:
 
 
 #: of a design as it is
-NO_DEVIATION: Mapping[str, float] = asdict(Tolerances())
+NO_DEVIATION: dict[str, float] = asdict(Tolerances())
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -25,21 +25,29 @@ def estimate(
 ) -> dict[str, Any]:
     """Return what tolerances make of a design to first order, over the reference at the same level.
 
-    response: (f,) amplitudes of the design as it is; run: the amplitude of one that is off.
-    worst: with every deviation at the worse end of its width; run: what a run has there; mean: over the sample; by: what
-    each width adds to the worst, the largest first; frequency_hz: where that is, None for the mean of a band; without:
-    number of responses without derivatives, by the reason: they stay as they are. All None where one of these may be
-    what counts.
+    response: (f,) amplitudes of the design as it is; run: gives the amplitude of one that is off.
+    worst: with every deviation at the worse end of its width; run: what runs have there; mean: over the sample; by:
+    what each width adds to the worst, the largest first; frequency_hz: of the worst, None for the mean of a band;
+    without: number of responses without derivatives, by the reason: they stay as they are. Where one that may count has
+    none, its frequency and reason only. Empty without tolerances.
     """
     widths = {name: width for name in NO_DEVIATION if (width := getattr(study.table.tolerances, name)) > 0.0}
     if not widths:
         return {}
-    slopes, reasons = _slopes(study, design, response, [study.paths[name] for name in widths])
-    without = dict(Counter(filter(None, reasons)))
-    found: dict[str, Any] = dict.fromkeys(("worst", "run", "mean", "frequency_hz")) | {"by": {}, "without": without}
     whole = study.table.over_band == "mean"
-    if any(whole or not response[f] < _NEAR * np.nanmax(response) for f in np.flatnonzero(reasons)):
-        return found
+    slopes, without = np.zeros((len(response), len(widths))), Counter[str]()
+    nothing: dict[str, Any] = dict.fromkeys(("worst", "run", "mean")) | {"by": {}}
+    for f in np.argsort(-response, kind="stable").tolist():  # nan first: -nan is nan
+        frequency = float(study.frequencies[f])
+        scene = study.scene_of(design, NO_DEVIATION, frequency)
+        paths, amplitude = [study.paths[name] for name in widths], study.reference * float(response[f])
+        found = steady_slope(scene, paths, study.table.measure, amplitude)
+        if isinstance(found, Slope):
+            slopes[f] = found.by_number
+            continue
+        if whole or not response[f] < _NEAR * response.max():
+            return nothing | {"frequency_hz": frequency, "without": {found: 1}}
+        without[found] += 1
     if whole:
         slopes, response = slopes.mean(axis=0, keepdims=True), response.mean(keepdims=True)
 
@@ -57,22 +65,9 @@ def estimate(
     signs = np.where(ends[:, 0, at] >= ends[:, 1, at], 1.0, -1.0)
     corner = {**NO_DEVIATION, **{name: sign * widths[name] for name, sign in zip(widths, signs.tolist(), strict=True)}}
     by = zip(widths, ends[:, :, at].max(axis=1).tolist(), strict=True)
-    return found | {
+    return {
         "worst": float(total[at]), "run": run(design, corner),
         "mean": float(np.mean([np.max(response + moved(deviation)) for deviation in sample])),
         "by": dict(sorted(by, key=lambda item: -item[1])),
-        "frequency_hz": None if whole else float(study.frequencies[at]),
+        "frequency_hz": None if whole else float(study.frequencies[at]), "without": dict(without),
     }  # fmt: skip
-
-
-def _slopes(study: Study, design: Design, response: np.ndarray, paths: Sequence[str]) -> tuple[np.ndarray, list[str]]:
-    """Return derivatives (f, P) by numbers, m by a unit of each, and why a response has none, "" where it has."""
-    slopes, reasons = np.zeros((len(response), len(paths))), [""] * len(response)
-    for f, frequency in enumerate(study.frequencies.tolist()):
-        scene = study.scene_of(design, NO_DEVIATION, frequency)
-        found = steady_slope(scene, paths, study.table.measure, study.reference * float(response[f]))
-        if isinstance(found, Slope):
-            slopes[f] = found.by_number
-        else:
-            reasons[f] = found
-    return slopes, reasons
