@@ -59,7 +59,7 @@ class Optimum:
             return f"no tolerances to first order: the response at {at:.6g} Hz has none ({_words(reason)})"
         if not found:
             return ""
-        most, added = next(iter(found["by"].items()))
+        most, added = found["by"][0]
         return (
             f"tolerances to first order: at worst {1 - found['worst']:.1%} gained (runs there: "
             f"{1 - found['run']:.1%}), in the mean {1 - found['mean']:.1%}; {most} costs most, {added:.2%}"

@@ -27,7 +27,7 @@ def estimate(
 
     response: (f,) amplitudes of the design as it is; run: gives the amplitude of one that is off.
     worst: with every deviation at the worse end of its width; run: what runs have there; mean: over the sample; by:
-    what each width adds to the worst, the largest first; frequency_hz: of the worst, None for the mean of a band;
+    [name, what its width adds to the worst], largest first; frequency_hz: of the worst, None for the mean of a band;
     without: number of responses without derivatives, by the reason: they stay as they are. Where one that may count has
     none, its frequency and reason only. Empty without tolerances.
     """
@@ -36,7 +36,7 @@ def estimate(
         return {}
     whole = study.table.over_band == "mean"
     slopes, without = np.zeros((len(response), len(widths))), Counter[str]()
-    nothing: dict[str, Any] = dict.fromkeys(("worst", "run", "mean")) | {"by": {}}
+    nothing: dict[str, Any] = dict.fromkeys(("worst", "run", "mean")) | {"by": []}
     for f in np.argsort(-response, kind="stable").tolist():  # nan first: -nan is nan
         frequency = float(study.frequencies[f])
         scene = study.scene_of(design, NO_DEVIATION, frequency)
@@ -68,6 +68,6 @@ def estimate(
     return {
         "worst": float(total[at]), "run": run(design, corner),
         "mean": float(np.mean([np.max(response + moved(deviation)) for deviation in sample])),
-        "by": dict(sorted(by, key=lambda item: -item[1])),
+        "by": sorted(map(list, by), key=lambda item: -item[1]),
         "frequency_hz": None if whole else float(study.frequencies[at]), "without": dict(without),
     }  # fmt: skip
