@@ -9,8 +9,8 @@ whole band confirm it. Where a response does not repeat its amplitude stays as t
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -25,67 +25,57 @@ _NEAR = 0.7
 _FIRST, _LEAST, _GROWTH, _SHRINKAGE = 0.1, 1e-4, 2.0, 0.25
 #: gain of a step that is worth another one, relative
 _GAIN = 1e-5
+#: designs from which gradients start, at most, and how far apart they are, as a fraction of the variables' ranges
+_STARTS, _APART = 4, 0.1
 #: iterations within a step, and their tolerance
 _ITERATIONS, _TOLERANCE = 15, 1e-9
 _PATHS = {"mass_ratio": "mass", "gap_ratio": "gap"}
 
 
-class Trial(Protocol):
-    """Runs of designs as designed."""
-
-    study: Study
-
-    def tried(self, design: Design) -> tuple[float, np.ndarray]:
-        """Return the amplitude of a design, and those at the frequencies (f,), nan where a run is not ok."""
+#: gives the amplitude of a design as it is, and those at the frequencies (f,), nan where a run is not ok
+Tried = Callable[[Design], tuple[float, np.ndarray]]
 
 
-class Descent(NamedTuple):
-    """Where gradients lead.
+def descend(study: Study, tried: Tried, designs: Sequence[Design]) -> tuple[Design, dict[str, Any]]:
+    """Return the best design that gradients lead to from the first of some designs, or from others, and how.
 
-    before, after: amplitudes of the best first design and of the last one; steps: designs that were tried, and taken:
-    of these; orbits: found on the way, with their derivatives; without: number of responses that counted and had no
-    derivatives, by the reason. None: there was no search.
+    designs: the best one first; each keeps its number of bodies.
+    before, after: amplitudes of the first design and of the last one, None without a search; steps: designs that were
+    tried; taken: of these; orbits: found on the way, with their derivatives; without: number of responses that counted
+    and had no derivatives, by the reason.
     """
-
-    design: Design
-    before: float | None = None
-    after: float | None = None
-    steps: int = 0
-    taken: int = 0
-    orbits: int = 0
-    without: Mapping[str, int] = {}
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {name: value for name, value in self._asdict().items() if name != "design"}
-
-
-def descend(trial: Trial, starts: Sequence[Design]) -> Descent:
-    """Return the best design that gradients lead to from the first of some designs, or from the others if that fails.
-
-    starts: the best one first. Each keeps its number of bodies.
-    """
-    study, best = trial.study, starts[0]
     names = [name for name in _PATHS if len(set(getattr(study.table.variables, name))) > 1]
-    if not names or not study.table.gradient_steps:
-        return Descent(best)
-    before, response = trial.tried(best)
-    found, without = Descent(best, before, before), Counter[str]()
-    for start in starts:
-        amplitude, response = (before, response) if start is best else trial.tried(start)
+    how: dict[str, Any] = {"before": None, "after": None, "steps": 0, "taken": 0, "orbits": 0, "without": {}}
+    for start in _starts(study, names, designs) if names and study.table.gradient_steps else ():
+        amplitude, response = tried(start)
+        if how["before"] is None:
+            how |= {"before": amplitude, "after": amplitude}
         surface = _Surface(study, names, start, response)
         design, after, steps, taken = _descended(
-            trial, surface, start, amplitude, study.table.gradient_steps - found.steps
+            tried, surface, start, amplitude, study.table.gradient_steps - how["steps"]
         )
-        without += surface.without
-        found = found._replace(steps=found.steps + steps, orbits=found.orbits + surface.orbits, without=dict(without))
-        if after < before:
-            return found._replace(design=design, after=after, taken=taken)
-    return found
+        how["without"] = dict(surface.without + Counter(how["without"]))
+        how |= {"steps": how["steps"] + steps, "orbits": how["orbits"] + surface.orbits}
+        if after < how["before"]:
+            return design, how | {"after": after, "taken": taken}
+    return designs[0], how
+
+
+def _starts(study: Study, names: Sequence[str], designs: Sequence[Design]) -> list[Design]:
+    """Return the first of some designs that are not close to each other."""
+    ranges, chosen = {name: np.ptp(getattr(study.table.variables, name)) for name in names}, list[Design]()
+    for design in designs:
+        apart = (
+            max(abs(getattr(design, name) - getattr(other, name)) / ranges[name] for name in names)
+            for other in chosen if other.bodies == design.bodies
+        )  # fmt: skip
+        if len(chosen) < _STARTS and min(apart, default=np.inf) >= _APART:
+            chosen.append(design)
+    return chosen
 
 
 def _descended(
-    trial: Trial, surface: _Surface, start: Design, amplitude: float, most: int
+    tried: Tried, surface: _Surface, start: Design, amplitude: float, most: int
 ) -> tuple[Design, float, int, int]:
     """Return the design that `most` steps lead to, its amplitude, and how many were tried and taken."""
     best, reach, steps, taken = start, _FIRST, 0, 0
@@ -95,7 +85,7 @@ def _descended(
         if moved < _LEAST:
             break
         design, steps = surface.design(place), steps + 1
-        found, response = trial.tried(design)
+        found, response = tried(design)
         gain = 1.0 - found / amplitude
         if gain <= 0.0:
             surface.consider(response)

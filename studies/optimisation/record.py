@@ -95,7 +95,7 @@ class Optimisation:
     frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
                        where a run is not ok
     headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
-    gradient           where derivatives led the best design as designed (gradient.Descent)
+    gradient           where derivatives led the best design as designed (gradient.descend)
     scenes, trouble    number of runs, and of those with another status than ok
     wall_time_s        s
     sentence           the answer in words

@@ -31,8 +31,6 @@ from vanedamp.studies.terminal import stage
 
 #: generations of a search, at least
 _GENERATIONS = 5
-#: designs from which gradients start, at most, and how far apart they are, as a fraction of the variables' ranges
-_STARTS, _APART = 4, 0.1
 _Deviation = Mapping[str, float]
 
 
@@ -61,10 +59,9 @@ def _measures(study: Study) -> tuple[str, str]:
 def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
     started, table = time.perf_counter(), study.table
     with stage("search as designed"):
-        descent = descend(trial, trial.starts(trial.search(False, None)))
-        first = descent.design
+        first, gradient = descend(study, trial.tried, trial.best_designs(trial.search(False, [])))
     with stage("search within tolerances"):
-        second = trial.search(True, trial.generation(first)) if len(trial.sample) > 1 else first
+        second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
@@ -101,7 +98,7 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
-        gradient=descent.to_json(),
+        gradient=gradient,
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
@@ -171,8 +168,8 @@ class _Trial:
         curves = (known, known, none, none, none, undamped, fixed)
         return headline(self.study.frequencies, *curves, peaks, along_frequency=True)
 
-    def search(self, robust: bool, first: np.ndarray | None) -> Design:
-        """Return the best design by differential evolution, from a first generation or from a Latin hypercube.
+    def search(self, robust: bool, designs: Sequence[Design]) -> Design:
+        """Return the best design by differential evolution, from the first of some designs or from a Latin hypercube.
 
         robust: within the tolerances, or as designed.
         """
@@ -181,41 +178,23 @@ class _Trial:
             return self._design([])
         bounds = [getattr(table.variables, name) for name in names]
         size = max(5, table.evaluations // max(_GENERATIONS, math.isqrt(table.evaluations)))
-        if first is None:
+        first = np.array([[getattr(design, name) for name in names] for design in designs[:size]], float)
+        if not designs:
             first = qmc.scale(qmc.LatinHypercube(len(names), seed=table.seed).random(size), *np.transpose(bounds))
 
         def objective(columns: np.ndarray) -> np.ndarray:
             return self._tried([self._design(column) for column in np.atleast_2d(columns.T)], robust)
 
         minimum = differential_evolution(
-            objective, bounds, init=first[:size], maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
+            objective, bounds, init=first, maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
             seed=table.seed, updating="deferred", vectorized=True, integrality=[name == "bodies" for name in names],
         )  # fmt: skip
         return self._design(minimum.x)
 
-    def _best_designs(self, best: Design) -> list[Design]:
+    def best_designs(self, best: Design) -> list[Design]:
         """Return the designs so far, that one first, then the others from the best to the worst."""
         ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
-        return list(dict.fromkeys(design for design, _, _ in ordered))
-
-    def generation(self, best: Design) -> np.ndarray:
-        """Return the best designs so far (s, variables), that one first, as the first generation of another search."""
-        return self._columns(self._best_designs(best))
-
-    def _columns(self, designs: Sequence[Design]) -> np.ndarray:
-        return np.array([[getattr(design, name) for name in self._variables] for design in designs], float)
-
-    def starts(self, best: Design) -> list[Design]:
-        """Return some of the best designs so far that are not close to each other, that one first."""
-        if not self._variables:
-            return [best]
-        ranges = np.array([np.ptp(getattr(self.study.table.variables, name)) for name in self._variables])
-        chosen: list[Design] = []
-        for design in self._best_designs(best):
-            apart = [np.abs(np.diff(self._columns([design, other]), axis=0) / ranges).max() for other in chosen]
-            if min(apart, default=np.inf) >= _APART:
-                chosen.append(design)
-        return chosen[:_STARTS]
+        return list(dict.fromkeys([best, *(design for design, _, _ in ordered)]))
 
     def _tried(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes of `judge`, and keep them in the history."""
