@@ -21,7 +21,7 @@ from vanedamp.files.toml_input import InputError
 #: relative distance of an orbit's amplitude from the run's: the transient that is left, and not another orbit
 _SAME = 0.02
 #: reasons of this module; others are those of sensitivities
-_NOT_PERIODIC, _DEFLECTS, _NOT_OK = "not_periodic", "static_deflection", "not_ok"
+_NOT_PERIODIC, _DEFLECTS, _NOT_OK, _REFUSED = "not_periodic", "static_deflection", "not_ok", "refused"
 
 
 class Slope(NamedTuple):
@@ -53,14 +53,19 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
     """Return the slope of the motion on which a scene settles, or why there is none.
 
     measure: name of an amplitude; amplitude: of the scene's run, m, nan for a run that is not ok. Amplitudes about a
-    static deflection have none.
+    static deflection have none, nor have scenes of another method, or that orbits refuse.
     """
     if not np.isfinite(amplitude):
         return _NOT_OK
+    if scene.solver.method != "exact":
+        return _REFUSED
     if deflects(scene, assemble(scene)):
         return _DEFLECTS
-    orbit = settled_orbit(scene)
-    found = _NOT_PERIODIC if orbit is None else slope_of(orbit, paths, measure)
+    try:
+        orbit = settled_orbit(scene)
+        found = _NOT_PERIODIC if orbit is None else slope_of(orbit, paths, measure)
+    except InputError:
+        return _REFUSED
     return _NOT_PERIODIC if isinstance(found, Slope) and not found.agrees(amplitude) else found
 
 

@@ -159,6 +159,19 @@ def test_where_the_worst_does_not_repeat_the_gradient_leads_nowhere():
     assert "the gradient leads no further" in record.remarks[0]
 
 
+def test_other_methods_and_static_deflections_have_no_derivatives():
+    for change, reason in (
+        ({"solver.method": "moreau", "solver.steps_per_period": 100}, "refused"),
+        ({"gravity.orientation_deg": 30.0}, "static_deflection"),
+    ):
+        case = study(band=(2364.0, 2436.0, 2), tolerances={"gap": 0.01}, samples=1, evaluations=5)
+        case = case._replace(scene=case.scene.replace(change))
+        variables = replace(case.table.variables, mass_ratio=(0.09, 0.1), gap_ratio=(0.85, 0.85))
+        record = optimise(case._replace(table=replace(case.table, variables=variables)))
+        assert set(record.gradient["without"]) == set(record.nominal.estimate["without"]) == {reason}
+        assert record.gradient["steps"] == record.gradient["orbits"] == 0
+
+
 def replace_variables(case, design):
     """The study with one design only."""
     variables = replace(case.table.variables, mass_ratio=(design.mass_ratio,) * 2, gap_ratio=(design.gap_ratio,) * 2)
