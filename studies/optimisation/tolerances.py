@@ -37,7 +37,7 @@ def estimate(
     whole = study.table.over_band == "mean"
     slopes, without = np.zeros((len(response), len(widths))), Counter[str]()
     nothing: dict[str, Any] = dict.fromkeys(("worst", "run", "mean")) | {"by": []}
-    for f in np.argsort(-response, kind="stable").tolist():  # nan first: -nan is nan
+    for f in np.argsort(-response, kind="stable").tolist():
         frequency = float(study.frequencies[f])
         scene = study.scene_of(design, NO_DEVIATION, frequency)
         paths, amplitude = [study.paths[name] for name in widths], study.reference * float(response[f])
