@@ -49,6 +49,19 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     return replace(found, parameter=search.low)
 
 
+def settled_orbit(scene: Scene) -> Orbit | None:
+    """Return the orbit on which the run of a scene settles; None if it does not."""
+    response = simulate(scene)
+    kind = response.classification
+    if response.final is None or kind == "non-periodic":
+        return None
+    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
+    turns = scene.rotation if scene.excitation.engine_order is not None else None
+    parameter = FREQUENCY if turns is None else f"rotation.{'speed' if turns.rpm is None else 'rpm'}"
+    orbit = find_orbit(replace(scene, orbit=Table(parameter=parameter, periods=periods)), response.final)
+    return orbit if orbit.status is OrbitStatus.OK else None
+
+
 def orbits(
     scene: Scene,
     progress: Callable[[int, int], None] | None = None,
