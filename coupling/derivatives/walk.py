@@ -18,7 +18,8 @@ from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without.
 
-    half_way: (k,) the state half a period after the start, None if the engine has not come so far.
+    half_way: the state (k,) half a period after the start, and its derivative (k, k), which is one only in a passage
+    with its derivative; None if the engine has not come so far.
     """
 
     def __init__(
@@ -27,7 +28,7 @@ class PassageWalk:
         self._frame, self._dynamics, self._names, self._whole = frame, dynamics, names, derivative
         self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
-        self.half_way: np.ndarray | None = None
+        self.half_way: tuple[np.ndarray, np.ndarray] | None = None
 
     def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
@@ -55,8 +56,8 @@ class PassageWalk:
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
             if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
-                middle, _ = flow.after(z, half - segment.time)
-                self.half_way = dynamics.to_state @ middle[: dynamics.one]
+                middle, power = flow.after(z, half - segment.time)
+                self.half_way = dynamics.to_state @ middle[: dynamics.one], dynamics.to_state @ power @ M / dynamics.scale
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue

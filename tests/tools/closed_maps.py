@@ -47,6 +47,10 @@ class ClosedMap:
             raise InputError(f"scene: value: {self.lowest:g} is the least")
         return replace(self, value=value)
 
+    def with_numbers(self, values: dict[str, float]) -> ClosedMap:
+        """Return the map at two values, a tuple of them."""
+        return replace(self, value=tuple(values.values()))
+
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
 

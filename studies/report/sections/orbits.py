@@ -19,6 +19,7 @@ from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
+from vanedamp.studies.report.border_chart import borders_figure, borders_table, maps_of
 from vanedamp.studies.report.charts import Table, axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, quantity
 from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_table
@@ -71,10 +72,22 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     shown["multipliers"] = page.chart(
         "multipliers", _multipliers_figure(branches), *_multipliers_table(branches), files
     )
+    shown["borders"] = [_borders(record, page, files) for record in records.values() if record.borders]
     named, shown["missing"] = _histories(branches)
     if named:
         shown["orbits"] = page.chart("orbits", orbits_figure(named), *orbits_table(named), files)
     return shown
+
+
+def _borders(branches: Branches, page: Page, files: list[str]) -> dict[str, Any]:
+    """Return the chart of a file's borders over the first sweep with the same two axes."""
+    sweeps = {file: result.record for file, result in page.results.kinds["sweep"].items()}
+    maps = maps_of(branches, sweeps)
+    figure = borders_figure(branches, next(iter(maps.values()), None))
+    return {
+        "record": branches, "units": unit_of(branches.second),
+        "chart": page.chart("borders", figure, *borders_table(branches), [*files, *list(maps)[:1]]),
+    }  # fmt: skip
 
 
 def _row(branches: Branches, number: int) -> dict[str, Any]:

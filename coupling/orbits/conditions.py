@@ -1,0 +1,275 @@
+"""Conditions on orbits over two numbers: scalar functions that vanish where orbits bifurcate, graze or peak.
+
+A singular matrix is seen by a bordered system, which is regular and whose last unknown vanishes with the determinant
+(Griewank and Reddien 1984; Govaerts 2000, Numerical Methods for Bifurcations of Dynamical Equilibria, chapter 3).
+Normal forms are those of maps (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 5.4 and 9).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.linalg import eigvals, solve, svd
+
+from vanedamp.coupling.derivatives.passage import Passage
+from vanedamp.coupling.orbits.multipliers import decided, indicators
+from vanedamp.coupling.orbits.surface import Surface, difference
+
+#: clearance, relative to its scale, up to which an orbit is followed that does not graze yet: the border itself is
+#: extrapolated, which leaves its square
+_LEVEL = 1e-7
+#: scaled steps of differences: of first derivatives for a normal form, of amplitudes, and of conditions
+_NORMAL_FORM, _AMPLITUDE, _STEP, _SMALL_STEP = 1e-4, 1e-5, 1e-7, 1e-2 * _LEVEL
+
+
+class Counts(NamedTuple):
+    """Orbits that meet at a border, and stable ones of them, at a smaller and a larger first number: (2,) each."""
+
+    orbits: tuple[int, int]
+    stable: tuple[int, int]
+
+
+class Condition(Protocol):
+    """A condition on y. step: of its differences; level: by which its zero is away from the border."""
+
+    step: float
+    level: float
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the function that vanishes; nan where it is none."""
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Condition:
+        """Return the condition with what it refers to taken from a point of the border."""
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return functions that vanish at points of codimension two, by their names."""
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbits on both sides.
+
+        rate: of the condition along the branch per its first number; along: (k,) slope of the residual by that.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Singular:
+    """A multiplier `unit`, 1 or -1, of the surface's map; b, c: (k,) borders of the singular matrix."""
+
+    surface: Surface
+    kind: str
+    unit: float
+    neutral: int
+    b: np.ndarray
+    c: np.ndarray
+    step: float = _STEP
+    level: float = 0.0
+
+    @classmethod
+    def of(cls, surface: Surface, kind: str, neutral: int, passage: Passage) -> Singular:
+        """Return the condition by the singular vectors at a passage."""
+        unit = 1.0 if kind == "fold" else -1.0
+        nothing = np.zeros(surface.size)
+        found = cls(surface, kind, unit, neutral, nothing, nothing)
+        left, _, right = svd(found._matrix(passage))
+        return replace(found, b=left[:, -1], c=right[-1])
+
+    def _matrix(self, passage: Passage) -> np.ndarray:
+        if self.unit > 0:
+            return self.surface.deflated(passage)
+        return self.surface.derivative(passage) + np.eye(self.surface.size)
+
+    def _solved(self, passage: Passage) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return right and left null vectors (k,) and what is left of them."""
+        size = self.surface.size
+        matrix = np.zeros((size + 1, size + 1))
+        matrix[:-1, :-1], matrix[:-1, -1], matrix[-1, :-1] = self._matrix(passage), self.b, self.c
+        right = solve(matrix, np.eye(size + 1)[-1])
+        left = solve(matrix.T, np.eye(size + 1)[-1])
+        return right[:-1], left[:-1], float(right[-1])
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the last unknown of the bordered system."""
+        return self._solved(passage)[2]
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Singular:
+        """Return the condition with the null vectors of a passage as borders."""
+        right, left, _ = self._solved(passage)
+        return replace(self, b=left / np.linalg.norm(left), c=right / np.linalg.norm(right))
+
+    def _normal_form(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the coefficient of the normal form, times the product of the null vectors; nan where it is unknown.
+
+        Of a fold, of second order: zero at a cusp. Of the others, of third order: above zero, the orbits that bifurcate
+        are as stable as the others were.
+        """
+        right, left, _ = self._solved(passage)
+        step = _NORMAL_FORM * np.append(right, (0.0, 0.0))
+        above, below = (self.surface.passage(y + way * step) for way in (1, -1))
+        if above is None or below is None or not above.sequence == below.sequence == passage.sequence:
+            return np.nan
+        M, up, down = (self.surface.derivative(each) for each in (passage, above, below))
+        second = (up - down) / (2 * _NORMAL_FORM)
+        if self.unit > 0:
+            return float(left @ second @ right / 2)
+        third = (up + down - 2 * M) / _NORMAL_FORM**2
+        bent = solve(np.eye(len(M)) - M, second @ right)
+        return float(left @ third @ right / 6 + left @ second @ bent / 2)
+
+    def _others(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers but those that are known to have modulus 1."""
+        values = decided(eigvals(self.surface.derivative(passage)), self.neutral)
+        return np.delete(values, np.argmin(np.abs(values - self.unit)))
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return the product of the null vectors, the coefficient of the normal form, other multipliers."""
+        right, left, _ = self._solved(passage)
+        rest = indicators(self._others(passage), 0)
+        product, form = float(left @ right), self._normal_form(y, passage)
+        if self.unit > 0:
+            flip = "fold-pitchfork" if self.surface.mirrored else "fold-flip"
+            found = {"cusp": form, "1:1 resonance": product, flip: rest.doubling}
+        elif self.surface.mirrored:
+            found = {"generalised pitchfork": form / product, "1:1 resonance": product, "fold-pitchfork": rest.unity}
+        else:
+            found = {"generalised doubling": form / product, "1:2 resonance": product, "fold-flip": rest.unity}
+        return found | {f"{self.kind}-Neimark-Sacker": rest.torus}
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return two orbits on one side of a fold; of the others those that bifurcate, too."""
+        right, left, _ = self._solved(passage)
+        form, product = self._normal_form(y, passage), float(left @ right)
+        inside = bool(np.all(np.abs(self._others(passage)) < 1.0))
+        if self.unit > 0:
+            larger = form * float(left @ along) < 0.0
+            return Counts((0, 2) if larger else (2, 0), (0, int(inside)) if larger else (int(inside), 0))
+        inward, supercritical = -rate / product > 0.0, form / product > 0.0  # multiplier, by the first number
+        new = 2 if self.surface.mirrored else 1
+        own = (0, 1) if inward else (1, 0)
+        # they are on the side where the others are unstable, if stable ones go out
+        beside = own[::-1] if supercritical else own
+        orbits = tuple(1 + new * there for there in beside)
+        stable = tuple(
+            inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True)
+        )
+        return Counts((orbits[0], orbits[1]), (stable[0], stable[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near a point of the border."""
+
+    surface: Surface
+    neutral: int
+    total: float
+    step: float = _STEP
+    level: float = 0.0
+
+    def _pair(self, passage: Passage) -> tuple[complex, complex, np.ndarray]:
+        """Return product and sum of the pair, and the other multipliers."""
+        values = decided(eigvals(self.surface.derivative(passage)), self.neutral)
+        pairs = list(itertools.combinations(range(len(values)), 2))
+        ends = [(values[i] * values[j], values[i] + values[j]) for i, j in pairs]
+        best = min(range(len(pairs)), key=lambda n: abs(ends[n][0] - 1.0) + abs(ends[n][1] - self.total))
+        return (*ends[best], np.delete(values, pairs[best]))
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the product of the pair, less one."""
+        return float(self._pair(passage)[0].real) - 1.0
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Pair:
+        """Return the condition on the pair of a passage."""
+        return replace(self, total=float(self._pair(passage)[1].real))
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return the distance of the pair's angle from small fractions of a turn, and other multipliers."""
+        _, total, others = self._pair(passage)
+        rest = indicators(others, 0)
+        strong = {f"1:{n} resonance": total.real - at for n, at in ((1, 2.0), (2, -2.0), (3, -1.0), (4, 0.0))}
+        return strong | {"fold-Neimark-Sacker": rest.unity, "flip-Neimark-Sacker": rest.doubling}
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbit itself, stable on one side; the torus is not counted."""
+        inside = int(np.all(np.abs(self._pair(passage)[2]) < 1.0))
+        return Counts((1, 1), (0, inside) if rate < 0.0 else (inside, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level."""
+
+    surface: Surface
+    neutral: int
+    step: float = _SMALL_STEP
+    level: float = _LEVEL
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the smallest clearance, less the level."""
+        least = passage.clearance[0]
+        return least - self.level if np.isfinite(least) else np.nan
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Clearance:
+        """Return the condition."""
+        return self
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return what of the multipliers is critical."""
+        rest = indicators(eigvals(self.surface.derivative(passage)), self.neutral)
+        return {
+            "grazing-fold": rest.unity, "grazing-flip": rest.doubling, "grazing-Neimark-Sacker": rest.torus
+        }  # fmt: skip
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbit without the event, on one side; those with it are not counted."""
+        inside = _inside(self.surface, self.neutral, passage)
+        return Counts((0, 1), (0, inside)) if rate > 0.0 else Counts((1, 0), (inside, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """A largest amplitude along a branch over the first number; way: (k + 1,) direction of that branch."""
+
+    surface: Surface
+    neutral: int
+    way: np.ndarray
+    step: float = 10 * _AMPLITUDE
+    level: float = 0.0
+
+    def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return the unit tangent (k + 1,) of the branch."""
+        derivative = np.column_stack([self.surface.deflated(passage), self.surface.columns(y, passage)[:, 0]])
+        tangent = svd(derivative)[2][-1]
+        return np.asarray(tangent if tangent @ self.way > 0.0 else -tangent)
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the slope of the logarithm of the amplitude along the branch."""
+
+        def amplitude(at: np.ndarray) -> float | None:
+            other = self.surface.passage(at, False)
+            return float(other.peaks.mean()) if other is not None and other.sequence == passage.sequence else None
+
+        mean = float(passage.peaks.mean())
+        slope = difference(amplitude, y, np.append(self._tangent(y, passage), 0.0), _AMPLITUDE, mean)
+        return np.nan if slope is None or mean == 0.0 else float(slope) / mean
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
+        """Return the condition with the branch at a passage."""
+        return replace(self, way=self._tangent(y, passage))
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return what of the multipliers is critical."""
+        rest = indicators(eigvals(self.surface.derivative(passage)), self.neutral)
+        return {"peak-fold": rest.unity, "peak-flip": rest.doubling, "peak-Neimark-Sacker": rest.torus}
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbit itself."""
+        inside = _inside(self.surface, self.neutral, passage)
+        return Counts((1, 1), (inside, inside))
+
+
+def _inside(surface: Surface, neutral: int, passage: Passage) -> int:
+    """Return 1 where all multipliers but the neutral ones lie inside the unit circle, else 0."""
+    return int(np.all(np.abs(decided(eigvals(surface.derivative(passage)), neutral)) < 1.0))
