@@ -2,38 +2,60 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from vanedamp.coupling.derivatives.derivative import Before, Derivative, Guard, begins
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.event_names import EventNames
-from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.jump import Untrusted
+from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
+from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 
 
-class PassageWalk:
-    """One passage from a state (k,), with its derivative or without.
+class Watch(Protocol):
+    """Measures a motion and its derivatives by numbers, P columns behind those by the start."""
 
-    half_way: the state (k,) half a period after the start, and its derivative (k, k), which is one only in a passage
-    with its derivative; None if the engine has not come so far.
+    def segment(self, begun: Before, course: Course) -> None:
+        """Take the motion until the next event. begun: its start, with the derivative there."""
+
+    def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+        """Take an event, or a period's end. M: the derivative after it; shift: (P,) of its time, s."""
+
+    def end(self, before: Before) -> None:
+        """Take the end of the motion."""
+
+
+class PassageWalk:
+    """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
+
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
+    a search for the clearance; given: as in Start; half_way: state (k,) and derivatives (k, k) and (k, P) half a period
+    after the start, of a passage without its derivative only the state; None if the engine has not come so far.
     """
 
     def __init__(
-        self, frame: Frame, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool
-    ) -> None:
-        self._frame, self._dynamics, self._names, self._whole = frame, dynamics, names, derivative
-        self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
+        self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
+        numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
+        given: bool = False,
+    ) -> None:  # fmt: skip
+        self._dynamics, self._names, self._whole = dynamics, names, derivative
+        self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
+        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns, given), numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
-        self.half_way: tuple[np.ndarray, np.ndarray] | None = None
+        self.half_way: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
-        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self._derivative
+        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self.derivative
         state, derivative = np.full(k, np.nan), np.full((k, k), np.nan)
+        by_number = np.full((k, 0 if self._numbers is None else len(self._numbers)), np.nan)
         with np.errstate(invalid="ignore"):  # a derivative that is not known is nan
             before = self._walked(walk)
             final = run.final() if walk.status is Status.OK else None
@@ -41,10 +63,14 @@ class PassageWalk:
                 made.worsen(PassageStatus.STOPPED)
             else:
                 state = self._frame.state_of(final)
+                if self._watch is not None:
+                    self._watch.end(before)
                 if self._whole:
-                    derivative = made.end(before, state, periods * self._frame.system.period)
+                    derivative, by_number = made.end(before, state, periods)
         peaks = run.records.peak[:periods].copy()
-        return Passage(state, derivative, tuple(self._crossings), self._clearance, made.status, peaks)
+        return Passage(
+            state, derivative, tuple(self._crossings), self._clearance, made.status, peaks, by_number
+        )  # fmt: skip
 
     def _walked(self, walk: Walk) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
@@ -56,21 +82,35 @@ class PassageWalk:
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
             if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
-                middle, power = flow.after(z, half - segment.time)
-                self.half_way = dynamics.to_state @ middle[: dynamics.one], dynamics.to_state @ power @ M / dynamics.scale
+                middle = self._followed(Before(segment, segment.event, flow, z, M), half - segment.time, None)
+                self.half_way = dynamics.to_state @ middle.u, *self.derivative.reached(middle, 0.5)
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue
-            least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
-            if least < self._clearance[0]:
-                self._clearance = least, self._names.possible(unit, what)
-            z, power = flow.after(z, segment.duration)
-            before = Before(segment, segment.event, flow, z, power @ M)
+            if self._watch is None:
+                least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
+                if least < self._clearance[0]:
+                    self._clearance = least, self._names.possible(unit, what)
+            before = self._followed(Before(segment, segment.event, flow, z, M), segment.duration, self._watch)
         return before
+
+    def _followed(self, begun: Before, duration: float, watch: Watch | None) -> Before:
+        """Return the motion a duration after the start of a segment, s."""
+        segment, flow, k = begun.segment, begun.flow, len(self._dynamics.scale)
+        z, power = flow.after(begun.z, duration)
+        if self._numbers is None:
+            return begun._replace(z=z, M=power @ begun.M)
+        Z = self._numbers.harmonics(self._dynamics, segment.start).T
+        Z[: len(power)] = begun.M[:, k:]
+        series = derivative_of(flow, self._numbers).series
+        course = series.course(begun.z, Z, duration, watch is not None)
+        if watch is not None:
+            watch.segment(begun, course)
+        return begun._replace(z=z, M=np.hstack([power @ begun.M[:, :k], course.end[: len(power)]]))
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
         """Return the derivative as a segment begins, nan where it is unknown, and keep the event before it."""
-        made, guards = self._derivative, list[Guard]()
+        made, guards = self.derivative, list[Guard]()
         if before is not None and before.event.unit >= 0:
             guards = made.guards(before, segment) if self._whole else []
             name = self._names.event(before.flow.named, flow.named, before.event.struck)
@@ -82,7 +122,10 @@ class PassageWalk:
         try:
             if before is None:
                 return made.begin(walk.start, segment, flow, u)
-            return made.after(before, segment, flow, u, guards)
+            M = made.after(before, segment, flow, u, guards)
         except Untrusted:
             made.worsen(PassageStatus.UNDETERMINED)
-            return np.full_like(self._dynamics.from_state, np.nan)
+            M = np.full((len(u), len(made.shift)), np.nan)
+        if before is not None and self._watch is not None:
+            self._watch.event(before, segment, M, made.shift[len(self._dynamics.scale) :])
+        return M

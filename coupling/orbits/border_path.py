@@ -68,9 +68,12 @@ class Named(NamedTuple):
 def place_of(
     surface: Surface, condition: Condition, y: np.ndarray, passage: Passage, row: np.ndarray, iterations: int = 0
 ) -> Place | None:
-    """Return a point of a border that continues in the direction of `row` (k + 2,); None where it has no gradient."""
+    """Return a point of a border that continues in the direction of `row` (k + 2,); None where it has no
+    derivative."""
     condition = condition.renewed(y, passage)
-    columns = surface.columns(y, passage)
+    columns = surface.columns(y)
+    if columns is None:
+        return None
     plane = svd(np.hstack([surface.deflated(passage), columns]))[2][-2:].T
     here = condition.value(y, passage)
 

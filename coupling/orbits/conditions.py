@@ -238,10 +238,12 @@ class Peak:
     step: float = 10 * _AMPLITUDE
     level: float = 0.0
 
-    def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray:
-        """Return the unit tangent (k + 1,) of the branch."""
-        derivative = np.column_stack([self.surface.deflated(passage), self.surface.columns(y, passage)[:, 0]])
-        tangent = svd(derivative)[2][-1]
+    def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray | None:
+        """Return the unit tangent (k + 1,) of the branch; None where it is unknown."""
+        column = self.surface.columns(y, 1)
+        if column is None:
+            return None
+        tangent = svd(np.hstack([self.surface.deflated(passage), column]))[2][-1]
         return np.asarray(tangent if tangent @ self.way > 0.0 else -tangent)
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
@@ -251,13 +253,16 @@ class Peak:
             other = self.surface.passage(at, False)
             return float(other.peaks.mean()) if other is not None and other.sequence == passage.sequence else None
 
-        mean = float(passage.peaks.mean())
-        slope = difference(amplitude, y, np.append(self._tangent(y, passage), 0.0), _AMPLITUDE, mean)
+        mean, tangent = float(passage.peaks.mean()), self._tangent(y, passage)
+        if tangent is None:
+            return np.nan
+        slope = difference(amplitude, y, np.append(tangent, 0.0), _AMPLITUDE, mean)
         return np.nan if slope is None or mean == 0.0 else float(slope) / mean
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
         """Return the condition with the branch at a passage."""
-        return replace(self, way=self._tangent(y, passage))
+        way = self._tangent(y, passage)
+        return self if way is None else replace(self, way=way)
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
         """Return what of the multipliers is critical."""

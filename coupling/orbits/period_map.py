@@ -14,6 +14,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
@@ -39,7 +40,7 @@ class PeriodMap:
 
     scene: with the map's parameter (a dotted path in it) at its value; scale: (k,) typical sizes of the coordinates,
     the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
-    of states are, rad/s; None: the scene's own.
+    of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives.
     """
 
     scene: Scene
@@ -47,6 +48,7 @@ class PeriodMap:
     periods: int
     scale: np.ndarray
     speed: float | None = None
+    numbers: tuple[str, ...] = ()
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
     _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
@@ -57,6 +59,10 @@ class PeriodMap:
     @cached_property
     def _dynamics(self) -> Dynamics:
         return Dynamics(self._frame, self.scale)
+
+    @cached_property
+    def _numbers(self) -> Numbers | None:
+        return numbers_of(self.scene, self.numbers, self._dynamics, self.speed) if self.numbers else None
 
     @cached_property
     def _event_names(self) -> EventNames:
@@ -74,20 +80,21 @@ class PeriodMap:
         are unknown, and the status is OK or STOPPED.
         """
         if not np.all(np.isfinite(state)):
-            return Passage.stopped(state, self.periods)
+            return Passage.stopped(state, self.periods, len(self.numbers))
         return self._walk(state, self.periods, derivative)[0]
 
     def _walk(
         self, state: np.ndarray, periods: int, derivative: bool
-    ) -> tuple[Passage, tuple[np.ndarray, np.ndarray] | None]:
-        """Return a passage from a state (k,), and state and derivative half a period after the start."""
+    ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
+        """Return a passage from a state (k,), and state and derivatives half a period after the start."""
         system = self._frame.system
         start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
         for earlier in self._earlier:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
-        walk = PassageWalk(self._frame, self._dynamics, self._event_names, state, derivative)
+        numbers = self._numbers if derivative else None
+        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers)
         return walk.passage(run, periods), walk.half_way
 
     def at(self, value: float) -> PeriodMap:
@@ -154,8 +161,8 @@ class PeriodMap:
         image = self._frame.image
         passage, half = self._walk(state, 1, derivative) if np.all(np.isfinite(state)) else (None, None)
         if image is None or passage is None or half is None:
-            return Passage.stopped(state, 1)
-        return passage._replace(state=image @ half[0], derivative=image @ half[1])
+            return Passage.stopped(state, 1, len(self.numbers))
+        return passage._replace(state=image @ half[0], derivative=image @ half[1], by_number=image @ half[2])
 
 
 def period_map(

@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import svd
 
+from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
-#: scaled step of differences of states by numbers: they have the smallest error, some 1e-10, at the cube root of the
-#: states' round-off; and by which steps are shortened where another motion lies within them
-_DIFFERENCE, _SHRINKS = 1e-6, (1.0, 1e-2, 1e-4)
+#: by which steps of differences are shortened where another motion lies within them
+_SHRINKS = (1.0, 1e-2, 1e-4)
 #: passages that are kept for the next step, which often wants them again
 _PASSAGES = 64
 
@@ -112,19 +112,15 @@ class Surface:
         """
         return np.asarray(self.derivative(passage) - np.eye(self.size) + self.left @ self.right.T)
 
-    def columns(self, y: np.ndarray, passage: Passage) -> np.ndarray:
-        """Return the derivative (k, 2) of the residual by the scaled numbers."""
-        found = np.zeros((self.size, 2))
-        for number, row in enumerate(np.eye(len(y))[-2:]):
-
-            def state(at: np.ndarray) -> np.ndarray | None:
-                other = self.passage(at, False)
-                return other.state if other is not None and other.sequence == passage.sequence else None
-
-            slope = difference(state, y, row, _DIFFERENCE, passage.state)
-            if slope is not None:
-                found[:, number] = slope / self.weight
-        return found
+    def columns(self, y: np.ndarray, numbers: int = 2) -> np.ndarray | None:
+        """Return the derivative (k, n) of the residual by the first n scaled numbers; None where it is unknown."""
+        try:
+            along = replace(self.at(y), numbers=self.paths[:numbers])
+            passage = (along.half if self.mirrored else along)(self.state(y))
+        except NotSmooth:
+            return None
+        found = passage.by_number / self.weight[:, None] * self.span[:numbers]
+        return found if np.isfinite(found).all() else None
 
     def neutral(self, derivative: np.ndarray) -> Surface:
         """Return the surface with the neutral directions of an orbit with a derivative (k, k)."""
