@@ -35,7 +35,8 @@ class Border:
     """A border of m points, in order, over the branches' number and a second one.
 
     kind                of the special points that it consists of, or "peak"
-    source              the branch, and its special point, from which it was followed; -1 for a peak
+    source              the branch, and its special point, from which it was followed; for a peak -1 less the
+                        number of the branch's orbit next to it
     periods             of the excitation that its orbits take
     parameter, second   (m,) the two numbers
     state               (m, k) at the start of a period
@@ -134,7 +135,9 @@ def borders_of(values: Mapping[str, Any]) -> tuple[Border, ...]:
         branch, point = values["border_source"][number]
         first, last = values["border_end"][number]
         periods = int(values["border_periods"][number])
-        found.append(Border(kind, (int(branch), int(point)), periods, special=tuple(special), ends=(first, last), **arrays))
+        found.append(
+            Border(kind, (int(branch), int(point)), periods, special=tuple(special), ends=(first, last), **arrays)
+        )
     return tuple(found)
 
 

@@ -85,13 +85,12 @@ def place_of(
         return found if np.isfinite(found) else None
 
     slopes = [difference(value, y, direction, condition.step, here) for direction in plane.T]
-    if any(slope is None for slope in slopes) or not np.any(slopes):
+    known = np.array([np.nan if slope is None else slope for slope in slopes])
+    if not np.isfinite(known).all() or not known.any():
         return None
-    gradient = plane @ np.array(slopes, float)
-    tangent = plane @ np.array([-slopes[1], slopes[0]], float)  # type: ignore[operator]
-    tangent /= np.linalg.norm(tangent)
+    tangent = plane @ np.array([-known[1], known[0]]) / np.linalg.norm(known)
     return Place(
-        y, passage, columns, gradient, tangent if tangent @ row >= 0.0 else -tangent, condition, iterations
+        y, passage, columns, plane @ known, tangent if tangent @ row >= 0.0 else -tangent, condition, iterations
     )  # fmt: skip
 
 
@@ -199,8 +198,8 @@ class BorderPath:
             if place is not None and place.tangent @ head.tangent > _BENT:
                 quick = place.iterations <= _QUICK and place.tangent @ head.tangent > _STRAIGHT
                 # states may change fast: it is the numbers whose steps are bounded
-                most = self.table.max_step / max(float(np.linalg.norm(place.tangent[-2:])), _FLAT)
-                self.step = min(1.5 * step, most) if quick else step
+                longest = self.table.max_step / max(float(np.linalg.norm(place.tangent[-2:])), _FLAT)
+                self.step = min(1.5 * step, longest) if quick else step
                 self._accept(head, place)
                 return
             failed, step = step, step / 4
@@ -213,12 +212,12 @@ class BorderPath:
         if place is None:
             return None
         for number in (-2, -1):
-            edge = min(max(place.y[number], 0.0), 1.0)
+            edge = float(np.clip(place.y[number], 0.0, 1.0))
             if place.y[number] == edge or abs(head.y[number] - edge) < _CLOSE:
                 continue
-            share = (edge - head.y[number]) / (place.y[number] - head.y[number])
-            start, row = head.y + share * (place.y - head.y), np.zeros(len(head.y))
-            start[number], row[number] = edge, np.copysign(1.0, place.y[number] - head.y[number])
+            ahead = float(place.y[number] - head.y[number])
+            start, row = head.y + (edge - head.y[number]) / ahead * (place.y - head.y), np.zeros(len(head.y))
+            start[number], row[number] = edge, np.copysign(1.0, ahead)
             place = solved(self.surface, head, start, row, step) or place
         return place
 
@@ -322,6 +321,8 @@ class BorderPath:
 
     def _note(self, head: Place, after: Passage | None) -> None:
         kind, note = change(head.passage, after)
+        if kind == "grazing":
+            kind = f"{head.condition.kind}-grazing"  # of codimension two
         self.named.append((len(self.places) - 1, Named(kind, note, head.border)))
 
     def _beyond(self, head: Place) -> Iterator[tuple[np.ndarray, Passage]]:

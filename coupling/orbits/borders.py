@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.orbits.border import Border, BorderPoint
-from vanedamp.coupling.orbits.border_path import BorderPath, Place, place_of, solved
+from vanedamp.coupling.orbits.border_path import BorderPath, Named, Place, place_of, solved
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
-from vanedamp.coupling.orbits.conditions import Clearance, Condition, Pair, Peak, Singular
+from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.orbits.surface import Surface
@@ -18,8 +20,19 @@ from vanedamp.files.store import frozen
 
 #: scaled distance of special points that lie on one border, and of a border's point from the special point it begins at
 _SAME, _NEAR = 1e-5, 1e-3
+#: scaled distance ahead that must lie in the range of the second number
+_AHEAD = 1e-6
 #: parts of the way from a grazing orbit to its neighbour on the branch from which Newton's method begins
 _WAYS = (1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+
+
+class _Candidate(NamedTuple):
+    """Kind, special point of the branch (-1 less the number of an orbit for a peak), parameter and how to begin."""
+
+    kind: str
+    point: int
+    parameter: float
+    begin: Callable[[], tuple[Surface, Place | None]]
 
 
 class Borders:
@@ -51,43 +64,38 @@ class Borders:
     def follow(self, branches: Sequence[Branch], changed: Callable[[int, int], None]) -> None:
         """Find all borders; changed: called with the number of places found and of those that there may be."""
         for number, branch in enumerate(branches):
-            for kind, place_in_branch, begin in self._candidates(branch):
-                source = (number, place_in_branch)
-                if any(border.source == source and border.kind == kind for border in self.finished):
+            for kind, at, parameter, begin in self._candidates(branch):
+                source = (number, at)
+                if any(border.source == source for border in self.finished):
                     continue  # of a checkpoint
                 surface, place = begin()
-                where = f"{kind} of branch {number}"
                 if place is None:
-                    self.notes.append(f"{where} at {self.table.parameter} = {self._value(branch, source):.9g}: no border")
+                    self.notes.append(
+                        f"the {kind} of branch {number} at {self.table.parameter} = {parameter:.9g} cannot be followed"
+                    )
                 elif not self._known(kind, branch.periods, place.border):
                     self._follow(kind, branch.periods, source, surface, place, changed)
 
-    def _value(self, branch: Branch, source: tuple[int, int]) -> float:
-        return branch.special[source[1]].parameter if source[1] >= 0 else float(branch.parameter[branch.amplitude_mean.argmax()])
-
     def _known(self, kind: str, periods: int, y: np.ndarray) -> bool:
         """Say whether a border through y at the branches' second number was followed already."""
-        return any(
-            (kind, periods) == (other, of) and np.abs(y - at).max() < _SAME for other, of, at in self._visited
-        )
+        return any((kind, periods) == (other, of) and np.abs(y - at).max() < _SAME for other, of, at in self._visited)
 
     def _follow(
         self, kind: str, periods: int, source: tuple[int, int], surface: Surface, place: Place,
         changed: Callable[[int, int], None],
     ) -> None:  # fmt: skip
         """Follow a border both ways from a place, as far as the ranges of the numbers allow."""
-        paths = []
+        paths: list[BorderPath] = []
+        before = sum(len(border.parameter) for border in self.finished)
         for way in (-1.0, 1.0):
-            head = place._replace(tangent=way * place.tangent)
-            path = BorderPath(surface, self.table, head, self.own)
-            ahead = self.own + 1e-6 * np.sign(path.head.tangent[-1])
-            if not 0.0 <= ahead <= 1.0:
+            path = BorderPath(surface, self.table, place._replace(tangent=way * place.tangent), self.own)
+            paths.append(path)
+            if not 0.0 <= self.own + _AHEAD * np.sign(path.head.tangent[-1]) <= 1.0:
                 path.end = "the end of a number's range"
             while not path.end:
                 path.advance(self.track.max_points)
-                done = sum(len(border.parameter) for border in self.finished) + sum(len(p.places) for p in (*paths, path))
+                done = before + sum(len(each.places) for each in paths)
                 changed(done, done + self.track.max_points)
-            paths.append(path)
             if path.end.startswith("closed"):
                 break
         self._visited += [(kind, periods, y) for y in (place.border, *(y for path in paths for y in path.visits))]
@@ -95,20 +103,18 @@ class Borders:
 
     # -- where borders begin
 
-    def _candidates(self, branch: Branch) -> Iterator[tuple[str, int, Callable[[], tuple[Surface, Place | None]]]]:
-        """Yield kind, special point (-1 for a peak) and how to find the first place of every border of a branch."""
+    def _candidates(self, branch: Branch) -> Iterator[_Candidate]:
+        """Yield where borders of a branch may begin."""
         for number, point in enumerate(branch.special):
-            if point.kind not in self.track.kinds or point.note.startswith("joins"):
-                continue
-            if point.kind in ("grazing", "sequence"):
-                yield point.kind, number, lambda point=point: self._clear(branch, point)
-            else:
-                yield point.kind, number, lambda point=point: self._smooth(branch, point)
+            if point.kind not in self.track.kinds or (point.kind == "pitchfork" and branch.periods > 1):
+                continue  # where a doubled branch joins another one that doubles there
+            begin = self._clear if point.kind in ("grazing", "sequence") else self._smooth
+            yield _Candidate(point.kind, number, point.parameter, partial(begin, branch, point))
         if "peak" in self.track.kinds:
             a, sequence = branch.amplitude_mean, branch.sequence
             for i in range(1, len(a) - 1):
                 if a[i - 1] < a[i] >= a[i + 1] and sequence[i - 1] == sequence[i] == sequence[i + 1]:
-                    yield "peak", -1 - i, lambda i=i: self._peak(branch, i)
+                    yield _Candidate("peak", -1 - i, float(branch.parameter[i]), partial(self._peak, branch, i))
 
     def _surface(self, branch: Branch, index: int, mirrored: bool = False) -> Surface:
         """Return the surface of orbits around a regular one of a branch."""
@@ -141,7 +147,8 @@ class Borders:
     def _clear(self, branch: Branch, point: SpecialPoint) -> tuple[Surface, Place | None]:
         """Return the first place of a border where an event grazes, from orbits without it."""
         near = [index for index in (point.index, point.index + 1) if index < len(branch.parameter)]
-        for index in sorted(near, key=lambda index: branch.sequence[index].count(";") + bool(branch.sequence[index])):
+        events = [len(str(branch.sequence[index]).split("; ")) - (not branch.sequence[index]) for index in near]
+        for _, index in sorted(zip(events, near, strict=True)):
             surface = self._surface(branch, index)
             here = self._at(surface, point.state, point.parameter)
             away = self._at(surface, branch.state[index], float(branch.parameter[index])) - here
@@ -180,6 +187,7 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
     special = [(len(before) + index, named) for index, named in ahead.named]
     special += [] if back is None else [(len(before) - 1 - index, named) for index, named in back.named]
     found = [multipliers(surface.derivative(place.passage))[0] for place in places]
+    impacts = [sum(name.count("impact ") for name in place.passage.sequence) / periods for place in places]
     counts = [_counts(place) for place in places]
     return Border(
         kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
@@ -187,24 +195,21 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
         multipliers=frozen([values**2 if surface.mirrored else values for values in found], complex),
         amplitude_mean=frozen([place.passage.peaks.mean() for place in places]),
         amplitude_max=frozen([place.passage.peaks.max() for place in places]),
-        impacts_per_period=frozen([_impacts(place) / periods for place in places]),
-        orbits=frozen([orbits for orbits, _ in counts], int), stable_orbits=frozen([stable for _, stable in counts], int),
-        special=tuple(
-            BorderPoint(index, *surface.numbers(each.y).tolist(), each.kind, each.note, frozen(surface.state(each.y)))
-            for index, each in sorted(special, key=lambda entry: entry[0])
-        ),
+        impacts_per_period=frozen(impacts), orbits=frozen([each.orbits for each in counts], int),
+        stable_orbits=frozen([each.stable for each in counts], int),
+        special=tuple(_point(surface, index, named) for index, named in sorted(special, key=lambda entry: entry[0])),
         ends=("closed" if back is None else back.end, ahead.end),
     )  # fmt: skip
 
 
-def _impacts(place: Place) -> int:
-    return sum(name.count("impact ") for name in place.passage.sequence)
+def _point(surface: Surface, index: int, named: Named) -> BorderPoint:
+    parameter, second = surface.numbers(named.y).tolist()
+    return BorderPoint(index, parameter, second, named.kind, named.note, frozen(surface.state(named.y)))
 
 
-def _counts(place: Place) -> tuple[tuple[int, int], tuple[int, int]]:
-    surface = place.condition.surface
-    along = place.columns[:, 0]
+def _counts(place: Place) -> Counts:
+    """Return the orbits on both sides of a place, at smaller and larger values of the first number."""
+    surface, along = place.condition.surface, place.columns[:, 0] * np.sign(place.condition.surface.span[0])
     state = np.linalg.lstsq(surface.deflated(place.passage), -along, rcond=None)[0]
-    rate = float(place.gradient @ np.concatenate([state, [1.0, 0.0]])) * np.sign(surface.span[0])
-    orbits, stable = place.condition.counts(place.passage, place.y, rate, along * np.sign(surface.span[0]))
-    return orbits, stable
+    rate = float(place.gradient @ np.concatenate([state, [np.sign(surface.span[0]), 0.0]]))
+    return place.condition.counts(place.passage, place.y, rate, along)

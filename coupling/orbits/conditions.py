@@ -34,10 +34,16 @@ class Counts(NamedTuple):
 
 
 class Condition(Protocol):
-    """A condition on y. step: of its differences; level: by which its zero is away from the border."""
+    """A condition on y. kind: its name; step: of its differences; level: by which its zero is away from the border."""
 
-    step: float
-    level: float
+    @property
+    def surface(self) -> Surface: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def step(self) -> float: ...
+    @property
+    def level(self) -> float: ...
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the function that vanishes; nan where it is none."""
@@ -152,19 +158,18 @@ class Singular:
         # they are on the side where the others are unstable, if stable ones go out
         beside = own[::-1] if supercritical else own
         orbits = tuple(1 + new * there for there in beside)
-        stable = tuple(
-            inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True)
-        )
+        stable = tuple(inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True))
         return Counts((orbits[0], orbits[1]), (stable[0], stable[1]))
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near a point of the border."""
+    """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near the border."""
 
     surface: Surface
     neutral: int
     total: float
+    kind: str = "neimark-sacker"
     step: float = _STEP
     level: float = 0.0
 
@@ -203,6 +208,7 @@ class Clearance:
 
     surface: Surface
     neutral: int
+    kind: str = "grazing"
     step: float = _SMALL_STEP
     level: float = _LEVEL
 
@@ -235,6 +241,7 @@ class Peak:
     surface: Surface
     neutral: int
     way: np.ndarray
+    kind: str = "peak"
     step: float = 10 * _AMPLITUDE
     level: float = 0.0
 
@@ -257,7 +264,7 @@ class Peak:
         if tangent is None:
             return np.nan
         slope = difference(amplitude, y, np.append(tangent, 0.0), _AMPLITUDE, mean)
-        return np.nan if slope is None or mean == 0.0 else float(slope) / mean
+        return np.nan if slope is None or mean == 0.0 else slope / mean
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
         """Return the condition with the branch at a passage."""

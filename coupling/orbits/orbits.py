@@ -130,7 +130,7 @@ class _Search:
             near = (hertz * min(self.low, self.to), hertz * max(self.low, self.to))
             base = replace(base, excitation=replace(base.excitation, resonance_near=near))
         ends = [_at(base, {path: value}) for value in (self.low, self.to) if value is not None]
-        if track is not None:
+        if track is not None and self.to is not None:
             corners = itertools.product((self.low, self.to), (self.first_second, track.to))
             ends += [_at(at_rest(base), {path: one, track.parameter: two}) for one, two in corners]
         if leaves_open(base):

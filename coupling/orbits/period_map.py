@@ -165,9 +165,7 @@ class PeriodMap:
         return passage._replace(state=image @ half[0], derivative=image @ half[1], by_number=image @ half[2])
 
 
-def period_map(
-    scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = ""
-) -> PeriodMap:
+def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "") -> PeriodMap:
     """Return the map of a scene over excitation periods, with a number of it as parameter (dotted path).
 
     second: another number that will change.

@@ -1,7 +1,7 @@
 """Orbits over two numbers of a scene: a surface in the space of states and numbers.
 
-Its points are y = (state, numbers), scaled: the state by the map's scale and the square root of its size, the numbers by
-their ranges. Scalar conditions on it are borders (orbits.conditions), followed by orbits.border_path.
+Its points are y = (state, numbers), scaled: the state by the map's scale and the square root of its size, the numbers
+by their ranges. Scalar conditions on it are borders (orbits.conditions), followed by orbits.border_path.
 """
 
 from __future__ import annotations
@@ -132,18 +132,18 @@ class Surface:
 
 
 def difference(
-    function: Callable[[np.ndarray], np.ndarray | float | None], y: np.ndarray, direction: np.ndarray, step: float,
-    here: np.ndarray | float,
-) -> np.ndarray | float | None:  # fmt: skip
+    function: Callable[[np.ndarray], float | None], y: np.ndarray, direction: np.ndarray, step: float, here: float
+) -> float | None:
     """Return the derivative of a function of y along a direction (k + 2,), by central differences.
 
     Steps shrink as long as the function is None on a side; then one side serves. None where none does. here: its value.
     """
+    above = below = None
     for shrink in _SHRINKS:
         h = shrink * step
         above, below = function(y + h * direction), function(y - h * direction)
         if above is not None and below is not None:
             return (above - below) / (2 * h)
-    if above is None and below is None:
-        return None
-    return (above - here) / h if above is not None else (here - below) / h
+    if above is not None:
+        return (above - here) / h
+    return None if below is None else (here - below) / h

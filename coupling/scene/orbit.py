@@ -9,7 +9,6 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, Real, Whole
 
-
 #: what is followed over a second number
 Kind = Literal["fold", "pitchfork", "period doubling", "neimark-sacker", "grazing", "sequence", "peak"]
 

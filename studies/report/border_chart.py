@@ -24,7 +24,7 @@ _LINES = {
     "grazing": "#0072b2", "sequence": "#56b4e9", "peak": "#e69f00",
 }  # fmt: skip
 #: named points without a mark of their own: the sequence of events changes, and the border goes on
-_PLAIN = ("sequence", "grazing")
+_PLAIN = ("sequence",)
 
 
 def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
@@ -103,7 +103,9 @@ def map_of(branches: Branches, sweep: Sweep) -> Panel | None:
         return None
     if min(len(sweep.axes[path]) for path in two) < 2:
         return None
-    mine, shown = (system_of(scene, {branches.second: None}, branches.parameter) for scene in (branches.scene, sweep.scene))
+    mine, shown = (
+        system_of(scene, {branches.second: None}, branches.parameter) for scene in (branches.scene, sweep.scene)
+    )
     if mine is None or mine != shown:
         return None
     tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
@@ -123,7 +125,9 @@ def borders_table(branches: Branches) -> Table:
     for number, border in enumerate(branches.borders):
         columns = np.column_stack([border.parameter, border.second, border.amplitude_mean, border.impacts_per_period])
         sides = np.hstack([border.orbits, border.stable_orbits]).tolist()
-        rows += [[number, border.kind, *values, *counts] for values, counts in zip(columns.tolist(), sides, strict=True)]
+        rows += [
+            [number, border.kind, *values, *counts] for values, counts in zip(columns.tolist(), sides, strict=True)
+        ]
     counts = ("orbits_below", "orbits_above", "stable_below", "stable_above")
     header = ["border", "kind", branches.parameter, branches.second, "amplitude_mean", "impacts_per_period", *counts]
     return header, rows

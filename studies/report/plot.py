@@ -36,7 +36,8 @@ from vanedamp.studies.report.time_history import History, history_figure
 _MOST_CURVES = 8
 #: charts of records that one figure shows in full
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
-    Branches: lambda found: (borders_figure if found.borders else branches_figure)(found), Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure
+    Branches: lambda found: (borders_figure if found.borders else branches_figure)(found),
+    Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
 }  # fmt: skip
 
 
@@ -45,9 +46,9 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
 
     A Sweep gives its forced responses, the best of many; a Response its time history (with the walls of its cavities if
-    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams (Branches with borders the map of these); a file of `vanedamp modal` its modes; one
-    of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies. Raises
-    InputError for anything else, and for a response without samples.
+    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams, Branches with borders the map of these; a
+    file of `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the
+    tuned frequencies. Raises InputError for anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 

@@ -200,4 +200,12 @@ class ImpactOscillator:
         derivative = self.propagator(end - now) @ derivative
         state = self.driven(end) + self.propagator(end - now) @ (x - self.driven(now))
         clearance = (math.inf, "") if crossings else (1.0 - top, "impact stop 0")
-        return Passage(state, derivative, tuple(crossings), clearance, PassageStatus.OK, np.ones(self.periods), np.zeros((len(state), 0)))
+        return Passage(
+            state,
+            derivative,
+            tuple(crossings),
+            clearance,
+            PassageStatus.OK,
+            np.ones(self.periods),
+            np.zeros((len(state), 0)),
+        )

@@ -14,6 +14,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.branch import Branch, Branches, SpecialPoint
 from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
@@ -72,7 +73,11 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     shown["multipliers"] = page.chart(
         "multipliers", _multipliers_figure(branches), *_multipliers_table(branches), files
     )
-    shown["borders"] = [_borders(record, page, files) for record in records.values() if record.borders]
+    tracked = {record.second: record for record in records.values() if record.borders}
+    shown["borders"] = [
+        _borders(replace(record, borders=joined_borders(list(records.values()), second)), page, files)
+        for second, record in tracked.items()
+    ]
     named, shown["missing"] = _histories(branches)
     if named:
         shown["orbits"] = page.chart("orbits", orbits_figure(named), *orbits_table(named), files)
@@ -80,7 +85,7 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
 
 
 def _borders(branches: Branches, page: Page, files: list[str]) -> dict[str, Any]:
-    """Return the chart of a file's borders over the first sweep with the same two axes."""
+    """Return the chart of borders over the first sweep with the same two axes."""
     sweeps = {file: result.record for file, result in page.results.kinds["sweep"].items()}
     maps = maps_of(branches, sweeps)
     figure = borders_figure(branches, next(iter(maps.values()), None))
@@ -171,6 +176,16 @@ def joined(records: Sequence[Branches]) -> Branches:
             branches.append(replace(branch, source=source))
     warnings = dict.fromkeys(warning for record in records for warning in record.warnings)
     return replace(records[0], branches=tuple(branches), warnings=tuple(warnings))
+
+
+def joined_borders(records: Sequence[Branches], second: str) -> tuple[Border, ...]:
+    """Return the borders over a second number of several files, their branches numbered as in `joined`."""
+    found, first = list[Border](), 0
+    for record in records:
+        for border in record.borders if record.second == second else ():
+            found.append(replace(border, source=(border.source[0] + first, border.source[1])))
+        first += len(record.branches)
+    return tuple(found)
 
 
 def branch_name(number: int, branch: Branch) -> str:
