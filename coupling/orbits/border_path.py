@@ -31,6 +31,8 @@ _QUICK, _STRAIGHT, _BENT = 9, 0.985, 0.9
 _FLAT = 0.05
 #: scaled arclength to which points of codimension two and ends are located
 _CLOSE, _END = 1e-9, 1e-8
+#: largest derivative of the map, scaled: it goes as one over the speed of an impact that comes to graze
+_STEEP = 1e5
 #: size of a test at its root, as a fraction of those around it, above which it has jumped there
 _ZERO = 1e-3
 #: scaled distances from an end at which the other side is sought, and how much farther a state is that has jumped
@@ -127,12 +129,15 @@ def _newton(
     residual = missed(y, passage)
     for iteration in range(1, _ITERATIONS + 1):
         B[:size, :size] = surface.deflated(passage)
+        wanted = np.append(residual, row @ (y - start))
+        if iteration == 1:
+            wanted[size] = 0.0  # onto the surface first: what that does to the condition is learnt on the way
         try:
-            step = np.linalg.solve(np.vstack([B, row]), -np.append(residual, row @ (y - start)))
+            step = np.linalg.solve(np.vstack([B, row]), -wanted)
         except np.linalg.LinAlgError:
             return None
         length, size_of = float(np.linalg.norm(step)), 1.0 + float(np.linalg.norm(y))
-        bound = None if length <= _STALLED * size_of else residual
+        bound = None if iteration == 1 or length <= _STALLED * size_of else residual
         taken = _taken(surface, missed, y, step, passage.sequence, bound)
         if taken is None:
             return None
@@ -141,7 +146,7 @@ def _newton(
         reach = size_of * (1.0 + float(np.abs(B[:size, :size]).max(initial=0.0)))
         known = float(np.abs(residual[:-1]).max(initial=0.0)) <= _ROUND_OFF * reach
         stalls = length <= _STALLED * size_of and np.linalg.norm(residual) >= 0.1 * np.linalg.norm(before)
-        if known and (length <= _SMALL * size_of or stalls):
+        if iteration > 1 and known and (length <= _SMALL * size_of or stalls):
             return y, passage, iteration
         left = (residual - before - B @ moved)[:, None] * moved / max(float(moved @ moved), np.finfo(float).tiny)
         B[:size, size:] += left[:size, size:]
@@ -155,8 +160,7 @@ def _taken(
 ) -> tuple[np.ndarray, Passage, np.ndarray] | None:  # fmt: skip
     """Return y, passage and residual after a step, or a part of it, that keeps the sequence; None without any.
 
-    bound: residual (k + 1,) that it must lessen, as a whole or that of the orbit: across the surface the condition is
-    not known before the first step.
+    bound: residual (k + 1,) that it must lessen, as a whole or that of the orbit.
     """
     for halving in range(_HALVINGS):
         at = y + step / 2**halving
@@ -243,6 +247,12 @@ class BorderPath:
         inside = all(_CLOSE < value < 1.0 - _CLOSE for value in place.y[-2:])
         if last:
             self.end = f"{self.named[-1][1].kind}: the multipliers of the pair are real beyond"
+        elif np.abs(self.surface.derivative(place.passage)).max() > _STEEP:
+            slowest = min(place.passage.crossings, key=lambda crossing: abs(crossing.speed), default=None)
+            name = slowest.name if slowest else "an event"
+            note = f"next to it motions part by more than {_STEEP:g} per passage: {name} nearly grazes"
+            self.named.append((len(self.places) - 1, Named(f"{place.condition.kind}-grazing", note, place.border)))
+            self.end = note
         elif not inside:
             self.end = "the end of a number's range"
         elif len(self.places) > 4 and self._returned(before, place):
