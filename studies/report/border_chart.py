@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from vanedamp.coupling.orbits.border import Border
+from vanedamp.coupling.orbits.border import Border, BorderPoint
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.record import Sweep
@@ -18,11 +18,13 @@ from vanedamp.studies.report.forced_response import for_people
 from vanedamp.studies.report.map_chart import Panel, panels
 from vanedamp.studies.report.sweep_beside import system_of
 
-#: colours of borders by their kind, which the colour-blind tell apart (Okabe and Ito 2008), in white over a sweep
+#: colours of borders by their kind, which the colour-blind tell apart (Okabe and Ito 2008)
 _LINES = {
     "fold": "#000000", "pitchfork": "#009e73", "period doubling": "#d55e00", "neimark-sacker": "#cc79a7",
     "grazing": "#0072b2", "sequence": "#56b4e9", "peak": "#e69f00",
 }  # fmt: skip
+#: symbols of named points, in the order of their names
+_SYMBOLS = ("circle", "square", "diamond", "triangle-up", "star", "pentagon", "triangle-down", "cross", "hexagon")
 #: named points without a mark of their own: the sequence of events changes, and the border goes on
 _PLAIN = ("sequence",)
 
@@ -58,7 +60,6 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
             )  # fmt: skip
             shown.add((border.kind, what))
     _add_points(figure, branches, wide, high)
-    assert branches.scene.orbit is not None
     figure.update_xaxes(title_text=axis_title(branches.parameter, across))
     figure.update_yaxes(title_text=axis_title(branches.second, up))
     return dressed(figure, height=620).update_layout(
@@ -67,19 +68,21 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
 
 
 def _add_points(figure: go.Figure, branches: Branches, wide: float, high: float) -> None:
-    """Mark the named points, and name them by their kind."""
-    found = [
-        (point, f"border {number}, {border.kind}")
-        for number, border in enumerate(branches.borders)
-        for point in border.special
-        if point.kind not in _PLAIN
-    ]
-    if found:
+    """Mark the named points, a symbol per kind."""
+    found: dict[str, list[tuple[BorderPoint, str]]] = {}
+    for number, border in enumerate(branches.borders):
+        for point in border.special:
+            if point.kind not in _PLAIN:
+                found.setdefault(point.kind, []).append((point, f"border {number}, {border.kind}"))
+    for place, (kind, points) in enumerate(sorted(found.items())):
         figure.add_scatter(
-            x=[wide * point.parameter for point, _ in found], y=[high * point.second for point, _ in found],
-            mode="markers+text", text=[point.kind for point, _ in found], textposition="top right", name="named points",
-            marker={"symbol": "circle", "size": 9, "color": "#ffffff", "line": {"color": "#000000", "width": 2}},
-            customdata=[f"{name}: {point.kind} {point.note}" for point, name in found],
+            x=[wide * point.parameter for point, _ in points], y=[high * point.second for point, _ in points],
+            mode="markers", name=kind,
+            marker={
+                "symbol": _SYMBOLS[place % len(_SYMBOLS)], "size": 11, "color": "#ffffff",
+                "line": {"color": "#000000", "width": 2},
+            },
+            customdata=[f"{name}: {kind} {point.note}" for point, name in points],
             hovertemplate="%{customdata}<br>%{x:.10g}, %{y:.8g}<extra></extra>",
         )  # fmt: skip
 

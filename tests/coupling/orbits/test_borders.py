@@ -12,10 +12,12 @@ from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools import closed_maps as maps
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.orbits.border_path import BorderPath, place_of, solved
+from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.conditions import Pair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.coupling.orbits.surface import Surface
 from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.files.toml_input import InputError
 
 #: distance of a border, and of a point of codimension two on it, from its closed form
 CLOSE, NAMED = 1e-10, 1e-7
@@ -158,7 +160,7 @@ def test_impact_oscillator_grazes_where_its_linear_response_reaches_the_stop(sec
     """Whatever the restitution, and in proportion to the gap."""
     own = {"stop.0.restitution": 0.5, "stop.0.gap": 1.0}[second]
     track = {"parameter": second, "to": 0.9 * own, "from": 1.1 * own, "kinds": ["grazing"], "within": (0.3, 0.6)}
-    (border,) = orbits(stopped(0.4, to=0.5, start="linear", max_points=20, track=track)).borders
+    (border,) = orbits(stopped(0.4, to=0.5, start="linear", min_step=0.01, max_points=20, track=track)).borders
     reached = abs(1 - 1.2**2 + 0.12j)
     assert border.parameter == pytest.approx(reached * (border.second if "gap" in second else 1.0), rel=1e-10)
     assert sorted(border.second[[0, -1]]) == pytest.approx([0.9 * own, 1.1 * own])
@@ -224,3 +226,45 @@ def test_the_peak_of_a_linear_response_follows_its_damping():
     assert border.kind == "peak" and border.second[[0, -1]] == pytest.approx([0.1, 0.12])
     assert 2 * math.pi * border.parameter == pytest.approx(np.sqrt(1 - border.second**2 / 2), rel=1e-9)
     assert (border.orbits == 1).all() and (border.stable_orbits == 1).all()
+
+
+@pytest.fixture(scope="module")
+def grazing():
+    track = {"parameter": "stop.0.gap", "to": 1.02, "kinds": ["grazing"], "within": (0.45, 0.5)}
+    return stopped(0.4555, to=0.4565, start="linear", max_step=1.0, min_step=0.01, max_points=12, track=track)
+
+
+def test_borders_are_read_as_they_were_written_and_continue_after_a_stop(grazing, tmp_path):
+    whole = orbits(grazing)
+    whole.save(tmp_path / "whole.h5")
+    read = Branches.load(tmp_path / "whole.h5")
+    assert read.to_json() == whole.to_json() and read.second == "stop.0.gap"
+    (border,), (kept,) = whole.borders, read.borders
+    for name in ("parameter", "second", "state", "multipliers", "amplitude_mean", "orbits", "stable_orbits"):
+        np.testing.assert_array_equal(getattr(border, name), getattr(kept, name))
+    points = sum(len(branch.parameter) for branch in whole.branches)
+
+    def stop(done, total):
+        if done > points:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        orbits(grazing, stop, tmp_path / "kept.h5")
+    resumed = orbits(grazing, None, tmp_path / "kept.h5")
+    assert resumed.to_json() | {"iterations": 0} == whole.to_json() | {"iterations": 0}
+
+
+@pytest.mark.parametrize(
+    ("track", "message"),
+    [
+        ({"parameter": "stop.0.gap", "from": 2.0, "to": 3.0}, r"orbit.track: stop.0.gap = 1 .* from `from` \(2\)"),
+        ({"parameter": "stop.0.height", "to": 3.0}, r"orbit.track.parameter: "),
+        ({"parameter": "time.periods", "to": 3.0}, r"orbit.track.parameter: time.periods is no number of"),
+        ({"parameter": "stop.0.gap", "to": -1.0}, r"orbit: at excitation.force = 0.45 and stop.0.gap = -1: "),
+        ({"parameter": "excitation.force", "to": 1.0}, r"track.parameter: excitation.force is the branch's own"),
+        ({"parameter": "stop.0.gap", "to": 2.0, "within": (2.0, 1.0)}, r"track.within: 2 must be smaller than 1"),
+    ],
+)
+def test_bad_second_numbers_are_rejected_in_one_line(track, message):
+    with pytest.raises(InputError, match=message):
+        orbits(stopped(0.45, to=0.46, start="linear", track=track))
