@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.orbits.border import Border, BorderPoint
-from vanedamp.coupling.orbits.border_path import BorderPath, Named, Place, place_of, solved
+from vanedamp.coupling.orbits.border_newton import Place, place_of, solved
+from vanedamp.coupling.orbits.border_path import BorderPath, Named
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigvals, solve, svd
@@ -33,55 +33,69 @@ class Counts(NamedTuple):
     stable: tuple[int, int]
 
 
-class Condition(Protocol):
-    """A condition on y. kind: its name; step: of its differences; level: by which its zero is away from the border."""
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """A condition on y of a surface, with as many neutral multipliers as its orbits have.
 
-    @property
-    def surface(self) -> Surface: ...
-    @property
-    def kind(self) -> str: ...
-    @property
-    def step(self) -> float: ...
-    @property
-    def level(self) -> float: ...
+    step: of its differences; level: by which its zero is away from the border.
+    """
+
+    surface: Surface
+    neutral: int
+    kind: ClassVar[str]
+    step: ClassVar[float] = _STEP
+    level: ClassVar[float] = 0.0
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the function that vanishes; nan where it is none."""
+        raise NotImplementedError
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Condition:
         """Return the condition with what it refers to taken from a point of the border."""
+        return self
+
+    def multipliers(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers that are not known to have modulus 1."""
+        return decided(eigvals(self.surface.derivative(passage)), self.neutral)
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
-        """Return functions that vanish at points of codimension two, by their names."""
+        """Return functions that vanish at points of codimension two, by their names: here of other multipliers."""
+        rest = indicators(self.multipliers(passage), 0)
+        values = {"fold": rest.unity, "flip": rest.doubling, "Neimark-Sacker": rest.torus}
+        return {f"{self.kind}-{name}": value for name, value in values.items()}
+
+    def inside(self, passage: Passage) -> int:
+        """Return 1 where all these multipliers lie inside the unit circle, else 0."""
+        return int(np.all(np.abs(self.multipliers(passage)) < 1.0))
 
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
-        """Return the orbits on both sides.
+        """Return the orbits on both sides: here the orbit itself.
 
         rate: of the condition along the branch per its first number; along: (k,) slope of the residual by that.
         """
+        return Counts((1, 1), (self.inside(passage), self.inside(passage)))
 
 
 @dataclass(frozen=True, eq=False)
-class Singular:
-    """A multiplier `unit`, 1 or -1, of the surface's map; b, c: (k,) borders of the singular matrix."""
+class Singular(Condition):
+    """A multiplier of 1 or -1 of the surface's map, by kind; b, c: (k,) borders of the singular matrix."""
 
-    surface: Surface
-    kind: str
-    unit: float
-    neutral: int
+    kind: str  # type: ignore[misc]
     b: np.ndarray
     c: np.ndarray
-    step: float = _STEP
-    level: float = 0.0
 
     @classmethod
     def of(cls, surface: Surface, kind: str, neutral: int, passage: Passage) -> Singular:
         """Return the condition by the singular vectors at a passage."""
-        unit = 1.0 if kind == "fold" else -1.0
         nothing = np.zeros(surface.size)
-        found = cls(surface, kind, unit, neutral, nothing, nothing)
+        found = cls(surface, neutral, kind, nothing, nothing)
         left, _, right = svd(found._matrix(passage))
         return replace(found, b=left[:, -1], c=right[-1])
+
+    @property
+    def unit(self) -> float:
+        """The multiplier, of a pitchfork that of the mirrored half period."""
+        return 1.0 if self.kind == "fold" else -1.0
 
     def _matrix(self, passage: Passage) -> np.ndarray:
         if self.unit > 0:
@@ -125,15 +139,15 @@ class Singular:
         bent = solve(np.eye(len(M)) - M, second @ right)
         return float(left @ third @ right / 6 + left @ second @ bent / 2)
 
-    def _others(self, passage: Passage) -> np.ndarray:
+    def multipliers(self, passage: Passage) -> np.ndarray:
         """Return the multipliers but those that are known to have modulus 1."""
-        values = decided(eigvals(self.surface.derivative(passage)), self.neutral)
+        values = super().multipliers(passage)
         return np.delete(values, np.argmin(np.abs(values - self.unit)))
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
         """Return the product of the null vectors, the coefficient of the normal form, other multipliers."""
         right, left, _ = self._solved(passage)
-        rest = indicators(self._others(passage), 0)
+        rest = indicators(self.multipliers(passage), 0)
         product, form = float(left @ right), self._normal_form(y, passage)
         if self.unit > 0:
             flip = "fold-pitchfork" if self.surface.mirrored else "fold-flip"
@@ -148,38 +162,38 @@ class Singular:
         """Return two orbits on one side of a fold; of the others those that bifurcate, too."""
         right, left, _ = self._solved(passage)
         form, product = self._normal_form(y, passage), float(left @ right)
-        inside = bool(np.all(np.abs(self._others(passage)) < 1.0))
+        inside = self.inside(passage)
         if self.unit > 0:
             larger = form * float(left @ along) < 0.0
-            return Counts((0, 2) if larger else (2, 0), (0, int(inside)) if larger else (int(inside), 0))
+            return Counts((0, 2), (0, inside)) if larger else Counts((2, 0), (inside, 0))
         inward, supercritical = -rate / product > 0.0, form / product > 0.0  # multiplier, by the first number
         new = 2 if self.surface.mirrored else 1
         own = (0, 1) if inward else (1, 0)
         # they are on the side where the others are unstable, if stable ones go out
         beside = own[::-1] if supercritical else own
-        orbits = tuple(1 + new * there for there in beside)
-        stable = tuple(inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True))
-        return Counts((orbits[0], orbits[1]), (stable[0], stable[1]))
+        orbits = 1 + new * beside[0], 1 + new * beside[1]
+        stable = [inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True)]
+        return Counts(orbits, (stable[0], stable[1]))
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class Pair(Condition):
     """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near the border."""
 
-    surface: Surface
-    neutral: int
+    kind = "neimark-sacker"
     total: float
-    kind: str = "neimark-sacker"
-    step: float = _STEP
-    level: float = 0.0
 
     def _pair(self, passage: Passage) -> tuple[complex, complex, np.ndarray]:
         """Return product and sum of the pair, and the other multipliers."""
-        values = decided(eigvals(self.surface.derivative(passage)), self.neutral)
+        values = super().multipliers(passage)
         pairs = list(itertools.combinations(range(len(values)), 2))
         ends = [(values[i] * values[j], values[i] + values[j]) for i, j in pairs]
         best = min(range(len(pairs)), key=lambda n: abs(ends[n][0] - 1.0) + abs(ends[n][1] - self.total))
         return (*ends[best], np.delete(values, pairs[best]))
+
+    def multipliers(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers without the pair."""
+        return self._pair(passage)[2]
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the product of the pair, less one."""
@@ -191,59 +205,42 @@ class Pair:
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
         """Return the distance of the pair's angle from small fractions of a turn, and other multipliers."""
-        _, total, others = self._pair(passage)
-        rest = indicators(others, 0)
+        total, rest = self._pair(passage)[1], indicators(self.multipliers(passage), 0)
         strong = {f"1:{n} resonance": total.real - at for n, at in ((1, 2.0), (2, -2.0), (3, -1.0), (4, 0.0))}
         return strong | {"fold-Neimark-Sacker": rest.unity, "flip-Neimark-Sacker": rest.doubling}
 
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
         """Return the orbit itself, stable on one side; the torus is not counted."""
-        inside = int(np.all(np.abs(self._pair(passage)[2]) < 1.0))
+        inside = self.inside(passage)
         return Counts((1, 1), (0, inside) if rate < 0.0 else (inside, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Clearance:
+class Clearance(Condition):
     """An event that does not happen, but nearly: orbits without it, whose distance to it is the level."""
 
-    surface: Surface
-    neutral: int
-    kind: str = "grazing"
-    step: float = _SMALL_STEP
-    level: float = _LEVEL
+    kind = "grazing"
+    step = _SMALL_STEP
+    level = _LEVEL
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the smallest clearance, less the level."""
         least = passage.clearance[0]
         return least - self.level if np.isfinite(least) else np.nan
 
-    def renewed(self, y: np.ndarray, passage: Passage) -> Clearance:
-        """Return the condition."""
-        return self
-
-    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
-        """Return what of the multipliers is critical."""
-        rest = indicators(eigvals(self.surface.derivative(passage)), self.neutral)
-        return {
-            "grazing-fold": rest.unity, "grazing-flip": rest.doubling, "grazing-Neimark-Sacker": rest.torus
-        }  # fmt: skip
-
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
         """Return the orbit without the event, on one side; those with it are not counted."""
-        inside = _inside(self.surface, self.neutral, passage)
+        inside = self.inside(passage)
         return Counts((0, 1), (0, inside)) if rate > 0.0 else Counts((1, 0), (inside, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Peak:
+class Peak(Condition):
     """A largest amplitude along a branch over the first number; way: (k + 1,) direction of that branch."""
 
-    surface: Surface
-    neutral: int
+    kind = "peak"
+    step = 10 * _AMPLITUDE
     way: np.ndarray
-    kind: str = "peak"
-    step: float = 10 * _AMPLITUDE
-    level: float = 0.0
 
     def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray | None:
         """Return the unit tangent (k + 1,) of the branch; None where it is unknown."""
@@ -270,18 +267,3 @@ class Peak:
         """Return the condition with the branch at a passage."""
         way = self._tangent(y, passage)
         return self if way is None else replace(self, way=way)
-
-    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
-        """Return what of the multipliers is critical."""
-        rest = indicators(eigvals(self.surface.derivative(passage)), self.neutral)
-        return {"peak-fold": rest.unity, "peak-flip": rest.doubling, "peak-Neimark-Sacker": rest.torus}
-
-    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
-        """Return the orbit itself."""
-        inside = _inside(self.surface, self.neutral, passage)
-        return Counts((1, 1), (inside, inside))
-
-
-def _inside(surface: Surface, neutral: int, passage: Passage) -> int:
-    """Return 1 where all multipliers but the neutral ones lie inside the unit circle, else 0."""
-    return int(np.all(np.abs(decided(eigvals(surface.derivative(passage)), neutral)) < 1.0))

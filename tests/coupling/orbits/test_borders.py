@@ -11,7 +11,8 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools import closed_maps as maps
 from tests.tools.closed_form_scenes import scene
-from vanedamp.coupling.orbits.border_path import BorderPath, place_of, solved
+from vanedamp.coupling.orbits.border_newton import place_of, solved
+from vanedamp.coupling.orbits.border_path import BorderPath
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.conditions import Pair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
