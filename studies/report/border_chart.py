@@ -39,7 +39,7 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
     if map_ is not None:
         _, x, y, values = map_
         figure.add_heatmap(
-            x=wide * x, y=high * y, z=values, colorscale="Greys", reversescale=True, opacity=0.75,
+            x=wide * x, y=high * y, z=values, colorscale="Greys", opacity=0.6,
             colorbar={"title": {"text": "mean amplitude /<br>maximum without bodies"}},
             hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra>runs</extra>",
         )  # fmt: skip
