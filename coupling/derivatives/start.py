@@ -31,6 +31,8 @@ class Start:
         given: bool = False,
     ) -> None:  # fmt: skip
         self._fixed = given
+        #: derivative (2N, P) by numbers before units that are at rest stop what these would move
+        self.unheld = np.zeros((dynamics.one, 0))
         self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
         self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
         self._turns = np.zeros((len(state), 0 if numbers is None else len(numbers))) if turns is None else turns
@@ -66,6 +68,7 @@ class Start:
             M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
         if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z):
             status = PassageStatus.GRAZING
+        self.unheld = M[:, k:]
         M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
         return M[:, :k], M[:, k:], status
 
@@ -122,11 +125,10 @@ class Start:
     def _turned(self, what: str, rows: np.ndarray, z: np.ndarray, M: np.ndarray) -> np.ndarray:
         """Return whether numbers change some functionals (m,), "gap" or "speed", at the start."""
         functional, own = getattr(self.dynamics, what)[rows], M[:, len(self._given) :]
-        turned, terms = functional[:, : len(own)] @ own, np.abs(functional[:, : len(own)]) @ np.abs(own)
+        turned = functional[:, : len(own)] @ own
         if self._numbers is not None:
-            of = (getattr(self._numbers.parts, what)[:, rows] @ z).T
-            turned, terms = turned + of, terms + np.abs(of)
-        return np.asarray(np.any(np.abs(turned) > _NEAR * terms, axis=1))
+            turned = turned + (getattr(self._numbers.parts, what)[:, rows] @ z).T
+        return np.asarray(np.abs(turned).max(axis=1, initial=0.0) > _NEAR * np.abs(functional) @ self.dynamics.typical)
 
     def _loose(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
         """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.

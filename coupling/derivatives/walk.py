@@ -22,6 +22,9 @@ from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 class Watch(Protocol):
     """Measures a motion and its derivatives by numbers, P columns behind those by the start."""
 
+    def begin(self, unheld: np.ndarray) -> None:
+        """Take the derivative (2N, P) of the start as it is given, before what sticks is stopped."""
+
     def segment(self, begun: Before, course: Course) -> None:
         """Take the motion until the next event. begun: its start, with the derivative there."""
 
@@ -47,7 +50,8 @@ class PassageWalk:
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole = dynamics, names, derivative
         self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
-        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns, given), numbers)
+        self._start = Start(dynamics, state, numbers, turns, given)
+        self.derivative = Derivative(dynamics, self._start, numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
@@ -121,7 +125,10 @@ class PassageWalk:
             return self._dynamics.from_state
         try:
             if before is None:
-                return made.begin(walk.start, segment, flow, u)
+                M = made.begin(walk.start, segment, flow, u)
+                if self._watch is not None:
+                    self._watch.begin(self._start.unheld)
+                return M
             M = made.after(before, segment, flow, u, guards)
         except Untrusted:
             made.worsen(PassageStatus.UNDETERMINED)

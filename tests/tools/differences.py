@@ -7,14 +7,17 @@ error, beside round-off. Runs on all sides must have the same events.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Response, Status
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
@@ -24,6 +27,8 @@ _SIXTH = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])
 _EIGHTH = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 #: steps that are tried, relative to the size of the number, until the error is this small
 STEPS, ENOUGH = (1e-3, 1e-4, 1e-2, 1e-5, 1e-6), 1e-10
+#: steps of which two are to agree
+SURE = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: round-off of a run's results relative to their sizes, apart from what its derivatives multiply
 _ROUND_OFF = 3e-15
 #: events per period after which a run is given up
@@ -55,29 +60,45 @@ class Difference(NamedTuple):
     base: Observed
 
 
-def observed(scene: Scene, walked: PeriodMap, state: np.ndarray | None, periods: int) -> Observed | None:
-    """Return the results of a run of so many periods; None where it makes no scene or does not end.
+class Coordinates(NamedTuple):
+    """How a restart state is one (k,) of a period map: numbers of the bodies in the plane, of the Jenkins elements."""
 
-    walked: the period map of the scene, whose coordinates states have; state: (k,) at the start, None: the scene's own.
-    """
-    start = None if state is None else walked.restart_of(state)
-    short = {"time": {"periods": periods, "transient": 0}, "solver": {"max_events": MOST_EVENTS * periods}}
-    response = simulate(scene.replace(short), events=True, start=start)
+    extended: list[int]
+    drawn: list[int]
+    scale: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, scale: np.ndarray) -> Coordinates:
+        """Return those of a scene without a reduced model that turns. scale: (k,) sizes of coordinates."""
+        planar = [i for i, damper in enumerate(scene.damper) if damper.form.planar]
+        drawn = [i for i, damper in enumerate(scene.friction_damper) if damper.stiffness is not None]
+        return cls(planar, drawn, scale)
+
+    def state_of(self, final: RestartState) -> np.ndarray:
+        """Return the state (k,)."""
+        across = (final.lift, final.lift_velocity, final.tilt, final.tilt_rate)
+        return np.concatenate([
+            final.displacement, final.velocity, final.slip, final.slip_velocity,
+            *(part[self.extended] for part in across if len(part)), final.elongation[self.drawn],
+        ])  # fmt: skip
+
+
+def observed(scene: Scene, known: Coordinates, start: RestartState | None) -> Observed | None:
+    """Return the results of a run of a scene from a state, None: its own; None if it does not end."""
+    response = simulate(scene, events=True, start=start)
     if response.final is None or response.status not in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
         return None
     hits = impacts_of(response)
     energies = np.array([response.energy[name] for name in ENERGIES])
     results = {
-        "state": walked.state_of(response.final), "peak": response.peak,
+        "state": known.state_of(response.final), "peak": response.peak,
         "impact_time": hits[:, 0], "impact_speed": hits[:, 1],
         **{name: _one(getattr(response, name)) for name in FIGURES},
         **{f"energy.{name}": energies[[k]] for k, name in enumerate(ENERGIES)},
     }  # fmt: skip
     motion = np.array([max(float(response.amplitude_max), 1e-300)])
-    fastest = np.abs(hits[:, 1]).max(initial=0.0) or 1.0
-    sizes = {"state": walked.scale, "impact_time": np.array([1.0 / walked.scene.frequency])} | {
-        "impact_speed": np.array([fastest])
-    }
+    fastest = np.array([np.abs(hits[:, 1]).max(initial=0.0) or 1.0])
+    sizes = {"state": known.scale, "impact_time": np.array([1.0 / scene.frequency]), "impact_speed": fastest}
     sizes |= dict.fromkeys(("peak", *FIGURES[:4]), motion) | dict.fromkeys(FIGURES[4:], np.ones(1))
     sizes |= dict.fromkeys([f"energy.{name}" for name in ENERGIES], np.array([np.abs(energies).max() or 1.0]))
     return Observed(results, Counter(_name(event) for event in response.event_list), sizes)
@@ -98,14 +119,18 @@ def _name(event) -> tuple:
     return event.kind, event.damper, event.side, event.corner
 
 
-def difference(observe: Callable[[float], Observed | None], size: float) -> Difference | None:
+def difference(observe: Callable[[float], Observed | None], size: float, sure: bool = False) -> Difference | None:
     """Return the derivative by a number at 0 of what is observed; None without any run on both sides.
 
-    size: of the number.
+    size: of the number; sure: with steps ten times apart that agree, as the error says: this tells kinks near by.
     """
     base = observe(0.0)
     if base is None:
         return None
+    if sure:
+        found = [each for step in SURE if (each := _at_step(observe, base, size, step)) is not None and each.same]
+        pairs = [_agreeing(one, other) for one, other in itertools.pairwise(found)]
+        return reduce(_better, pairs) if pairs else None
     best: Difference | None = None
     for step in STEPS:
         found = _at_step(observe, base, size, step)
@@ -118,6 +143,15 @@ def difference(observe: Callable[[float], Observed | None], size: float) -> Diff
         if best.same and max(best.error.values()) <= ENOUGH:
             break
     return best
+
+
+def _agreeing(one: Difference, other: Difference) -> Difference:
+    """Return the first of two, whose error is at least how far the other is from it."""
+    apart = {
+        name: float(np.abs((values - other.derivative[name]) / one.relative[name]).max(initial=0.0))
+        for name, values in one.derivative.items()
+    }  # fmt: skip
+    return one._replace(error={name: max(error, apart[name]) for name, error in one.error.items()})
 
 
 def _better(one: Difference, other: Difference) -> Difference:
@@ -156,24 +190,25 @@ def _change(name: str, ahead: Observed, back: Observed) -> np.ndarray:
     return (change + np.pi) % (2 * np.pi) - np.pi if name == "phase" else change
 
 
-def by_number(scene: Scene, found: PeriodMap, path: str, size: float, value: float, state, way, periods: int):
-    """Return the derivative by a number of a run that begins with a state (k,) + way (k,) times the change.
+def by_numbers(
+    scene: Scene, walked: PeriodMap, moves: Mapping[str, tuple[float, float]], state: np.ndarray | None,
+    way: np.ndarray | None, sure: bool = False,
+) -> Difference | None:  # fmt: skip
+    """Return the derivative of a run as numbers change together, each by its size per unit.
 
-    state, way: None for the scene's own start.
+    walked: the period map of the scene, over the periods of the run; moves: path -> value, size; state, way: (k,) start
+    and its derivative, None for the scene's own start; sure: as in `difference`.
     """
+    known = Coordinates.of(scene, walked.scale)
+    options = {"time": {"periods": walked.periods, "transient": 0}}
+    short = scene.replace(options | {"solver": {"max_events": MOST_EVENTS * walked.periods}})
 
     def observe(change: float) -> Observed | None:
         try:
-            walked = found.at(value + change) if change else found
-            begun = None if state is None else state + (0.0 if way is None else way * change)
-            return observed(walked.scene, walked, begun, periods)
+            moved = short.replace({path: value + change * size for path, (value, size) in moves.items()})
+            start = None if state is None or way is None else walked.restart_of(state + way * change)
+            return observed(moved, known, start)
         except InputError:
             return None
 
-    return difference(observe, size)
-
-
-def by_start(scene: Scene, found: PeriodMap, state: np.ndarray, j: int, periods: int) -> Difference | None:
-    """Return the derivative by a coordinate of the start."""
-    unit = np.eye(len(state))[j]
-    return difference(lambda change: observed(scene, found, state + change * unit, periods), float(found.scale[j]))
+    return difference(observe, 1.0, sure)

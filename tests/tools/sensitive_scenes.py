@@ -151,7 +151,9 @@ def numbers_of(scene: Scene, start: bool) -> dict[str, tuple[float, float]]:
     """
     found = {}
     for path, value in _numbers(scene.to_dict(), ""):
-        if path.split(".")[0] not in _NO_NUMBERS and not _at_bound(path, value) and (start or not _of_start(path)):
+        if path.split(".")[0] in _NO_NUMBERS or _at_bound(path, value):
+            continue
+        if not _of_start(path) or (start and not _at_rest(path, value)):
             size = _size(scene, path, value)
             try:
                 scene.replace({path: value + 1e-6 * size})
@@ -176,6 +178,11 @@ def _numbers(node: Any, path: str):
 def _of_start(path: str) -> bool:
     keys = ("position", "velocity", "lift", "tilt", "lift_velocity", "tilt_rate")
     return path.split(".")[0] == "initial" or (path.startswith("damper.") and path.split(".")[-1] in keys)
+
+
+def _at_rest(path: str, value: float) -> bool:
+    """Whether a body begins at rest by this number, as it would not by its neighbours on either side."""
+    return path.startswith("damper.") and not path.endswith("position") and value == 0.0
 
 
 def _at_bound(path: str, value: float) -> bool:
