@@ -24,7 +24,8 @@ class Track:
     from_: Annotated[Real | None, Field(alias="from")] = None
     """other value where they end; the scene's own must lie between (default: the scene's own) [unit of the number]"""
     within: tuple[Real, Real] | None = None
-    """values of the branch's own parameter between which borders are followed (default: its `from` and `to`)"""
+    """values of the branch's own parameter between which borders are followed (default: its `from` and `to`)
+    [unit of the parameter]"""
     kinds: tuple[Kind, ...] = ("fold", "pitchfork", "period doubling", "neimark-sacker", "grazing", "peak")
     """special points that are followed; "peak": the largest amplitude of a branch"""
     max_points: Annotated[Whole, Field(ge=2, le=100_000)] = 300
