@@ -76,6 +76,8 @@ class Borders:
                     )
                 elif not self._known(kind, branch.periods, place.border):
                     self._follow(kind, branch.periods, source, surface, place, changed)
+        if not self.finished and not self.notes:
+            self.notes.append(f"orbit.track: the branches have none of {', '.join(self.track.kinds)}")
 
     def _known(self, kind: str, periods: int, y: np.ndarray) -> bool:
         """Say whether a border through y at the branches' second number was followed already."""

@@ -269,3 +269,9 @@ def test_borders_are_read_as_they_were_written_and_continue_after_a_stop(grazing
 def test_bad_second_numbers_are_rejected_in_one_line(track, message):
     with pytest.raises(InputError, match=message):
         orbits(stopped(0.45, to=0.46, start="linear", track=track))
+
+
+def test_a_branch_without_special_points_says_so():
+    track = {"parameter": "stop.0.gap", "to": 1.1}
+    found = orbits(stopped(0.1, to=0.2, start="linear", step=0.5, max_step=1.0, track=track))
+    assert found.borders == () and found.warnings[0].startswith("orbit.track: the branches have none of fold, ")
