@@ -21,6 +21,8 @@ from vanedamp.files.store import frozen
 
 #: scaled distance of special points that lie on one border, and of a border's point from the special point it begins at
 _SAME, _NEAR = 1e-5, 1e-3
+#: kinds whose event does not happen on one side
+_CLEAR = ("grazing", "sequence")
 #: scaled distance ahead that must lie in the range of the second number
 _AHEAD = 1e-6
 #: parts of the way from a grazing orbit to its neighbour on the branch from which Newton's method begins
@@ -73,6 +75,7 @@ class Borders:
                 if place is None:
                     self.notes.append(
                         f"the {kind} of branch {number} at {self.table.parameter} = {parameter:.9g} cannot be followed"
+                        + (": no orbits come near it with nothing that may rest anywhere" if kind in _CLEAR else "")
                     )
                 elif not self._known(kind, branch.periods, place.border):
                     self._follow(kind, branch.periods, source, surface, place, changed)
@@ -111,7 +114,7 @@ class Borders:
         for number, point in enumerate(branch.special):
             if point.kind not in self.track.kinds or (point.kind == "pitchfork" and branch.periods > 1):
                 continue  # where a doubled branch joins another one that doubles there
-            begin = self._clear if point.kind in ("grazing", "sequence") else self._smooth
+            begin = self._clear if point.kind in _CLEAR else self._smooth
             yield _Candidate(point.kind, number, point.parameter, partial(begin, branch, point))
         if "peak" in self.track.kinds:
             a, sequence = branch.amplitude_mean, branch.sequence
@@ -148,8 +151,12 @@ class Borders:
         return surface, self._first(surface, condition, y)
 
     def _clear(self, branch: Branch, point: SpecialPoint) -> tuple[Surface, Place | None]:
-        """Return the first place of a border where an event grazes, from orbits without it."""
+        """Return the first place of a border where an event grazes, from orbits without it.
+
+        None if they may be moved: where a body may rest anywhere, that decides how near it comes.
+        """
         near = [index for index in (point.index, point.index + 1) if index < len(branch.parameter)]
+        near = [index for index in near if not branch.neutral[index]]
         events = [len(str(branch.sequence[index]).split("; ")) - (not branch.sequence[index]) for index in near]
         for _, index in sorted(zip(events, near, strict=True)):
             surface = self._surface(branch, index)
@@ -160,10 +167,10 @@ class Borders:
                 passage = surface.passage(y)
                 if passage is None or "; ".join(passage.sequence) != branch.sequence[index]:
                     continue
-                place = self._first(surface, Clearance(surface, int(branch.neutral[index])), y)
+                place = self._first(surface, Clearance(surface, 0), y)
                 if place is not None and np.abs(place.border - here)[-2:].max() < _NEAR:
                     return surface, place
-        return surface, None
+        return self._surface(branch, point.index), None
 
     def _peak(self, branch: Branch, index: int) -> tuple[Surface, Place | None]:
         """Return the first place of a peak next to the largest of a branch's orbits."""

@@ -51,6 +51,7 @@ PARTS = (
     Part("vanedamp.coupling.response", ("response", "restart_state", "steady_state")),
     Part("vanedamp.coupling.sweep", ("sweep", "record", "steady_states")),
     Part("vanedamp.coupling.orbits", ("orbits", "branch", "border", "multipliers", "bifurcations", "history")),
+    Part("vanedamp.coupling.exponents"),
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),

@@ -275,3 +275,19 @@ def test_a_branch_without_special_points_says_so():
     track = {"parameter": "stop.0.gap", "to": 1.1}
     found = orbits(stopped(0.1, to=0.2, start="linear", step=0.5, max_step=1.0, track=track))
     assert found.borders == () and found.warnings[0].startswith("orbit.track: the branches have none of fold, ")
+
+
+def test_a_slider_that_may_rest_anywhere_has_no_border_of_its_own():
+    """A friction damper begins to slip at a force that its resting place shifts."""
+    track = {"parameter": "friction_damper.0.friction", "to": 0.12, "kinds": ["sequence"]}
+    data = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+        excitation={"frequency": 1.0 / (2 * math.pi), "force": 0.1},
+        friction_damper=[{"normal_force": 1.0, "friction": 0.1, "stiffness": 0.5}],
+        time={"periods": 1, "transient": 0},
+        orbit={
+            "parameter": "excitation.force", "to": 0.12, "start": "linear", "min_step": 0.01, "step": 0.1,
+            "max_step": 1.0, "max_points": 20, "track": track,
+        },
+    )  # fmt: skip
+    assert any("may rest anywhere" in warning for warning in orbits(data).warnings)
