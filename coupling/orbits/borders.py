@@ -75,7 +75,11 @@ class Borders:
                 if place is None:
                     self.notes.append(
                         f"the {kind} of branch {number} at {self.table.parameter} = {parameter:.9g} cannot be followed"
-                        + (": no orbits come near it with nothing that may rest anywhere" if kind in _CLEAR else "")
+                        + (
+                            ": no event nearly happens next to it, or a body may rest anywhere"
+                            if kind in _CLEAR
+                            else ""
+                        )
                     )
                 elif not self._known(kind, branch.periods, place.border):
                     self._follow(kind, branch.periods, source, surface, place, changed)
