@@ -23,6 +23,7 @@ from vanedamp.files.store import frozen
 _SAME, _NEAR = 1e-5, 1e-3
 #: kinds whose event does not happen on one side
 _CLEAR = ("grazing", "sequence")
+_UNCLEAR = ": no event nearly happens next to it, or a body may rest anywhere"
 #: scaled distance ahead that must lie in the range of the second number
 _AHEAD = 1e-6
 #: parts of the way from a grazing orbit to its neighbour on the branch from which Newton's method begins
@@ -73,14 +74,9 @@ class Borders:
                     continue  # of a checkpoint
                 surface, place = begin()
                 if place is None:
-                    self.notes.append(
-                        f"the {kind} of branch {number} at {self.table.parameter} = {parameter:.9g} cannot be followed"
-                        + (
-                            ": no event nearly happens next to it, or a body may rest anywhere"
-                            if kind in _CLEAR
-                            else ""
-                        )
-                    )
+                    why = _UNCLEAR if kind in _CLEAR else ""
+                    where = f"branch {number} at {self.table.parameter} = {parameter:.9g}"
+                    self.notes.append(f"the {kind} of {where} cannot be followed{why}")
                 elif not self._known(kind, branch.periods, place.border):
                     self._follow(kind, branch.periods, source, surface, place, changed)
         if not self.finished and not self.notes:
