@@ -26,6 +26,7 @@ class ClosedMap:
     periods: int = 1
     mirror: bool = False
     lowest: float = -math.inf
+    numbers: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -33,6 +34,7 @@ class ClosedMap:
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         derivative, crossings, clearance, peaks = np.eye(len(state)), [], (math.inf, ""), []
+        start = np.asarray(state, float)
         for _ in range(self.periods):
             peaks.append(abs(state[0]))
             state, one, new, near = self.step(np.asarray(state, float), self.value)
@@ -40,14 +42,23 @@ class ClosedMap:
             crossings += new
         finite = np.isfinite(state).all() and np.abs(state).max() < 1e6
         status = PassageStatus.OK if finite else PassageStatus.STOPPED
-        return Passage(
-            state, derivative, tuple(crossings), clearance, status, np.array(peaks), np.zeros((len(state), 0))
-        )
+        by_number = np.zeros((len(state), 0)) if not self.numbers else self._by_number(start)
+        return Passage(state, derivative, tuple(crossings), clearance, status, np.array(peaks), by_number)
+
+    def _by_number(self, state: np.ndarray) -> np.ndarray:
+        """Return differences by the first of its two numbers or both."""
+        steps = 1e-5 * np.eye(2)[: len(self.numbers)]
+        ways = [[self.step(state, tuple(self.value + way * step))[0] for way in (1, -1)] for step in steps]
+        return np.array([(up - down) / 2e-5 for up, down in ways]).T
 
     def at(self, value: float) -> ClosedMap:
         if value < self.lowest:
             raise InputError(f"scene: value: {self.lowest:g} is the least")
         return replace(self, value=value)
+
+    def with_numbers(self, values: dict[str, float]) -> ClosedMap:
+        """Return the map at two values, a tuple of them."""
+        return replace(self, value=tuple(values.values()))
 
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
