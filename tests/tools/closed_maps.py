@@ -15,6 +15,9 @@ from vanedamp.files.toml_input import InputError
 #: state (k,) and parameter -> state, derivative (k, k), crossings, clearance
 Step = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray, tuple[Crossing, ...], tuple[float, str]]]
 
+#: step of differences by numbers
+_STEP = 1e-5
+
 
 @dataclass(frozen=True)
 class ClosedMap:
@@ -27,6 +30,7 @@ class ClosedMap:
     mirror: bool = False
     lowest: float = -math.inf
     numbers: tuple[str, ...] = ()
+    parameter: str = "value"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -46,10 +50,14 @@ class ClosedMap:
         return Passage(state, derivative, tuple(crossings), clearance, status, np.array(peaks), by_number)
 
     def _by_number(self, state: np.ndarray) -> np.ndarray:
-        """Return differences by the first of its two numbers or both."""
-        steps = 1e-5 * np.eye(2)[: len(self.numbers)]
-        ways = [[self.step(state, tuple(self.value + way * step))[0] for way in (1, -1)] for step in steps]
-        return np.array([(up - down) / 2e-5 for up, down in ways]).T
+        """Return differences by its value, or by the first of its two values or both."""
+        columns, values = [], np.atleast_1d(self.value).astype(float)
+        for step in _STEP * np.eye(len(values))[: len(self.numbers)]:
+            moved = [values + way * step for way in (1, -1)]
+            kinds = [tuple(each) if isinstance(self.value, tuple) else float(each[0]) for each in moved]
+            up, down = (replace(self, value=each, numbers=())(state).state for each in kinds)
+            columns.append((up - down) / (2 * _STEP))
+        return np.array(columns).T
 
     def at(self, value: float) -> ClosedMap:
         if value < self.lowest:
