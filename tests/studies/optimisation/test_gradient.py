@@ -172,6 +172,13 @@ def test_other_methods_and_static_deflections_have_no_derivatives():
         assert record.gradient["steps"] == record.gradient["orbits"] == 0
 
 
+def test_a_tolerance_that_begins_at_a_kink_has_no_derivative():
+    """Friction that a body may have, but has not as designed."""
+    case = study(damper={"friction": 0.0}, band=(2364.0, 2436.0, 2), tolerances={"friction": 0.1}, samples=1)
+    record = optimise(replace_variables(case, Design(0.09, 0.85, 1)))
+    assert record.nominal.estimate["worst"] is None and record.nominal.estimate["without"] == {"undetermined": 1}
+
+
 def replace_variables(case, design):
     """The study with one design only."""
     variables = replace(case.table.variables, mass_ratio=(design.mass_ratio,) * 2, gap_ratio=(design.gap_ratio,) * 2)
