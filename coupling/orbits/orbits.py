@@ -18,7 +18,7 @@ from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
-from vanedamp.coupling.orbits.period_map import PeriodMap, at_rest, period_map
+from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -158,7 +158,7 @@ class _Search:
         ends = [_at(base, {path: value}) for value in (self.low, self.to) if value is not None]
         if track is not None and self.to is not None:
             corners = itertools.product((self.low, self.to), (self.first_second, track.to))
-            ends += [_at(at_rest(base), {path: one, track.parameter: two}) for one, two in corners]
+            ends += [_at(centred(base), {path: one, track.parameter: two}) for one, two in corners]
         if leaves_open(base):
             choices = choices_of(ends)
             ends = [with_choices(end, choices).scene for end in ends]

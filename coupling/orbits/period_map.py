@@ -168,9 +168,8 @@ class PeriodMap:
 def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "") -> PeriodMap:
     """Return the map of a scene over excitation periods, with a number of it as parameter (dotted path).
 
-    second: another number that will change.
-
-    Open choices of the scene are made first. Raises InputError for a scene that the exact engine cannot run.
+    second: another number that will change; bodies then begin in the middle of their cavities. Open choices of the
+    scene are made first. Raises InputError for a scene that the exact engine cannot run.
     """
     if scene.solver.method != "exact":
         raise InputError(
@@ -179,10 +178,10 @@ def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: i
     chosen = choose(scene).scene
     check_waveform(chosen, "exact")
     turns = (parameter in SPEEDS or second in SPEEDS) and isinstance(chosen.structure, Rom)
-    chosen = at_rest(chosen)
+    chosen = centred(chosen) if second else chosen
     return PeriodMap(chosen, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None)
 
 
-def at_rest(scene: Scene) -> Scene:
+def centred(scene: Scene) -> Scene:
     """Return a scene whose bodies begin in the middle: where they begin may lie outside of another gap."""
     return scene.replace({f"damper.{number}.position": 0.0 for number in range(len(scene.damper))})

@@ -146,6 +146,8 @@ class ImpactOscillator:
     periods: int = 1
     damping: float = 0.1
     restitution: float = 0.8
+    numbers: tuple[str, ...] = ()
+    parameter: str = "value"
     names = ("x", "x rate")
     scale = np.ones(2)
 
@@ -172,7 +174,8 @@ class ImpactOscillator:
         return np.array([x[1], self.value * math.cos(t) - self.damping * x[1] - x[0]])
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
-        end, now, x, derivative = 2 * math.pi * self.periods, 0.0, np.asarray(state, float), np.eye(2)
+        first, derivative = np.asarray(state, float), np.eye(2)
+        end, now, x = 2 * math.pi * self.periods, 0.0, first
         crossings, top = [], -math.inf
         while len(crossings) < 50:
 
@@ -215,5 +218,9 @@ class ImpactOscillator:
             clearance,
             PassageStatus.OK,
             np.ones(self.periods),
-            np.zeros((len(state), 0)),
+            self._by_number(first) if self.numbers else np.zeros((len(state), 0)),
         )
+
+    def _by_number(self, state: np.ndarray) -> np.ndarray:
+        up, down = (replace(self, value=self.value + way * _STEP, numbers=())(state).state for way in (1, -1))
+        return ((up - down) / (2 * _STEP))[:, None]
