@@ -174,8 +174,8 @@ class ImpactOscillator:
         return np.array([x[1], self.value * math.cos(t) - self.damping * x[1] - x[0]])
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
-        first, derivative = np.asarray(state, float), np.eye(2)
-        end, now, x = 2 * math.pi * self.periods, 0.0, first
+        end, now, x, derivative = 2 * math.pi * self.periods, 0.0, np.asarray(state, float), np.eye(2)
+        turn, slope = np.zeros(2), lambda t: self.driven(t) / self.value  # derivatives by a: of x, and of the response
         crossings, top = [], -math.inf
         while len(crossings) < 50:
 
@@ -206,9 +206,11 @@ class ImpactOscillator:
             f, g = self.rate(before, t), self.rate(after, t)
             salt = jump + np.outer(g - jump @ f, [1.0, 0.0]) / f[0]
             derivative = salt @ self.propagator(t - now) @ derivative
+            turn = salt @ (slope(t) + self.propagator(t - now) @ (turn - slope(now)))
             crossings.append(Crossing(t, "impact stop 0", before[1], 0.0))
             x, now = after, t
         derivative = self.propagator(end - now) @ derivative
+        turn = slope(end) + self.propagator(end - now) @ (turn - slope(now))
         state = self.driven(end) + self.propagator(end - now) @ (x - self.driven(now))
         clearance = (math.inf, "") if crossings else (1.0 - top, "impact stop 0")
         return Passage(
@@ -218,9 +220,5 @@ class ImpactOscillator:
             clearance,
             PassageStatus.OK,
             np.ones(self.periods),
-            self._by_number(first) if self.numbers else np.zeros((len(state), 0)),
+            turn[:, None][:, : len(self.numbers)],
         )
-
-    def _by_number(self, state: np.ndarray) -> np.ndarray:
-        up, down = (replace(self, value=self.value + way * _STEP, numbers=())(state).state for way in (1, -1))
-        return ((up - down) / (2 * _STEP))[:, None]
