@@ -15,7 +15,7 @@ KINDS = {
         FileKind(
             "pipeline",
             "vanedamp.studies.pipeline.tables:PipelineFile",
-            ("calibrate", "modal", "reduce", "report", "folder"),
+            ("calibrate", "modal", "reduce", "identify", "report", "folder"),
         ),
         FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
         FileKind(

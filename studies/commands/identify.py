@@ -19,9 +19,9 @@ from vanedamp.studies.workers import workers
 def run(arguments: Namespace) -> None:
     """Find the numbers."""
     study = IdentificationStudy.load(arguments.input)
-    arguments.outputs.keep(study.files)
+    arguments.outputs.keep(study.scene.files)
     with workers(arguments.workers) as pool:
-        compile_engine([study.scene], pool)
+        compile_engine([study.base], pool)
         with progress("identify") as report:
             found = identify(study, pool, report, {"versions": versions()})
     lines = _summary(found)

@@ -37,7 +37,7 @@ class Model(ABC):
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         self.measured, self.paths, self.count = measured, study.paths, count
         self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
-        self._points = Points(study.scene.replace(measured.changes))
+        self._points = Points(study.base.replace(measured.changes))
 
     def scene(self, values: np.ndarray, further: Mapping[str, float] | None = None) -> Scene | None:
         """Return the scene with values (P,) of the numbers; None where they make no scene."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -82,7 +83,8 @@ class _Work:
         self.fit = Fit(study)
         self._map: Callable[..., Iterable[Any]] = map if executor is None else executor.map
         self._progress, self._done = progress, 0
-        self._expected = study.search.candidates + study.search.starts + len(study.numbers)
+        asked = math.prod(map(len, study.proposals().values())) if study.proposals() else 0
+        self._expected = study.search.candidates + study.search.starts + len(study.numbers) + asked
 
     def _each(self, function: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
         """Return the results of calls, in order, and count their engine runs."""

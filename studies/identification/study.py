@@ -46,7 +46,6 @@ class IdentificationStudy:
 
     def __post_init__(self) -> None:
         """Check it."""
-        object.__setattr__(self, "scene", replace(self.scene, sweep={}, orbit=None, ramp=None))
         if self.scene.solver.method != "exact":
             raise InputError(f'solver.method: identification takes "exact", not "{self.scene.solver.method}"')
         if leaves_open(self.scene):
@@ -57,7 +56,7 @@ class IdentificationStudy:
             self._check_measured(measured)
         for path, values in self.propose.items():
             try:
-                assemble(self.scene.replace({path: float(values[0])}))
+                assemble(self.base.replace({path: float(values[0])}))
             except InputError as error:
                 raise InputError(f"propose: {str(error).removeprefix('scene: ')}") from None
         count, known = sum(len(one.at) * len(one.channels) for one in self.measured), len(self.numbers)
@@ -71,7 +70,7 @@ class IdentificationStudy:
         try:
             given = number_at(self.scene.to_dict(), path)
             for value in (number.min, number.max):
-                assemble(self.scene.replace({path: value}))
+                assemble(self.base.replace({path: value}))
         except InputError as error:
             raise InputError(f"numbers: {path}: {str(error).removeprefix('scene: ')}") from None
         if number.start is None and not number.min <= given <= number.max:
@@ -86,7 +85,7 @@ class IdentificationStudy:
             if path in self.numbers:
                 raise InputError(f"{where}: {path} is one of the numbers that are sought; leave it out of `set`")
         try:
-            scene = self.scene.replace(measured.changes)
+            scene = self.base.replace(measured.changes)
             check_moved(scene) if measured.kind != "decay" else table_of(scene)
             ends = (measured.at[0], measured.at[-1]) if measured.kind == "forced" else ()
             for frequency in ends or (scene.frequency,):
@@ -117,6 +116,11 @@ class IdentificationStudy:
     def paths(self) -> tuple[str, ...]:
         """The paths of the numbers."""
         return tuple(self.numbers)
+
+    @cached_property
+    def base(self) -> Scene:
+        """The scene without tables of other commands."""
+        return replace(self.scene, sweep={}, orbit=None, ramp=None)
 
     @cached_property
     def start(self) -> np.ndarray:
@@ -159,11 +163,6 @@ class IdentificationStudy:
     def scene_at(self, values: np.ndarray) -> Scene:
         """Return the scene with values (P,) of the numbers."""
         return self.scene.replace(dict(zip(self.paths, map(float, values), strict=True)))
-
-    @cached_property
-    def files(self) -> list[str]:
-        """The files that the scene names."""
-        return self.scene.files
 
     def proposals(self) -> dict[str, list[float]]:
         """Return the measurements to choose the next from: values by paths; {} where no level is known."""

@@ -20,8 +20,10 @@ from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
+from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
+from vanedamp.studies.report.identification_charts import data_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
 from vanedamp.studies.report.results import Result, Results, collect
 from vanedamp.studies.report.sections.calibration import frequencies_figure, response_figure
@@ -35,7 +37,8 @@ from vanedamp.studies.report.time_history import History, history_figure
 _MOST_CURVES = 8
 #: charts of records that one figure shows in full
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
-    Branches: branches_figure, Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure
+    Branches: branches_figure, Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
+    Identification: data_figure,
 }  # fmt: skip
 
 
@@ -44,7 +47,8 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
 
     A Sweep gives its forced responses, the best of many; a Response its time history (with the walls of its cavities if
-    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; a file of `vanedamp modal` its modes; one
+    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; an
+    Identification its measurements over the model; a file of `vanedamp modal` its modes; one
     of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies. Raises
     InputError for anything else, and for a response without samples.
     """
@@ -73,6 +77,7 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
 @plot.register(Ramp)
 @plot.register(RingDown)
 @plot.register(Campbell)
+@plot.register(Identification)
 def _(result: Any, scene: Scene | None = None) -> go.Figure:
     return _DIAGRAMS[type(result)](result)
 
