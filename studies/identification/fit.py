@@ -100,9 +100,7 @@ class Fit:
         self.predict(z)
         return [each * self.study.slope(values) for each in self._each([m.derivative(values) for m in self.models])]
 
-    def minimum(
-        self, z: np.ndarray, held: Sequence[int] = (), close: float = _CLOSE, most: int = _MOST
-    ) -> Minimum:
+    def minimum(self, z: np.ndarray, held: Sequence[int] = (), close: float = _CLOSE, most: int = _MOST) -> Minimum:
         """Return the minimum near a start, some coordinates held.
 
         Raises nothing: a search that does not converge says so.
@@ -147,10 +145,12 @@ class Fit:
 
     def _pairs(self, found: list[Predicted]) -> list[tuple[Channel, np.ndarray, np.ndarray]]:
         """Return each channel with the model's values (n,) and their own errors in its terms (n,)."""
-        return [
-            (channel, one.values[channel.name], one.errors * (1.0 if channel.compare == "ratio" else np.abs(one.values[channel.name])))
-            for measured, one in zip(self.study.measured, found, strict=True) for channel in measured.channels
-        ]  # fmt: skip
+        pairs = []
+        for measured, one in zip(self.study.measured, found, strict=True):
+            for channel in measured.channels:
+                values = one.values[channel.name]
+                pairs.append((channel, values, one.errors * (1.0 if channel.compare == "ratio" else np.abs(values))))
+        return pairs
 
     def _each(self, of: list[Values]) -> list[np.ndarray]:
         """Return arrays by channel in the order of the channels."""

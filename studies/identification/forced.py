@@ -9,6 +9,7 @@ import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
 from vanedamp.studies.identification.steady import Steady, found_near, over_orbit, run, settled
@@ -18,6 +19,7 @@ from vanedamp.studies.identification.study import IdentificationStudy
 _EXACT, _MEAN = 1e-5, 2e-2
 #: half width of a 95 % confidence interval over the standard deviation
 _NORMAL = 1.96
+_TINY = float(np.finfo(float).tiny)
 
 
 class Forced(Model):
@@ -84,7 +86,7 @@ class Forced(Model):
 
         return self.differences(values, figures, _MEAN if steady.orbit is None else _EXACT)
 
-    def _at(self, values: np.ndarray, place: int):
+    def _at(self, values: np.ndarray, place: int) -> Scene | None:
         return self.scene(values, {FREQUENCY: float(self.measured.at[place])})
 
     def _figures(self, steady: Steady) -> tuple[np.ndarray, float]:
@@ -94,11 +96,11 @@ class Forced(Model):
         response = steady.response or over_orbit(steady, self.count)
         figures = np.array([getattr(response, name) for name in self._names])
         error = response.amplitude_mean_confidence if steady.orbit is None else 0.0
-        return figures, (error or 0.0) / _NORMAL / max(response.amplitude_mean, np.finfo(float).tiny)
+        return figures, (error or 0.0) / _NORMAL / max(response.amplitude_mean, _TINY)
 
     def _predicted(self, motions: list[Steady | None]) -> Predicted:
         nothing = np.full(len(self._names), np.nan), 0.0
         figures, errors = zip(*(nothing if one is None else self._figures(one) for one in motions), strict=True)
         of = dict(zip((channel.name for channel in self.measured.channels), np.transpose(figures), strict=True))
-        repeats = [one is not None and (one.orbit is not None or not error) for one, error in zip(motions, errors, strict=True)]
+        repeats = [one is not None and not error for one, error in zip(motions, errors, strict=True)]
         return Predicted(of, np.array(errors), np.array(repeats))

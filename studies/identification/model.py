@@ -58,9 +58,7 @@ class Model(ABC):
     def derivative(self, values: np.ndarray) -> Values:
         """Return derivatives (n, P) of the channels at values of the numbers that `predict` was called with last."""
 
-    def differences(
-        self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float
-    ) -> np.ndarray:
+    def differences(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float) -> np.ndarray:
         """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges."""
         low, high = self._bounds
         columns = []

@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
 
-from vanedamp.files.store import frozen
 from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.files.store import frozen
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.fit import Fit, Minimum
 from vanedamp.studies.identification.forced import Forced
@@ -98,7 +98,7 @@ class _Work:
         return results
 
     def starts(self) -> list[np.ndarray]:
-        """Return the best candidates that are apart, the best first: of the scene's own numbers and a Sobol sequence."""
+        """Return the best candidates that are apart, the best first: of the first guess and a Sobol sequence."""
         table, size = self.study.search, len(self.study.numbers)
         spread = qmc.Sobol(size, seed=table.seed).random(1 << max(table.candidates - 1, 1).bit_length())
         own = np.clip(self.study.coordinates(self.study.start), 0.0, 1.0)
@@ -181,7 +181,12 @@ def _minimum(study: IdentificationStudy, z: np.ndarray) -> tuple[Minimum, Counte
 
 
 def _profile(
-    study: IdentificationStudy, deviations: Sequence[float], best: Minimum, scatter: np.ndarray, number: int, most: float
+    study: IdentificationStudy,
+    deviations: Sequence[float],
+    best: Minimum,
+    scatter: np.ndarray,
+    number: int,
+    most: float,
 ) -> tuple[Profile, Counter[str]]:
     fit = Fit(study, deviations)
     fit.predict(best.z)
@@ -248,9 +253,7 @@ def _data(fit: Fit, z: np.ndarray, scatter: np.ndarray) -> dict[str, Any]:
     for number, ((measured, channel, model, repeats), slope, deviation) in enumerate(each):
         band = _NORMAL * np.sqrt(np.maximum(np.einsum("np,pq,nq->n", slope, told, slope), 0.0))
         place = np.full(len(model), float(number))
-        rows.append(
-            np.array([place, measured.at, channel.values, channel.deviations(deviation), model, band, repeats])
-        )
+        rows.append(np.array([place, measured.at, channel.values, channel.deviations(deviation), model, band, repeats]))
         channels.append(
             {"measurement": measured.name, "kind": measured.kind, "quantity": channel.name, "unit": channel.unit,
              "compare": channel.compare, "at_unit": measured.unit}

@@ -47,7 +47,7 @@ def information(jacobian: np.ndarray) -> np.ndarray:
 def covariance(jacobian: np.ndarray) -> np.ndarray:
     """Return the covariance (P, P) of coordinates by Gauss and Newton; inf of those that nothing tells."""
     squares = jacobian.T @ jacobian
-    tells = np.diag(squares) > np.finfo(float).eps * max(float(np.trace(squares)), np.finfo(float).tiny)
+    tells = np.diag(squares) > np.finfo(float).eps * float(np.trace(squares))
     found = np.diag(np.where(tells, 0.0, np.inf))
     places = np.flatnonzero(tells)
     found[np.ix_(places, places)] = np.linalg.pinv(squares[np.ix_(places, places)], rcond=1e-14, hermitian=True)

@@ -103,9 +103,10 @@ class IdentificationStudy:
         """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
         file, folder = validate(IdentificationFile, dict(data), str(path)), Path(path).parent
         measured = [
-            *(read_forced(table, folder) for table in file.forced), *(read_decay(table, folder) for table in file.decay),
+            *(read_forced(table, folder) for table in file.forced),
+            *(read_decay(table, folder) for table in file.decay),
             *(read_impacts(table, folder) for table in file.impacts),
-        ]  # fmt: skip
+        ]
         scene, propose = load_scene(folder / file.scene), {key: axis_values(axis) for key, axis in file.propose.items()}
         try:
             return cls(scene, file.numbers, measured, file.search, propose)

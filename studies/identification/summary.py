@@ -91,6 +91,6 @@ def _notes(
         yield f"other numbers fit as well: {found}"
     if cold > misfit + _ELSEWHERE:
         yield (
-            f"runs from the scene's own start miss the measurements by {cold:.4g} rather than {misfit:.4g}: some end in "
-            "another steady state than the measured one; give the direction of the measurement, or [initial]"
+            f"runs from the scene's own start miss the measurements by {cold:.4g} rather than {misfit:.4g}: some end "
+            "in another steady state than the measured one; give the direction of the measurement, or [initial]"
         )

@@ -227,7 +227,7 @@ class Identify(Stage):
     def inputs(self) -> dict[str, Any]:
         """Return the study, its scene, and the files that both name."""
         scene, *measured = self._named()
-        files = [*measured, *Scene.load(scene).files]
+        files: list[str | Path] = [*measured, *Scene.load(scene).files]
         of = {f"study {self.file.name}": read_toml(self.file), f"scene {scene.name}": read_toml(scene)}
         return of | _digests(files, self.file.parent) | _software()
 

@@ -96,8 +96,8 @@ class ReportStage:
 
 @dataclass(frozen=True, config=STRICT)
 class PipelineFile:
-    """A pipeline: a stage runs if its table is there, an empty one too, in the order calibrate, modal, reduce, identify,
-    sweep, report."""
+    """A pipeline: a stage runs if its table is there, an empty one too, in the order calibrate, modal, reduce,
+    identify, sweep, report."""
 
     case: str | None = None
     """case file of calibrate, modal and reduce, relative to this file"""
@@ -142,10 +142,9 @@ class PipelineFile:
     def _check_name(self, key: str, table: SweepStage | IdentifyStage) -> None:
         if not table.stem or Path(table.stem).name != table.stem:
             raise ValueError(f"{key}.name: expected a file name without folder and suffix, not '{table.stem}'")
-        if sum(other.stem == table.stem for other in (*self.sweep, *self.identify)) > 1:
-            kind = key.split("[")[0]
-            same = "sweeps" if kind == "sweep" else "stages"
-            raise ValueError(f"{key}.name: two {same} have the name '{table.stem}'; give one of them another")
+        stems = [one.stem for one in self.sweep] + [one.stem for one in self.identify]
+        if stems.count(table.stem) > 1:
+            raise ValueError(f"{key}.name: two stages have the name '{table.stem}'; give one of them another")
 
     @classmethod
     def load(cls, path: str | Path) -> PipelineFile:

@@ -81,7 +81,13 @@ def correlation_figure(record: Identification) -> go.Figure:
     names = list(record.paths)
     figure = go.Figure(
         go.Heatmap(
-            z=record.correlation, x=names, y=names, zmin=-1.0, zmax=1.0, colorscale="RdBu", texttemplate="%{z:.2f}",
+            z=record.correlation,
+            x=names,
+            y=names,
+            zmin=-1.0,
+            zmax=1.0,
+            colorscale="RdBu",
+            texttemplate="%{z:.2f}",
             colorbar={"title": "correlation"},
         )
     )

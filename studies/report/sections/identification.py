@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
 
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.identification.summary import proposal_text
-from vanedamp.studies.report.charts import dressed
+from vanedamp.studies.report.charts import Chart, Table, dressed
 from vanedamp.studies.report.identification_charts import (
     correlation_figure,
     data_figure,
@@ -23,8 +26,14 @@ from vanedamp.studies.report.results import Result
 
 ORDER = 57
 KIND = "identification"
-#: panels side by side, and height of a row of them
-_COLUMNS, _HEIGHT = 3, 320
+#: panels side by side, height of a row of them, and of what is around them
+_COLUMNS, _HEIGHT, _LEGEND = 3, 320, 120
+_DATA = "Measurements, and the model with its 95 % band; open circles are means of motions that do not repeat."
+_PROFILES = (
+    "Profiles: rise of the misfit along a number, the others at their best. Intervals of 95 % end at the dashed line."
+)
+_CORRELATIONS = "Correlations of the numbers."
+_NEXT = "The next measurement: what each would leave of the largest uncertainty."
 
 
 def load(path: Path) -> Result:
@@ -47,37 +56,34 @@ def _identification(file: str, record: Identification, page: Page) -> dict[str, 
 
 def _numbers(record: Identification) -> list[tuple[Any, ...]]:
     """Return a row per number: path, unit, value, deviation, ends of the interval and whether they are bounds."""
-    deviations = [math.sqrt(value) for value in record.covariance.diagonal().tolist()]
-    rows = zip(record.paths, record.best.tolist(), deviations, record.interval.tolist(), record.open.tolist(), strict=True)
+    columns = (record.best, np.sqrt(record.covariance.diagonal()), record.interval, record.open)
+    rows = zip(record.paths, *(column.tolist() for column in columns), strict=True)
     return [(path, unit_of(path), *rest) for path, *rest in rows]
 
 
-def _charts(file: str, record: Identification, page: Page) -> Any:
-    names = ("data_at", "data_value", "data_deviation", "data_model", "data_band")
-    data = zip(*(getattr(record, name).tolist() for name in ("data_channel", *names)), strict=True)
-    of = [f"{channel['measurement']} {channel['quantity']}" for channel in record.channels]
-    rows = ((of[channel], *rest) for channel, *rest in data)
-    yield "Measurements and the model with its 95 % band; open circles are means of motions that do not repeat.", page.chart(
-        "identification-data", _sized(data_figure(record), len(of)), ("channel", *names), rows, [file]
-    )
-    points = zip(record.profile_number.tolist(), record.profile_value.tolist(), record.profile_rise.tolist(), strict=True)
-    yield "Profiles: rise of the misfit along a number with the others at their best; dashed: where 95 % intervals end.", page.chart(
-        "identification-profiles", _sized(profile_figure(record), len(record.paths)), ("number", "value", "rise"),
-        ((record.paths[number], value, rise) for number, value, rise in points), [file],
-    )  # fmt: skip
+def _charts(file: str, record: Identification, page: Page) -> Iterator[tuple[str, Chart]]:
+    """Yield charts, each with a sentence."""
+
+    def made(kind: str, figure: go.Figure, panels: int, table: Table) -> Chart:
+        height = _LEGEND + _HEIGHT * math.ceil(panels / _COLUMNS)
+        return page.chart(f"identification-{kind}", dressed(figure, height), *table, [file])
+
+    yield _DATA, made("data", data_figure(record), len(record.channels), _data_table(record))
+    points = (record.profile_number, record.profile_value, record.profile_rise)
+    rows = [(record.paths[number], *rest) for number, *rest in zip(*(part.tolist() for part in points), strict=True)]
+    yield _PROFILES, made("profiles", profile_figure(record), len(record.paths), (("number", "value", "rise"), rows))
     pairs = itertools.product(range(len(record.paths)), repeat=2)
-    yield "Correlations of the numbers.", page.chart(
-        "identification-correlations", dressed(correlation_figure(record), 420), ("number", "other", "correlation"),
-        ((record.paths[i], record.paths[j], record.correlation[i, j]) for i, j in pairs), [file],
-    )  # fmt: skip
+    rows = [(record.paths[i], record.paths[j], record.correlation[i, j]) for i, j in pairs]
+    yield _CORRELATIONS, made("correlations", correlation_figure(record), 1, (("number", "other", "correlation"), rows))
     proposal = record.proposal
     if proposal is not None:
-        rows = ((*point, left[proposal.worst]) for point, left in zip(proposal.points.tolist(), proposal.shrink, strict=True))
-        yield "The next measurement: what it would leave of the largest uncertainty.", page.chart(
-            "identification-next", dressed(proposal_figure(record, proposal), 420), (*proposal.axes, "left"), rows, [file]
-        )
+        rows = [(*point, left) for point, left in zip(proposal.points, proposal.shrink[:, proposal.worst], strict=True)]
+        yield _NEXT, made("next", proposal_figure(record, proposal), 1, ((*proposal.axes, "left"), rows))
 
 
-def _sized(figure: Any, panels: int) -> Any:
-    rows = math.ceil(panels / _COLUMNS)
-    return dressed(figure, 120 + _HEIGHT * rows)
+def _data_table(record: Identification) -> Table:
+    """Return measured values with those of the model."""
+    names = ("data_at", "data_value", "data_deviation", "data_model", "data_band")
+    of = [f"{channel['measurement']} {channel['quantity']}" for channel in record.channels]
+    columns = zip(*(getattr(record, name).tolist() for name in ("data_channel", *names)), strict=True)
+    return ("channel", *names), ((of[channel], *rest) for channel, *rest in columns)
