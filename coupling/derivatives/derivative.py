@@ -12,8 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.constraints import Affine, Constraints
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
-from vanedamp.coupling.derivatives.jump import Jump, Untrusted, impact
+from vanedamp.coupling.derivatives.flow_derivative import derivative_of
+from vanedamp.coupling.derivatives.jump import Untrusted, impact, scaled
+from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.numerics import codes
@@ -42,14 +45,22 @@ _FORCES = (codes.PARTS, codes.AT_LOW, codes.AT_HIGH)
 class Guard(NamedTuple):
     """An event function right before its event: functional (2N,) of u, its rate and second derivative in time, scale.
 
-    part: number of the part of the system that it belongs to (Dynamics.part).
+    own: (P,) derivatives by numbers of the scene, where the motion stays; part: number of the part of the system that
+    it belongs to (Dynamics.part).
     """
 
     gradient: np.ndarray
+    own: np.ndarray
     rate: float
     bend: float
     scale: float
     part: int
+
+    def along(self, M: np.ndarray) -> np.ndarray:
+        """Return its derivative (k + P,) along with that of the motion, M (2N, k + P)."""
+        found = self.gradient @ M
+        found[M.shape[1] - len(self.own) :] += self.own
+        return np.asarray(found)
 
     @property
     def tangential(self) -> bool:
@@ -59,7 +70,7 @@ class Guard(NamedTuple):
 
 
 class Before(NamedTuple):
-    """The moment before an event: the segment that it ends, its flow, z (K,) there, and the derivative M (2N, k)."""
+    """The moment before an event: the segment that it ends, its flow, z (K,) there, and M (2N, k + P)."""
 
     segment: Segment
     event: Event
@@ -79,19 +90,26 @@ def begins(segment: Segment) -> bool:
 
 
 class Derivative:
-    """The derivative M (2N, k) of u by the state at the start, in units of its sizes `scale` (k,).
+    """The derivative M (2N, k + P) of u by the state at the start, in units of its sizes `scale` (k,), and by numbers.
 
-    status: its defect so far, if any.
+    status: its defect so far, if any; shift: (k + P,) of the last event in time, s.
     """
 
-    def __init__(self, dynamics: Dynamics, start: Start) -> None:
+    def __init__(self, dynamics: Dynamics, start: Start, numbers: Numbers | None = None) -> None:
         self.dynamics, self.system, self._start, self._scale = dynamics, dynamics.system, start, dynamics.scale
+        self.numbers, self._constraints = numbers, Constraints(dynamics, numbers)
         self.status, self._to_sizes = PassageStatus.OK, np.abs(dynamics.from_state)
-        #: size of each coordinate so far, at least that by which it is compared, and largest derivative of each
+        #: size of each coordinate so far, at least that by which it is compared, and largest derivatives of each: by
+        #: the start, and by each number
         self._size = _LEAST * self._to_sizes @ self._scale
-        self._reach = np.abs(dynamics.from_state * self._scale).max(axis=1)
-        #: the last event that matters: its time, and how derivatives shift it (k,), by parts of the system
+        self._reach = self._largest_of(np.hstack([dynamics.from_state * self._scale, self._none]))
+        #: the last event that matters: its time, and how derivatives shift it (k + P,), by parts of the system
         self._last: tuple[float, dict[int, np.ndarray]] = (-np.inf, {})
+        self.shift = np.zeros(len(self._scale) + self._none.shape[1])
+
+    @property
+    def _none(self) -> np.ndarray:
+        return np.zeros((self.dynamics.one, 0 if self.numbers is None else len(self.numbers)))
 
     def worsen(self, status: PassageStatus) -> None:
         """Note that something is wrong."""
@@ -100,38 +118,49 @@ class Derivative:
 
     def begin(self, event: Event, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
         """Return M as the first segment begins. event: at time zero. Raises Untrusted."""
-        self._check_idle(segment, self.dynamics.from_state * self._scale)
-        M, status = self._start.derivative(event, segment, flow, u)
+        z = self.dynamics.extended(u, segment.time)
+        M, own, status = self._start.derivative(event, segment, flow, z)
         self.worsen(status)
-        return M * self._scale
+        self._check_idle(segment, np.hstack([self.dynamics.from_state * self._scale, own]), z)
+        return np.hstack([M * self._scale, own])
 
     def after(self, before: Before, new: Segment, flow: Flow, u: np.ndarray, guards: list[Guard]) -> np.ndarray:
         """Return M after an event, or a period's end, as the motion continues from u (2N,). Raises Untrusted."""
-        event, jump = before.event, np.eye(self.dynamics.one)
+        event = before.event
+        self.shift = np.zeros_like(self.shift)
         if event.unit < 0:
             if not self._agrees(before.u, u):
                 raise Untrusted
             return before.M
-        jump[self.dynamics.rates, self.dynamics.rates], kick = self._jump(before, new, u)
+        z = self.dynamics.extended(u, new.time)
+        jump, kick = self._jump(before, new, z)
         if begins(new):  # rows at rest or in touch to round-off: the passage begins with them so
-            M = self.dynamics.begun(new.state, self._start.closed(new)) @ jump @ before.M
+            M = self._constraints.begun(new.state, self._start.closed(new), z)(jump(before.M))
             if event.what in (codes.CLOSES, codes.OPENS, codes.RECLOSES):
                 self.worsen(PassageStatus.GRAZING)
         else:
-            M = self._saltation(before, new, flow, u, jump, kick, guards)
-        self._check_still(new, M)
-        self._check_idle(new, M)
+            M = self._saltation(before, new, flow, z, jump, kick, guards)
+        self._check_still(new, M, z)
+        self._check_idle(new, M, z)
         return M
 
-    def end(self, before: Before, final: np.ndarray, time: float) -> np.ndarray:
-        """Return the derivative (k, k) of the state at the end, `final` (k,), after a time, s."""
-        dynamics = self.dynamics
+    def end(self, before: Before, final: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of the state at the end of periods, `final` (k,): by the start (k, k), by numbers (k, P).
+
+        The end moves with the length of a period.
+        """
+        dynamics, k, period = self.dynamics, len(final), self.system.period
         if not self._agrees(dynamics.from_state @ dynamics.to_state @ before.u, dynamics.from_state @ final):
             self.worsen(PassageStatus.UNDETERMINED)
-            return np.full((len(final), len(final)), np.nan)
-        if time - self._last[0] <= _SIMULTANEOUS * self.system.period:
+            return np.full((k, k), np.nan), np.full((k, self._none.shape[1]), np.nan)
+        if periods * period - self._last[0] <= _SIMULTANEOUS * period:
             self.worsen(PassageStatus.COINCIDENT)  # an event at the very end
-        return np.asarray(dynamics.to_state @ before.M / self._scale)
+        by_state = dynamics.to_state @ before.M[:, :k] / self._scale
+        if self.numbers is None:
+            return by_state, np.zeros((k, 0))
+        of, rate = self.numbers.parts, (before.flow.X @ before.z)[: dynamics.one]
+        by_number = dynamics.to_state @ (before.M[:, k:] + np.multiply.outer(rate, periods * of.period))
+        return by_state, (by_number + (of.to_state @ before.u).T) / self.numbers.size
 
     def _agrees(self, predicted: np.ndarray, found: np.ndarray) -> bool:
         """Return whether two states u (2N,) are one."""
@@ -167,74 +196,83 @@ class Derivative:
         if not np.isfinite(scale):
             terms = float(np.abs(functional) @ np.abs(before.z))
             scale = before.segment.speed if what == codes.STOPS else terms
-        gradient = functional[: self.dynamics.one]
+        gradient, own = functional[: self.dynamics.one], np.zeros(0)
+        if self.numbers is not None:
+            time = before.segment.start + before.segment.duration
+            own = derivative_of(before.flow, self.numbers).function(r, what) @ before.z
+            own = own + self.numbers.harmonics(self.dynamics, time) @ functional
         touched = np.flatnonzero(gradient)
         part = int(self.dynamics.part[touched[0] % len(self.dynamics.root)]) if len(touched) else -1
-        return Guard(gradient, rate if met is None else met, bend, scale, part)
+        return Guard(gradient, own, rate if met is None else met, bend, scale, part)
 
-    def _jump(self, before: Before, new: Segment, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivative (N, N) of w after an event by w before, and the jump (N,) of w.
+    def _jump(self, before: Before, new: Segment, z: np.ndarray) -> tuple[Affine, np.ndarray]:
+        """Return the derivative of u after an event by u before, at one time, and the jump (N,) of w; z: (K,) after.
 
         Raises Untrusted where the engine's speeds do not follow from their laws.
         """
-        dynamics, system, event = self.dynamics, self.system, before.event
-        rates, root, u_before = dynamics.rates, dynamics.root, before.u
-        follow = dynamics.followed(new.state)[rates, rates]
+        dynamics, system, event, rates = self.dynamics, self.system, before.event, self.dynamics.rates
+        root, u, u_before = dynamics.root, z[: dynamics.one], before.u
         at = lambda w: np.concatenate([u_before[dynamics.places], w])  # noqa: E731
-        kick = event.impulse @ dynamics.rows
-        left = follow @ (u_before[rates] + kick)
-        jump = Jump(u_before[rates] / root, np.eye(len(root)))
+        kick, struck = event.impulse @ dynamics.rows, Affine(np.eye(len(root)), self._none[rates])
+        w = u_before[rates]
         if event.impulse.any():
-            jump = impact(system, jump.v, event, before.segment.speed)
+            jump = impact(system, w / root, event, before.segment.speed, self.numbers)
             missed = np.abs(system.J[event.struck] @ jump.v - event.after)[np.isinf(system.spring[event.struck])]
             fastest = np.abs(np.concatenate([event.before, event.after])).max()
             if np.any(missed > _LAW * fastest + _ROUND_OFF * before.segment.speed):
                 raise Untrusted
-        derivative = follow @ (root[:, None] * jump.derivative / root)
+            struck, w = scaled(dynamics, jump, w, self.numbers), root * jump.v
+        follow = self._constraints.followed(new.state, np.concatenate([at(w), z[dynamics.one :]])).part(rates)
+        derivative, left = struck.then(follow), follow.matrix @ (u_before[rates] + kick)
         known = len(np.unique(event.struck)) == len(event.struck)
-        known = known and self._agrees(at(follow @ (root * jump.v)), at(left))
+        known = known and self._agrees(at(follow.matrix @ w), at(left))
         if np.any(np.abs(self.dynamics.rows @ (left - u[rates])) > _CAUGHT * new.speed):  # a chatter has been completed
             still = self._start.closed(new), np.abs(system.J @ new.v).reshape(2, -1) <= _ROUND_OFF * new.speed
             stuck = still[0] & still[1][1] & (system.friction > 0.0)
-            held = follow @ dynamics.held(still[0] & still[1][0], stuck)[rates, rates]
-            derivative, kick = held @ derivative, u[rates] - u_before[rates]
-            known = known and self._agrees(at(held @ left), at(u[rates]))
+            held = self._constraints.held(still[0] & still[1][0], stuck, z).part(rates)
+            held = held.then(self._constraints.followed(new.state, z).part(rates))
+            derivative, kick = derivative.then(held), u[rates] - u_before[rates]
+            known = known and self._agrees(at(held.matrix @ left), at(u[rates]))
         if not known or not self._agrees(at(u[rates]), u):
             raise Untrusted
         kick[dynamics.sliders] = (u - u_before)[rates][dynamics.sliders]
-        return derivative, kick
+        whole = Affine(np.eye(dynamics.one), self._none)
+        whole.matrix[rates, rates], whole.own[rates] = derivative
+        return whole, kick
 
     def _saltation(
-        self, before: Before, new: Segment, flow: Flow, u: np.ndarray, jump: np.ndarray, jumped: np.ndarray,
+        self, before: Before, new: Segment, flow: Flow, z: np.ndarray, jump: Affine, jumped: np.ndarray,
         guards: list[Guard],
     ) -> np.ndarray:  # fmt: skip
         """Return the derivative after an event: jump M, and the effect of the event's shift in time.
 
-        jumped: (N,) of w. Parts of the system that do not feel each other have their own events.
+        z: (K,) after; jumped: (N,) of w. Parts of the system that do not feel each other have their own events.
         """
         dynamics, event, M, k = self.dynamics, before.event, before.M, self.dynamics.one
         rate = (before.flow.X @ before.z)[:k]
-        rate_after = (flow.X @ dynamics.extended(u, new.time))[:k]
-        kick = rate_after - jump @ rate
+        rate_after = (flow.X @ z)[:k]
+        kick = rate_after - jump.matrix @ rate
         round_off = _CONTINUOUS if event.what in _FORCES else _ROUND_OFF
-        kick[np.abs(kick) <= round_off * (np.abs(rate_after) + np.abs(jump) @ np.abs(rate))] = 0.0
+        kick[np.abs(kick) <= round_off * (np.abs(rate_after) + np.abs(jump.matrix) @ np.abs(rate))] = 0.0
         if event.impulse.any():
             kick[dynamics.places] = dynamics.rate * jumped
         parts = {guard.part: guard for guard in guards[::-1]}  # the first of each
         others = [part for part in parts if part != guards[0].part]
         owner = np.tile(np.where(np.isin(dynamics.part, others), dynamics.part, guards[0].part), 2)
-        shifts = {part: -(each.gradient @ M) / (each.rate or np.inf) for part, each in parts.items()}
-        moved = jump @ M
+        shifts = {part: -each.along(M) / (each.rate or np.inf) for part, each in parts.items()}
+        self.shift = shifts[guards[0].part]
+        unmoved = jump(M)
+        moved = unmoved
         for part, shift in shifts.items():
             moved = moved - np.multiply.outer(np.where(owner == part, kick, 0.0), shift)
-        matters = event.impulse.any() or self._largest(moved - jump @ M) > _NOTHING * max(self._largest(M), 1.0)
+        matters = event.impulse.any() or self._largest(moved - unmoved) > _NOTHING * max(self._largest(M), 1.0)
         yields = np.isfinite(self.system.spring)
         if event.what == codes.CLOSES and yields[event.unit]:
             begun = np.flatnonzero((before.segment.state == codes.OPEN) & presses(new.state) & yields)
             if len(begun) > 1:
                 moved = self._closings(before, new, sorted(begun.tolist(), key=lambda c: c != event.unit))
             # friction stops the slips of neighbours at once where this motion has none
-            moved = dynamics.begun(new.state, presses(new.state)) @ moved
+            moved = self._constraints.begun(new.state, presses(new.state), z)(moved)
         if not matters:
             return moved
         if any(guard.tangential for guard in guards):
@@ -242,7 +280,7 @@ class Derivative:
         ends = event.what == codes.CLOSES and len(guards) > 1 and not event.after.any()
         if ends and np.all(self.system.tilt < 0):
             # sliders that come to rest at several contacts: nothing is left of gaps and speeds, in any order
-            moved = dynamics.held(self._start.closed(new), np.zeros(len(new.state), bool)) @ jump @ M
+            moved = self._constraints.held(self._start.closed(new), np.zeros(len(new.state), bool), z)(unmoved)
         elif self._meets(M, guards, shifts, new.start):
             self.worsen(PassageStatus.COINCIDENT)
         if before.segment.open_force.any() and event.what in _FORCES:
@@ -251,7 +289,7 @@ class Derivative:
         return moved
 
     def _largest(self, M: np.ndarray) -> float:
-        """Return the largest entry of a derivative (2N, k) in units of the sizes of states."""
+        """Return the largest entry of a derivative (2N, k + P) in units of the sizes of states."""
         return float(np.abs(self.dynamics.to_state @ M / self._scale[:, None]).max(initial=0.0))
 
     def _meets(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> bool:
@@ -260,7 +298,7 @@ class Derivative:
         if time - self._last[0] <= _INSTANT * self.system.period:
             events += [(guard, self._last[1][guard.part]) for guard in guards[:1] if guard.part in self._last[1]]
         for guard, shift in events:
-            at_event, later = guard.gradient @ M, guard.rate * shift
+            at_event, later = guard.along(M), guard.rate * shift
             terms = np.abs(at_event) + np.abs(later)
             if np.any(np.abs(at_event + later) > np.maximum(_ONE_INSTANT * terms, _NOTHING * guard.scale)):
                 return True
@@ -274,33 +312,50 @@ class Derivative:
             for c in order:
                 state[c] = new.state[c]
                 after = dynamics.flow(state, before.segment.open_force)
-                gradient, rate = dynamics.gap[c, :k], float(dynamics.gap[c] @ flow.X @ before.z)
+                rate = float(dynamics.gap[c] @ flow.X @ before.z)
                 kick = ((after.X - flow.X) @ before.z)[:k]
-                moved, flow = moved + np.multiply.outer(kick / rate, gradient @ moved), after
+                closes = dynamics.gap[c, :k] @ moved + self._own("gap", np.array([c]), before.z)[0]
+                moved, flow = moved + np.multiply.outer(kick / rate, closes), after
             ways.append(moved)
         if self._largest(ways[0] - ways[1]) > _ONE_INSTANT * self._largest(ways[0]):
             self.worsen(PassageStatus.COINCIDENT)
         return ways[0]
 
-    def _check_still(self, new: Segment, M: np.ndarray) -> None:
+    def _own(self, of_what: str, rows: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return what numbers change in some functionals (m,), "gap" or "speed", at z (K,): (m, k + P)."""
+        found = np.zeros((len(rows), len(self.shift)))
+        if self.numbers is not None:
+            found[:, len(self._scale) :] = (getattr(self.numbers.parts, of_what)[:, rows] @ z).T
+        return found
+
+    def _largest_of(self, M: np.ndarray) -> np.ndarray:
+        """Return the largest entries (2N, 1 + P) of a derivative: by the start, and by each number."""
+        k = len(self._scale)
+        return np.column_stack([np.abs(M[:, :k]).max(axis=1), np.abs(M[:, k:])])
+
+    def _check_still(self, new: Segment, M: np.ndarray, z: np.ndarray) -> None:
         """Raise Untrusted if the derivative moves coordinates at rest."""
         dynamics, u = self.dynamics, len(new.state)
-        rigid = np.isinf(self.system.spring) & presses(new.state) & (np.arange(u) < self.system.contacts)
-        stuck, k = dynamics.flow(new.state, new.open_force).stuck, dynamics.one
-        still = np.vstack([dynamics.speed[:u][rigid], dynamics.speed[u:][stuck], dynamics.gap[rigid]])[:, :k]
-        self._reach = np.maximum(self._reach, np.abs(M).max(axis=1))
-        if np.any(np.abs(still @ M).max(axis=1, initial=0.0) > _STILL * np.abs(still) @ self._reach):
+        closed = np.isinf(self.system.spring) & presses(new.state) & (np.arange(u) < self.system.contacts)
+        rigid, k = np.flatnonzero(closed), dynamics.one
+        stuck = u + np.flatnonzero(dynamics.flow(new.state, new.open_force).stuck)
+        speeds = np.concatenate([rigid, stuck])
+        still = np.vstack([dynamics.speed[speeds], dynamics.gap[rigid]])[:, :k]
+        own = np.vstack([self._own("speed", speeds, z), self._own("gap", rigid, z)])
+        self._reach = np.maximum(self._reach, self._largest_of(M))
+        terms = np.abs(still) @ self._reach + self._largest_of(own)
+        if np.any(self._largest_of(still @ M + own) > _STILL * terms):
             raise Untrusted
 
-    def _check_idle(self, segment: Segment, M: np.ndarray) -> None:
+    def _check_idle(self, segment: Segment, M: np.ndarray, z: np.ndarray) -> None:
         """Note contacts that touch without force and that neighbouring motions open or hit: they have a kink."""
         idle, dynamics, k = np.flatnonzero(segment.state == codes.TOUCHING), self.dynamics, self.dynamics.one
         if not len(idle):
             return
         # gaps and their rates, of which a contact with a force holds some
-        carried = dynamics.begun(segment.state, presses(segment.state)) @ M
-        rows = dynamics.gap[idle, :k], dynamics.speed[idle, :k]
-        for functional, size in zip(rows, (1.0, self.system.omega), strict=True):
-            opened = np.abs(functional @ carried).max(axis=1)
+        carried = self._constraints.begun(segment.state, presses(segment.state), z)(M)
+        for what, size in (("gap", 1.0), ("speed", self.system.omega)):
+            functional = getattr(dynamics, what)[idle, :k]
+            opened = np.abs(functional @ carried + self._own(what, idle, z)).max(axis=1)
             if np.any(opened > _NOTHING * size * self.system.play[idle]):
                 self.worsen(PassageStatus.GRAZING)

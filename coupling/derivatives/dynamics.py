@@ -17,6 +17,7 @@ the constraints leave, along the wrenches, to which Y is normal: N (Y^T N)^-1 Y^
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm, null_space
@@ -43,24 +44,29 @@ class Dynamics:
 
     scale: (k,) sizes of states; to_state, from_state: (k, 2N) and (2N, k) between u and states; rows: (2u, N) J in
     coordinates root mass q; gap: (u, K), speed: (2u, K) functionals of gaps and of the rows' speeds; typical: (K,)
-    sizes of z in a typical motion.
+    sizes of z in a typical motion; follows (j, 2N), bound (j,): u of a slider that slips is follows u - way bound;
+    pulled: (j, N) elongations; response: (K,) displacement, m. like: dynamics of another scene whose frequencies and
+    size serve here, too, so that both compare.
     """
 
-    def __init__(self, frame: Frame, scale: np.ndarray) -> None:
-        self.system = system = frame.system
+    def __init__(self, frame: Frame, scale: np.ndarray, like: Dynamics | None = None) -> None:
+        self.frame, self.system = frame, frame.system
+        system = self.system
         size, u, e = len(system.mass), len(system.rest), len(system.frequency)
         self.root = np.sqrt(system.mass)
         yields = np.isfinite(system.spring)
         stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
         stiff = stiff + (system.spring[yields, None] * system.J[:u][yields] ** 2).sum(axis=0)
-        self.rate = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
+        own = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
+        self.rate = own if like is None else like.rate
         self.unit = np.r_[self.root * self.rate, self.root]  # of u in terms of (q, q')
         self.rows = system.J / self.root
         self.places, self.rates, self.one = slice(0, size), slice(size, 2 * size), 2 * size
         cosine = slice(self.one + 1, self.one + 1 + e)
         sine = slice(cosine.stop, cosine.stop + e)
         loads = np.vstack([system.weight, np.abs(system.load)]) / self.root
-        self.size = float(np.abs(loads).max(initial=0.0) / self.rate.max(initial=0.0)) or 1.0
+        size_of_loads = float(np.abs(loads).max(initial=0.0) / self.rate.max(initial=0.0)) or 1.0
+        self.size = size_of_loads if like is None else like.size
         self.turn = np.zeros((sine.stop, sine.stop))
         self.turn[self.places, self.rates] = np.diag(self.rate)
         self.turn[cosine, sine], self.turn[sine, cosine] = -np.diag(system.frequency), np.diag(system.frequency)
@@ -76,10 +82,19 @@ class Dynamics:
         self.scale, self.to_state = scale, frame.to_state / self.unit
         self.from_state = self.unit[:, None] * frame.from_state
         self.typical = np.r_[np.abs(self.from_state) @ scale, np.full(1 + 2 * e, self.size)]
-        #: units that are Jenkins elements, coordinates (j,) of their sliders, and motions (j, N) of what draws them
+        #: units that are Jenkins elements, and coordinates (j,) of their sliders
         self.jenkins = slice(u - len(system.tangential), None)
         self.sliders = np.arange(size - len(system.tangential), size)
-        self.drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
+        drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
+        own_unit = self.unit[self.sliders], self.root[self.sliders]
+        self.follows = np.hstack(
+            [own_unit[0][:, None] * drawn / self.unit[:size], own_unit[1][:, None] * drawn / self.root]
+        )
+        self.bound = own_unit[0] * system.limit[self.jenkins] / system.tangential
+        self.pulled = system.elongation / self.root
+        self.response = np.zeros(sine.stop)
+        self.response[self.places] = system.response / self.unit[:size]
+        self.response[cosine], self.response[sine] = system.table.real / self.size, -system.table.imag / self.size
         self._flows: dict[bytes, Flow] = {}
 
     @cached_property
@@ -119,24 +134,40 @@ class Dynamics:
         matrix[self.rates, self.rates] = _projector(np.vstack([normal, self.rows[u:][stuck]]))
         return matrix
 
-    def begun(self, state: np.ndarray, closed: np.ndarray) -> np.ndarray:
-        """Return the projector (2N, 2N) of u that contacts `closed` (u,) and units that stick in states (u,) leave."""
-        rubs = (self.system.friction > 0.0) | (np.arange(len(state)) >= self.system.contacts)
-        return self.followed(state) @ self.held(closed & np.isinf(self.system.spring), (state == codes.STICK) & rubs)
-
     def followed(self, state: np.ndarray) -> np.ndarray:
         """Return the map (2N, 2N) of u to that with sliders as they are in states (u,).
 
         Sliders of Jenkins elements that slip follow their driving motion, others rest.
         """
         size, matrix = len(self.root), np.eye(2 * len(self.root))
-        for a, drawn, slips in zip(self.sliders, self.drawn, state[self.jenkins] != codes.STICK, strict=True):
-            matrix[size + a] = 0.0
-            if slips:
-                matrix[a] = 0.0
-                matrix[a, :size] = self.unit[a] * drawn / self.unit[:size]
-                matrix[size + a, size:] = self.root[a] * drawn / self.root
+        slips = state[self.jenkins] != codes.STICK
+        matrix[size + self.sliders] = 0.0
+        for a, follows in zip(self.sliders[slips], self.follows[slips], strict=True):
+            matrix[a, :size], matrix[a, size:] = follows[:size], 0.0
+            matrix[size + a, size:] = follows[size:]
         return matrix
+
+
+class Solved(NamedTuple):
+    """How the accelerations of a flow were found: its derivatives by numbers follow from the same equations.
+
+    closed, springs, stick, slides: units that are rigid and closed, yield and press, stick, and slide; holds: (j,)
+    Jenkins elements whose sliders rest; acts: (2u, N) coordinates of forces; free: (N, K) accelerations without what
+    holds; kept (m,), wrench (N, m): rows that hold and the directions of their forces; oblique (N, N): projector along
+    these; carried (m, K): forces.
+    """
+
+    closed: np.ndarray
+    springs: np.ndarray
+    stick: np.ndarray
+    slides: np.ndarray
+    holds: np.ndarray
+    acts: np.ndarray
+    free: np.ndarray
+    kept: np.ndarray
+    wrench: np.ndarray
+    oblique: np.ndarray
+    carried: np.ndarray
 
 
 class Flow:
@@ -165,7 +196,7 @@ class Flow:
         self.forces[springs] = -pushed - system.dashpot[springs, None] * dynamics.speed[springs]
         self.forces[u + springs] = -drag[springs] * self.forces[springs]
         self.forces[u + slides, one] = -(self.way * system.limit)[slides] / dynamics.size
-        drawn, holds = system.elongation / dynamics.root, state[dynamics.jenkins] == codes.STICK
+        drawn, holds = dynamics.pulled, state[dynamics.jenkins] == codes.STICK
         acts[u:][dynamics.jenkins][~holds] += drawn[~holds]
         free = dynamics.load + acts.T @ self.forces
         stretch = drawn[holds]
@@ -178,6 +209,7 @@ class Flow:
         carried = (np.linalg.pinv(wrench / length, rcond=DEPENDENT) @ (oblique @ free - free)) / length[:, None]
         self.forces[kept] += carried
         self.forces[u + closed] -= drag[closed] * carried[: len(closed)]
+        self.solved = Solved(closed, springs, stick, slides, holds, acts, free, kept, wrench, oblique, carried)
         self.X = dynamics.turn.copy()
         self.X[dynamics.rates] = oblique @ free
         moves = dynamics.followed(state)[dynamics.rates, dynamics.rates]

@@ -51,7 +51,8 @@ class Passage(NamedTuple):
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;
     clearance: the smallest distance to an event that did not happen (a gap that nearly closed, a force near its bound),
     as a fraction of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
-    peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response.
+    peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response;
+    by_number: (k, P) derivative of the state with respect to the numbers of the map, from the same start.
     """
 
     state: np.ndarray
@@ -60,6 +61,7 @@ class Passage(NamedTuple):
     clearance: tuple[float, str]
     status: PassageStatus
     peaks: np.ndarray
+    by_number: np.ndarray
 
     @property
     def sequence(self) -> tuple[str, ...]:
@@ -67,10 +69,11 @@ class Passage(NamedTuple):
         return tuple(crossing.name for crossing in self.crossings)
 
     @classmethod
-    def stopped(cls, state: np.ndarray, periods: int) -> Passage:
+    def stopped(cls, state: np.ndarray, periods: int, numbers: int = 0) -> Passage:
         """Return a passage that ends with its start (k,): nothing of it is known."""
-        unknown = np.full((len(state), len(state)), np.nan)
-        return cls(state, unknown, (), (np.inf, ""), PassageStatus.STOPPED, np.full(periods, np.nan))
+        unknown, peaks = np.full((len(state), len(state) + numbers), np.nan), np.full(periods, np.nan)
+        k = len(state)
+        return cls(state, unknown[:, :k], (), (np.inf, ""), PassageStatus.STOPPED, peaks, unknown[:, k:])
 
 
 def forecast(seen: Sequence[tuple[float, Passage]]) -> float | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.constraints import Constraints
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
-from vanedamp.coupling.derivatives.frame import Frame
-from vanedamp.coupling.derivatives.jump import impact
+from vanedamp.coupling.derivatives.jump import impact, scaled
+from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
 from vanedamp.coupling.response.segment import Event, Segment
@@ -19,10 +20,17 @@ _NEAR = 1e-9
 
 
 class Start:
-    """A state (k,) that a passage is to begin with, of a system of these dynamics."""
+    """A state (k,) that a passage is to begin with, of a system of these dynamics.
 
-    def __init__(self, frame: Frame, dynamics: Dynamics, state: np.ndarray) -> None:
-        self.frame, self.dynamics, self.system, self._given = frame, dynamics, frame.system, state
+    turns: (k, P) how numbers of the scene change it; None: they do not.
+    """
+
+    def __init__(
+        self, dynamics: Dynamics, state: np.ndarray, numbers: Numbers | None = None, turns: np.ndarray | None = None
+    ) -> None:
+        self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
+        self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
+        self._turns = np.zeros((len(state), 0 if numbers is None else len(numbers))) if turns is None else turns
 
     def closed(self, segment: Segment) -> np.ndarray:
         """Return whether contacts (u,) are closed as a segment begins, with or without force."""
@@ -32,13 +40,17 @@ class Start:
         rests = (gap <= _SHUT * system.play) & (np.abs(rate) <= _STILL * segment.speed)
         return np.asarray((np.arange(u) < system.contacts) & ((segment.state != OPEN) | rests))
 
-    def derivative(self, event: Event, segment: Segment, flow: Flow, u: np.ndarray) -> tuple[np.ndarray, PassageStatus]:
-        """Return the derivative (2N, k) of u at the start of the first segment, and its defect, if any.
+    def derivative(
+        self, event: Event, segment: Segment, flow: Flow, z: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, PassageStatus]:
+        """Return the derivative of u at the start of the first segment, and its defect, if any.
 
-        event: at time zero. Raises Untrusted (derivatives.jump).
+        By the state (2N, k), and by numbers (2N, P). event: at time zero; z: (K,) then. Raises Untrusted
+        (derivatives.jump).
         """
-        dynamics, status = self.dynamics, PassageStatus.OK
-        given, M = dynamics.from_state @ self._given, dynamics.from_state @ self._clipped(segment)
+        dynamics, status, k = self.dynamics, PassageStatus.OK, len(self._given)
+        u, given = z[: dynamics.one], dynamics.from_state @ self._given
+        M = self._placed(segment, z)
         n = self.system.modes
         if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n]):
             status = PassageStatus.GRAZING  # the structure would begin beyond a stop
@@ -46,35 +58,46 @@ class Start:
         rows = dynamics.speed[hit, : dynamics.one]
         if np.any(np.abs(rows @ given) > _STILL * np.abs(rows) @ np.abs(given)):
             status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
-            jump, root = impact(self.system, given[dynamics.rates] / dynamics.root, event, segment.speed), dynamics.root
-            M[dynamics.rates] = root[:, None] * jump.derivative / root @ M[dynamics.rates]
-        z = dynamics.extended(u, segment.time)
+            w = given[dynamics.rates]
+            jump = impact(self.system, w / dynamics.root, event, segment.speed, self._numbers)
+            M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
         if self._begins_at_event(segment, flow, z) or self._loose(segment, flow, z):
             status = PassageStatus.GRAZING
-        return dynamics.begun(segment.state, self.closed(segment)) @ M, status
+        M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
+        return M[:, :k], M[:, k:], status
 
-    def _clipped(self, segment: Segment) -> np.ndarray:
-        """Return the derivative (k, k) of the state that a run begins with: bodies in walls are moved out of them.
+    def _placed(self, segment: Segment, z: np.ndarray) -> np.ndarray:
+        """Return the derivative (2N, k + P) of u that a run begins with: bodies in walls are moved out of them.
 
         Springs of friction dampers are unloaded to their bounds.
         """
-        system, k = self.system, len(self._given)
-        kept, first = np.eye(k), k - len(self.frame.drawn)
-        sliding = first + np.flatnonzero(np.abs(self._given[first:]) > self.frame.longest)
-        kept[sliding, sliding] = 0.0
+        system, dynamics, k = self.system, self.dynamics, len(self._given)
+        kept, first = np.hstack([np.eye(k), self._turns]), k - len(self.frame.drawn)
+        own, numbers = np.zeros((dynamics.one, self._turns.shape[1])), self._numbers
+        sliding = np.flatnonzero(np.abs(self._given[first:]) > self.frame.longest)
+        kept[first + sliding] = 0.0
+        if numbers is not None:
+            of, sign = numbers.parts, np.sign(self._given[first:][sliding])
+            bound = of.limit[:, dynamics.jenkins] - self.frame.longest * of.tangential
+            kept[first + sliding, k:] = (sign * (bound / system.tangential)[:, sliding]).T
+            own = (of.from_state @ (dynamics.to_state @ z[: dynamics.one])).T
         slips = 2 * system.modes + np.arange(system.bodies)
         slip = segment.q[system.along] - system.floor @ segment.q
         travel = [self.frame.scene.cavity[index].gap for index in system.cavity]
-        pushed = np.flatnonzero(np.abs(slip - self._given[slips]) > _SHUT * np.array(travel))
+        pushed = slips[np.abs(slip - self._given[slips]) > _SHUT * np.array(travel)]
         if len(pushed):
             # gaps of bodies that were pushed and are closed now stay closed
-            gap = system.J[: len(system.rest)] @ self.frame.from_state[: len(system.mass)]
+            gap = dynamics.gap[:, : dynamics.one] @ dynamics.from_state
             shut = np.abs(system.rest + system.J[: len(gap)] @ segment.q) <= _SHUT * system.play
-            shut &= np.any(gap[:, slips[pushed]] != 0.0, axis=1) & (np.arange(len(gap)) < system.contacts)
-            follow = -np.linalg.pinv(gap[np.ix_(shut, slips[pushed])]) @ gap[shut]
-            follow[:, slips[pushed]] = 0.0
-            kept[slips[pushed]] = follow
-        return kept
+            shut &= np.any(gap[:, pushed] != 0.0, axis=1) & (np.arange(len(gap)) < system.contacts)
+            kept[pushed] = 0.0
+            opened = gap[shut] @ kept
+            if numbers is not None:
+                opened[:, k:] += dynamics.gap[shut, : dynamics.one] @ own + (numbers.parts.gap[:, shut] @ z).T
+            kept[pushed] = -np.linalg.pinv(gap[np.ix_(shut, pushed)]) @ opened
+        M = dynamics.from_state @ kept
+        M[:, k:] += own
+        return np.asarray(M)
 
     def _begins_at_event(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
         """Return whether a contact parts with a speed, or begins to slip, as the passage begins."""

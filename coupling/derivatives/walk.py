@@ -2,37 +2,55 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from vanedamp.coupling.derivatives.derivative import Before, Derivative, Guard, begins
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.event_names import EventNames
-from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.jump import Untrusted
+from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
+from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 
 
-class PassageWalk:
-    """One passage from a state (k,), with its derivative or without.
+class Watch(Protocol):
+    """Measures a motion and its derivatives by numbers, P columns behind those by the start."""
 
-    half_way: (k,) the state half a period after the start, None if the engine has not come so far.
+    def segment(self, begun: Before, course: Course) -> None:
+        """Take the motion until the next event. begun: its start, with the derivative there."""
+
+    def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+        """Take an event, or a period's end. M: the derivative after it; shift: (P,) of its time, s."""
+
+
+class PassageWalk:
+    """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
+
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; half_way: (k,) the
+    state half a period after the start, None if the engine has not come so far.
     """
 
     def __init__(
-        self, frame: Frame, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool
-    ) -> None:
-        self._frame, self._dynamics, self._names, self._whole = frame, dynamics, names, derivative
-        self._derivative = Derivative(dynamics, Start(frame, dynamics, state))
+        self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
+        numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
+    ) -> None:  # fmt: skip
+        self._dynamics, self._names, self._whole = dynamics, names, derivative
+        self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
+        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns), numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: np.ndarray | None = None
 
     def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
-        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self._derivative
+        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self.derivative
         state, derivative = np.full(k, np.nan), np.full((k, k), np.nan)
+        by_number = np.full((k, 0 if self._numbers is None else len(self._numbers)), np.nan)
         with np.errstate(invalid="ignore"):  # a derivative that is not known is nan
             before = self._walked(walk)
             final = run.final() if walk.status is Status.OK else None
@@ -41,9 +59,11 @@ class PassageWalk:
             else:
                 state = self._frame.state_of(final)
                 if self._whole:
-                    derivative = made.end(before, state, periods * self._frame.system.period)
+                    derivative, by_number = made.end(before, state, periods)
         peaks = run.records.peak[:periods].copy()
-        return Passage(state, derivative, tuple(self._crossings), self._clearance, made.status, peaks)
+        return Passage(
+            state, derivative, tuple(self._crossings), self._clearance, made.status, peaks, by_number
+        )  # fmt: skip
 
     def _walked(self, walk: Walk) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
@@ -63,13 +83,26 @@ class PassageWalk:
             least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
             if least < self._clearance[0]:
                 self._clearance = least, self._names.possible(unit, what)
-            z, power = flow.after(z, segment.duration)
-            before = Before(segment, segment.event, flow, z, power @ M)
+            before = self._followed(Before(segment, segment.event, flow, z, M))
         return before
+
+    def _followed(self, begun: Before) -> Before:
+        """Return the end of a segment from its start."""
+        segment, flow, k = begun.segment, begun.flow, len(self._dynamics.scale)
+        z, power = flow.after(begun.z, segment.duration)
+        if self._numbers is None:
+            return begun._replace(z=z, M=power @ begun.M)
+        Z = self._numbers.harmonics(self._dynamics, segment.start).T
+        Z[: len(power)] = begun.M[:, k:]
+        series = derivative_of(flow, self._numbers).series
+        course = series.course(begun.z, Z, segment.duration, self._watch is not None)
+        if self._watch is not None:
+            self._watch.segment(begun, course)
+        return begun._replace(z=z, M=np.hstack([power @ begun.M[:, :k], course.end[: len(power)]]))
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
         """Return the derivative as a segment begins, nan where it is unknown, and keep the event before it."""
-        made, guards = self._derivative, list[Guard]()
+        made, guards = self.derivative, list[Guard]()
         if before is not None and before.event.unit >= 0:
             guards = made.guards(before, segment) if self._whole else []
             name = self._names.event(before.flow.named, flow.named, before.event.struck)
@@ -81,7 +114,10 @@ class PassageWalk:
         try:
             if before is None:
                 return made.begin(walk.start, segment, flow, u)
-            return made.after(before, segment, flow, u, guards)
+            M = made.after(before, segment, flow, u, guards)
         except Untrusted:
             made.worsen(PassageStatus.UNDETERMINED)
-            return np.full_like(self._dynamics.from_state, np.nan)
+            M = np.full((len(u), len(made.shift)), np.nan)
+        if before is not None and self._watch is not None:
+            self._watch.event(before, segment, M, made.shift[len(self._dynamics.scale) :])
+        return M

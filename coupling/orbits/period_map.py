@@ -13,6 +13,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
@@ -38,7 +39,7 @@ class PeriodMap:
 
     scene: with the map's parameter (a dotted path in it) at its value; scale: (k,) typical sizes of the coordinates,
     the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
-    of states are, rad/s; None: the scene's own.
+    of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives.
     """
 
     scene: Scene
@@ -46,6 +47,7 @@ class PeriodMap:
     periods: int
     scale: np.ndarray
     speed: float | None = None
+    numbers: tuple[str, ...] = ()
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
     _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
@@ -56,6 +58,10 @@ class PeriodMap:
     @cached_property
     def _dynamics(self) -> Dynamics:
         return Dynamics(self._frame, self.scale)
+
+    @cached_property
+    def _numbers(self) -> Numbers | None:
+        return numbers_of(self.scene, self.numbers, self._dynamics, self.speed) if self.numbers else None
 
     @cached_property
     def _event_names(self) -> EventNames:
@@ -73,7 +79,7 @@ class PeriodMap:
         are unknown, and the status is OK or STOPPED.
         """
         if not np.all(np.isfinite(state)):
-            return Passage.stopped(state, self.periods)
+            return Passage.stopped(state, self.periods, len(self.numbers))
         return self._walk(state, self.periods, derivative)[0]
 
     def _walk(self, state: np.ndarray, periods: int, derivative: bool) -> tuple[Passage, np.ndarray | None]:
@@ -84,7 +90,8 @@ class PeriodMap:
         for earlier in self._earlier:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
-        walk = PassageWalk(self._frame, self._dynamics, self._event_names, state, derivative)
+        numbers = self._numbers if derivative else None
+        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers)
         return walk.passage(run, periods), walk.half_way
 
     def at(self, value: float) -> PeriodMap:

@@ -10,6 +10,7 @@ from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
 from tests.tools.planar import initial_motion, planar_scene
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.derivatives.constraints import Constraints
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
@@ -124,7 +125,8 @@ def directions(found, x):
     frame, dynamics = found._frame, found._dynamics
     start = found.restart_of(x)
     segment = next(iter(Walk(engine_run(frame.system, start, new_records(frame.system, 1, 0), True, 100), 1)))
-    begun = dynamics.begun(segment.state, Start(frame, dynamics, x).closed(segment))
+    u = np.zeros(len(dynamics.turn))
+    begun = Constraints(dynamics, None).begun(segment.state, Start(dynamics, x).closed(segment), u).matrix
     held = dynamics.to_state @ begun @ dynamics.from_state
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]

@@ -1,0 +1,100 @@
+"""Derivatives of flows and of event functions by numbers of the scene."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.constraints import pseudo_inverse
+from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Flow
+from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.derivatives.series import Series
+from vanedamp.coupling.numerics import codes
+
+#: flows whose derivatives are kept
+_KEPT = 1000
+
+
+class FlowDerivative:
+    """Derivatives of a flow by P numbers: X (P, K, K), and forces (P, 2u, K) of the units."""
+
+    def __init__(self, flow: Flow, numbers: Numbers) -> None:
+        self.flow, self.numbers = flow, numbers
+        dynamics, s, of = flow.dynamics, flow.solved, numbers.parts
+        system, rates, one = dynamics.system, dynamics.rates, dynamics.one
+        u, way = len(flow.state), flow.way
+        drag, turned = (way * system.friction)[:, None], (way * of.friction)[:, :, None]
+        n, m = s.springs, s.closed
+        self.forces = np.zeros((len(numbers), *flow.forces.shape))
+        self.forces[:, n] = -(
+            of.spring[:, n, None] * dynamics.gap[n] + system.spring[n, None] * of.gap[:, n]
+            + of.dashpot[:, n, None] * dynamics.speed[n] + system.dashpot[n, None] * of.speed[:, n]
+        )  # fmt: skip
+        self.forces[:, u + n] = -turned[:, n] * flow.forces[n] - drag[n] * self.forces[:, n]
+        self.forces[:, u + s.slides, one] = -(way * of.limit)[:, s.slides] / dynamics.size
+        # forces known before those that hold: what these add is found below
+        known = flow.forces.copy()
+        known[s.kept] -= s.carried
+        known[u + m] += drag[m] * s.carried[: len(m)]
+        acts = of.rows.copy()
+        acts[:, u:][:, dynamics.jenkins][:, ~s.holds] += of.pulled[:, ~s.holds]
+        free = of.load + acts.transpose(0, 2, 1) @ known + s.acts.T @ self.forces
+        stretch, pull, spring = dynamics.pulled[s.holds], of.pulled[:, s.holds], system.tangential[s.holds, None]
+        turns = pull.transpose(0, 2, 1) @ (spring * stretch)
+        turns = turns + turns.transpose(0, 2, 1) + stretch.T @ (of.tangential[:, s.holds, None] * stretch)
+        free[:, :, dynamics.places] -= turns / dynamics.rate
+        # the projector P along wrenches W onto the rows R's null space: R P = 0, P W = 0, P P = P
+        rows, of_rows = dynamics.rows[s.kept], of.rows[:, s.kept]
+        of_wrench = np.concatenate(
+            [
+                of.rows[:, m] - drag[m] * of.rows[:, u + m] - turned[:, m] * dynamics.rows[u + m],
+                of.rows[:, u + s.stick],
+            ],
+            axis=1,
+        ).transpose(0, 2, 1)
+        length = np.linalg.norm(rows, axis=1)
+        along = np.linalg.pinv(s.wrench / length, rcond=DEPENDENT) / length[:, None]
+        across, held = pseudo_inverse(rows), np.eye(len(rows.T)) - s.oblique
+        oblique = -s.oblique @ of_wrench @ (along @ held) - (held @ across) @ of_rows @ s.oblique
+        moved = oblique @ s.free + s.oblique @ free
+        carried = along @ (moved - free - of_wrench @ s.carried)
+        self.forces[:, s.kept] += carried
+        self.forces[:, u + m] -= turned[:, m] * s.carried[: len(m)] + drag[m] * carried[:, : len(m)]
+        self.X = of.turn.copy()
+        self.X[:, rates] = dynamics.followed(flow.state)[rates, rates] @ moved
+        slips = flow.state[dynamics.jenkins] != codes.STICK
+        follows = of.follows[:, slips, rates]
+        self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ s.free)
+
+    @cached_property
+    def series(self) -> Series:
+        """The motions of the flow with their derivatives."""
+        return Series(self.flow.X, self.X)
+
+    def function(self, r: int, what: int) -> np.ndarray:
+        """Return the derivatives (P, K) of the functional of an event (Flow.function)."""
+        dynamics, of, u = self.flow.dynamics, self.numbers.parts, len(self.flow.state)
+        system = dynamics.system
+        if what in (codes.CLOSES, codes.OPENS):
+            return of.gap[:, r] * (1.0 if what == codes.CLOSES else -1.0)
+        if what == codes.RECLOSES:
+            pushes = of.spring[:, r, None] * dynamics.gap[r] + system.spring[r] * of.gap[:, r]
+            return pushes + of.dashpot[:, r, None] * dynamics.speed[r] + system.dashpot[r] * of.speed[:, r]
+        if what == codes.STOPS:
+            return self.flow.way[r] * of.speed[:, u + r]
+        if what == codes.PARTS:
+            return self.forces[:, r]
+        room = of.friction[:, r, None] * self.flow.forces[r] + system.friction[r] * self.forces[:, r]
+        room = room + (self.forces[:, u + r] if what == codes.AT_LOW else -self.forces[:, u + r])
+        room[:, dynamics.one] += of.limit[:, r] / dynamics.size
+        return np.asarray(room)
+
+
+def derivative_of(flow: Flow, numbers: Numbers) -> FlowDerivative:
+    """Return the derivatives of a flow, which are found once."""
+    if flow not in numbers.flows:
+        if len(numbers.flows) > _KEPT:
+            numbers.flows.clear()
+        numbers.flows[flow] = FlowDerivative(flow, numbers)
+    return numbers.flows[flow]

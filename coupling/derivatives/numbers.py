@@ -1,0 +1,173 @@
+"""What the numbers of a scene do to its equations: derivatives of all that flows, events and impacts are made of.
+
+They are differences of whole assemblies (derivatives.differences), so that every number has them that a sweep axis can
+name; what follows from them along a motion is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
+from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.scene.paths import number_at
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.units import unit_of
+from vanedamp.files.toml_input import InputError
+
+#: tables whose numbers do not enter the equations of motion
+_NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down")
+
+#: state (k,) with which motions of a scene begin, of its frame; None: the same for all
+StartOf = Callable[[Frame], np.ndarray]
+
+
+class Parts(NamedTuple):
+    """What the equations are made of, in the scales of Dynamics: N coordinates, u units, j sliders, k states.
+
+    follows, bound: (j, 2N) and (j,), u of a slider that slips is follows u - way bound (places only); others as in
+    System and Dynamics. Of derivatives by P numbers, every array has an axis (P,) before these.
+    """
+
+    root: np.ndarray  # (N,)
+    rows: np.ndarray  # (2u, N)
+    gap: np.ndarray  # (u, K)
+    speed: np.ndarray  # (2u, K)
+    load: np.ndarray  # (N, K)
+    turn: np.ndarray  # (K, K)
+    to_state: np.ndarray  # (k, 2N)
+    from_state: np.ndarray  # (2N, k)
+    follows: np.ndarray  # (j, 2N)
+    bound: np.ndarray  # (j,)
+    pulled: np.ndarray  # (j, N)
+    response: np.ndarray  # (K,)
+    mass: np.ndarray  # (N,)
+    J: np.ndarray  # (2u, N)
+    friction: np.ndarray  # (u,)
+    limit: np.ndarray  # (u,)
+    restitution: np.ndarray  # (u,)
+    spring: np.ndarray  # (u,)
+    dashpot: np.ndarray  # (u,)
+    tangential: np.ndarray  # (j,)
+    frequency: np.ndarray  # (e,)
+    period: np.ndarray  # ()
+    start: np.ndarray  # (k,)
+
+    @classmethod
+    def of(cls, dynamics: Dynamics, start: np.ndarray) -> Parts:
+        """Return the parts of a scene's dynamics."""
+        s = dynamics.system
+        return cls(
+            dynamics.root, dynamics.rows, dynamics.gap, dynamics.speed, dynamics.load, dynamics.turn,
+            dynamics.to_state, dynamics.from_state, dynamics.follows, dynamics.bound, dynamics.pulled,
+            dynamics.response, s.mass, s.J, s.friction, s.limit, s.restitution,
+            np.where(np.isfinite(s.spring), s.spring, 0.0), s.dashpot, s.tangential, s.frequency,
+            np.array(s.period), start,
+        )  # fmt: skip
+
+    def flat(self) -> np.ndarray:
+        """Return all in one array."""
+        return np.concatenate([np.ravel(part) for part in self])
+
+    def like(self, flat: np.ndarray) -> Parts:
+        """Return parts of the same shapes from arrays (P, n) that `flat` has made."""
+        sizes = np.cumsum([part.size for part in self])[:-1]
+        pieces = np.split(flat, sizes, axis=-1)
+        shaped = (piece.reshape(*flat.shape[:-1], *part.shape) for piece, part in zip(pieces, self, strict=True))
+        return Parts(*shaped)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Numbers of a scene, P of them: their derivatives are by `size` (P,) of each.
+
+    parts: derivatives of the parts of the equations, times the sizes; paths, values (P,); frequency: (e,) of the
+    harmonics, rad/s.
+    """
+
+    paths: tuple[str, ...]
+    values: np.ndarray
+    size: np.ndarray
+    parts: Parts
+    frequency: np.ndarray
+    #: derivatives of the flows that a motion has met (derivatives.flow_derivative)
+    flows: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def harmonics(self, dynamics: Dynamics, time: float) -> np.ndarray:
+        """Return the derivatives (P, K) of constants and harmonics in z at a time since the passage's start, s."""
+        e, one = len(self.frequency), dynamics.one
+        found = np.zeros((len(self), one + 1 + 2 * e))
+        angle = self.frequency * time
+        found[:, one + 1 : one + 1 + e] = -dynamics.size * np.sin(angle) * time * self.parts.frequency
+        found[:, one + 1 + e :] = dynamics.size * np.cos(angle) * time * self.parts.frequency
+        return found
+
+
+def numbers_of(
+    scene: Scene, paths: Sequence[str], dynamics: Dynamics, speed: float | None, start: StartOf | None = None
+) -> Numbers:
+    """Return the derivatives of a scene's equations by the numbers at some paths.
+
+    speed: of rotation whose modes those of states are (Frame). Raises InputError for a path that names no number of the
+    equations, and NotSmooth where the equations have a kink.
+    """
+    data, begins = scene.to_dict(), start or (lambda frame: np.zeros(len(frame.to_state)))
+    frame = dynamics.frame
+    parts = Parts.of(dynamics, begins(frame))
+    here, values, sizes, found = parts.flat(), [], [], []
+    scale = _scales(parts)
+    for path in paths:
+        value = _number(data, path)
+
+        def moved(number: float, path: str = path) -> np.ndarray:
+            other = Frame(scene.replace({path: number}), speed)
+            made = Dynamics(other, dynamics.scale, dynamics)
+            flat = Parts.of(made, begins(other)).flat()
+            if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:
+                raise NotSmooth(path)
+            return flat / scale
+
+        size = abs(value) or _size(path, dynamics)
+        values.append(value)
+        sizes.append(size)
+        try:
+            found.append(derivative(moved, value, size, here / scale) * scale * size)
+        except NotSmooth:
+            raise NotSmooth(f"{path} = {value:g}: the equations of motion have a kink there") from None
+    stacked = np.reshape(found, (len(paths), len(here)))
+    return Numbers(tuple(paths), np.array(values), np.array(sizes), parts.like(stacked), dynamics.system.frequency)
+
+
+def _number(data: dict[str, object], path: str) -> float:
+    if path.split(".")[0] in _NO_NUMBERS:
+        raise InputError(
+            f"numbers: {path} is no number of the motion's equations; take one such as excitation.frequency"
+        )
+    try:
+        return number_at(data, path)
+    except InputError as error:
+        raise InputError(f"numbers: {str(error).removeprefix('scene: ')}") from None
+
+
+def _scales(parts: Parts) -> np.ndarray:
+    """Return the size of each entry (n,): the largest of its array, by which its round-off is judged."""
+    return np.concatenate([
+        np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts
+    ])  # fmt: skip
+
+
+def _size(path: str, dynamics: Dynamics) -> float:
+    """Return over how much a number changes the motion that is zero in the scene."""
+    system = dynamics.system
+    play = system.play[np.isfinite(system.play) & (system.play > 0.0)]
+    length = float(play.max(initial=0.0)) or float(dynamics.scale.max(initial=0.0)) or 1.0
+    sizes = {"m": length, "m/s": system.omega * length, "deg": 1.0, "rad/s": system.omega}
+    return sizes.get(unit_of(path), 1e-2 if unit_of(path) == "1" else 1.0)

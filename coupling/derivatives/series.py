@@ -1,0 +1,101 @@
+"""Linear motions with their derivatives by numbers, by Taylor's series over short panels.
+
+z' = X z, and by P numbers of X: Z' = X Z + D z. The series end at round-off, so that both are as exact as exp(X t).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.numerics.compiler.jit import entry
+
+#: norm of X over a panel, and terms of a series then: 3^32/32! < 1e-19
+_NORM, _TERMS = 3.0, 32
+#: nodes and weights of Gauss and Legendre on a panel (0 to 1): they integrate the motion and its squares to round-off
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
+
+
+class Course(NamedTuple):
+    """A motion over a time: n nodes in it with weights (n,) of integrals, s.
+
+    time (n,) s; z (n, K), Z (n, K, P): the motion and its derivatives there; end (K, P): derivatives at its end.
+    """
+
+    time: np.ndarray
+    weight: np.ndarray
+    z: np.ndarray
+    Z: np.ndarray
+    end: np.ndarray
+
+
+class Series:
+    """The series of one flow X (K, K), with derivatives D (P, K, K)."""
+
+    def __init__(self, X: np.ndarray, D: np.ndarray) -> None:
+        self._norm = float(min(np.abs(X).sum(axis=0).max(), np.abs(X).sum(axis=1).max()))
+        rows, columns = np.nonzero(X)
+        number, at, of = np.nonzero(D)
+        self._X = rows, columns, X[rows, columns]
+        self._D = number, at, of, D[number, at, of]
+
+    def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
+        """Return the motion from z (K,), Z (K, P) over a duration, s; at nodes, or without any."""
+        panels = max(int(np.ceil(self._norm * duration / _NORM)), 1)
+        step, (k, p) = duration / panels, Z.shape
+        places = _NODES if nodes else np.zeros(0)
+        g = len(places)
+        of_z, of_Z = np.empty((panels * g, k)), np.empty((panels * g, k, p))
+        z, Z = np.array(z), np.array(Z)
+        room = np.empty((_TERMS, k)), np.empty((_TERMS, k, p))
+        _advance(*self._X, *self._D, z, Z, step, panels, places, *room, of_z, of_Z)
+        time = (np.arange(panels)[:, None] + places) * step
+        weight = np.tile(_WEIGHTS if nodes else places, panels) * step
+        return Course(time.ravel(), weight, of_z, of_Z, Z)
+
+
+@entry
+def _advance(row, column, x, number, at, of, d, z, Z, step, panels, places, a, b, of_z, of_Z):
+    """Advance z and Z in place over panels; set them at places of each. a, b: room for the terms of the series."""
+    terms, k, p = b.shape
+    for panel in range(panels):
+        for i in range(k):
+            a[0, i] = z[i]
+            for n in range(p):
+                b[0, i, n] = Z[i, n]
+        for j in range(1, terms):
+            share = step / j
+            for i in range(k):
+                a[j, i] = 0.0
+                for n in range(p):
+                    b[j, i, n] = 0.0
+            for entry_ in range(len(x)):
+                i, l, value = row[entry_], column[entry_], share * x[entry_]
+                a[j, i] += value * a[j - 1, l]
+                for n in range(p):
+                    b[j, i, n] += value * b[j - 1, l, n]
+            for entry_ in range(len(d)):
+                b[j, at[entry_], number[entry_]] += share * d[entry_] * a[j - 1, of[entry_]]
+        for place in range(len(places)):
+            node = panel * len(places) + place
+            for i in range(k):
+                sum_ = a[terms - 1, i]
+                for j in range(terms - 2, -1, -1):
+                    sum_ = sum_ * places[place] + a[j, i]
+                of_z[node, i] = sum_
+                for n in range(p):
+                    sum_ = b[terms - 1, i, n]
+                    for j in range(terms - 2, -1, -1):
+                        sum_ = sum_ * places[place] + b[j, i, n]
+                    of_Z[node, i, n] = sum_
+        for i in range(k):
+            sum_ = 0.0
+            for j in range(terms - 1, -1, -1):
+                sum_ += a[j, i]
+            z[i] = sum_
+            for n in range(p):
+                sum_ = 0.0
+                for j in range(terms - 1, -1, -1):
+                    sum_ += b[j, i, n]
+                Z[i, n] = sum_
