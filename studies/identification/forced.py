@@ -12,7 +12,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Steady, found_near, over_orbit, run, settled
+from vanedamp.studies.identification.steady import Steady, found_near, over_orbit, run, settled, shifted, slope
 from vanedamp.studies.identification.study import IdentificationStudy
 
 #: steps of differences over the range of a number: of motions that are exact, and of means of runs
@@ -30,6 +30,8 @@ class Forced(Model):
         self._names = (measured.measure, *(["phase"] if len(measured.channels) > 1 else []))
         #: the motion at each frequency, for the values of the numbers that were last predicted
         self._motions: list[Steady | None] = [None] * len(measured.at)
+        #: derivatives of their states, and the values at which they hold
+        self._slope: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(measured.at)
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs."""
@@ -58,12 +60,16 @@ class Forced(Model):
         before: RestartState | None = None
         for place, linked in self._order():
             scene, last = self._at(values, place), self._motions[place]
-            steady = None if scene is None or last is None else found_near(scene, last, self.count)
+            moved: np.ndarray | float = 0.0
+            if (known := self._slope[place]) is not None:
+                moved = known[1] @ (values - known[0])
+            steady = None if scene is None or last is None else found_near(scene, last, self.count, moved)
             if steady is None and scene is not None:
                 found = run(scene, before if linked else None, self.count)
                 steady = None if found is None else settled(found, self.count)
             before = None if steady is None else steady.restart
             self._motions[place] = steady
+            self._slope[place] = None
         return self._predicted(self._motions)
 
     def derivative(self, values: np.ndarray) -> Values:
@@ -76,11 +82,15 @@ class Forced(Model):
         """Return derivatives (c, P) of the channels at a place."""
         if steady is None:
             return np.zeros((len(self._names), len(values)))
+        of_state = slope(steady, self.paths, self.count)
+        self._slope[place] = None if of_state is None else (values, of_state)
 
         def figures(moved: np.ndarray) -> np.ndarray:
             scene = self._at(moved, place)
             near = None
-            if scene is not None:
+            if scene is not None and of_state is not None:
+                near = shifted(scene, steady, of_state @ (moved - values))
+            elif scene is not None:
                 near = found_near(scene, steady, self.count) or run(scene, steady.restart, self.count)
             return self._figures(near or steady)[0]
 

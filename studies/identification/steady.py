@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.orbits import map_along
@@ -38,9 +40,28 @@ class Steady(NamedTuple):
         return None if self.response is None else self.response.final
 
 
-def found_near(scene: Scene, last: Steady, count: Counter[str]) -> Steady | None:
-    """Return the stable orbit that Newton's method finds from that of another scene; None if it finds none."""
-    return None if last.orbit is None else _orbit(scene, last.orbit.periods, last.orbit.state, count)
+def found_near(scene: Scene, last: Steady, count: Counter[str], moved: np.ndarray | float = 0.0) -> Steady | None:
+    """Return the stable orbit that Newton's method finds from that of another scene; None if it finds none.
+
+    moved: (k,) by how much it is expected to differ.
+    """
+    return None if last.orbit is None else _orbit(scene, last.orbit.periods, last.orbit.state + moved, count)
+
+
+def slope(steady: Steady, paths: Sequence[str], count: Counter[str]) -> np.ndarray | None:
+    """Return the derivative (k, P) of an orbit's state by numbers of its scene; None where it has none.
+
+    That of a fixed point of the period map F, x = F(x, q): dx/dq = (1 - dF/dx)^-1 dF/dq, of neutral coordinates zero.
+    """
+    if steady.orbit is None or steady.map is None:
+        return None
+    count["derivatives"] += 1
+    passage = replace(steady.map, numbers=tuple(paths))(steady.orbit.state)
+    if passage.status is not PassageStatus.OK:
+        return None
+    scale = steady.orbit.scale[:, None]
+    matrix = np.eye(len(scale)) - passage.derivative * (scale.T / scale)
+    return np.asarray(scale * np.linalg.lstsq(matrix, passage.by_number / scale, rcond=1e-9)[0])
 
 
 def run(scene: Scene, start: RestartState | None, count: Counter[str]) -> Steady | None:
@@ -75,3 +96,11 @@ def over_orbit(steady: Steady, count: Counter[str]) -> Response:
     count["passages"] += 1
     scene = replace(steady.scene, time=Time(periods=steady.orbit.periods, transient=0))
     return simulate(scene, start=steady.restart)
+
+
+def shifted(scene: Scene, steady: Steady, moved: np.ndarray) -> Steady | None:
+    """Return the passage of another scene from an orbit's state (k,) that has moved."""
+    assert steady.orbit is not None
+    passages = map_along(with_orbit(scene, steady.orbit.periods))
+    state = steady.orbit.state + moved
+    return Steady(scene, replace(steady.orbit, state=state, passage=passages(state, False)), passages, None)
