@@ -17,6 +17,8 @@ from vanedamp.coupling.scene.registration import register as register
 from vanedamp.coupling.scene.scene import Scene as Scene
 from vanedamp.coupling.scene.shapes.shape import Shape as Shape
 from vanedamp.coupling.scene.waveform import Waveform as Waveform
+from vanedamp.coupling.sensitivity.sensitivity import sensitivity as sensitivity
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity as Sensitivity
 from vanedamp.coupling.simulation import simulate as simulate
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states

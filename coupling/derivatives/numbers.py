@@ -23,8 +23,8 @@ from vanedamp.files.toml_input import InputError
 #: tables whose numbers do not enter the equations of motion
 _NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down")
 
-#: state (k,) with which motions of a scene begin, of its frame; None: the same for all
-StartOf = Callable[[Frame], np.ndarray]
+#: state (k,) with which the motion of a scene with the numbers begins, in a frame
+StartOf = Callable[[Scene, Frame], np.ndarray]
 
 
 class Parts(NamedTuple):
@@ -112,25 +112,27 @@ class Numbers:
 
 
 def numbers_of(
-    scene: Scene, paths: Sequence[str], dynamics: Dynamics, speed: float | None, start: StartOf | None = None
-) -> Numbers:
+    scene: Scene, paths: Sequence[str], dynamics: Dynamics, speed: float | None, begins: StartOf | None = None,
+    derived: Callable[[Scene], Scene] = lambda scene: scene,
+) -> Numbers:  # fmt: skip
     """Return the derivatives of a scene's equations by the numbers at some paths.
 
-    speed: of rotation whose modes those of states are (Frame). Raises InputError for a path that names no number of the
-    equations, and NotSmooth where the equations have a kink.
+    speed: of rotation whose modes those of states are (Frame); begins: the start of the motion, if numbers change it;
+    derived: the scene that moves, from the one that has the numbers. Raises InputError for a path that names no number
+    of the equations, and NotSmooth where the equations have a kink.
     """
-    data, begins = scene.to_dict(), start or (lambda frame: np.zeros(len(frame.to_state)))
-    frame = dynamics.frame
-    parts = Parts.of(dynamics, begins(frame))
+    data, start = scene.to_dict(), begins or (lambda _, frame: np.zeros(len(frame.to_state)))
+    parts = Parts.of(dynamics, start(scene, dynamics.frame))
     here, values, sizes, found = parts.flat(), [], [], []
     scale = _scales(parts)
     for path in paths:
         value = _number(data, path)
 
         def moved(number: float, path: str = path) -> np.ndarray:
-            other = Frame(scene.replace({path: number}), speed)
-            made = Dynamics(other, dynamics.scale, dynamics)
-            flat = Parts.of(made, begins(other)).flat()
+            other = scene.replace({path: number})
+            frame = Frame(derived(other), speed)
+            made = Dynamics(frame, dynamics.scale, dynamics)
+            flat = Parts.of(made, start(other, frame)).flat()
             if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:
                 raise NotSmooth(path)
             return flat / scale

@@ -20,13 +20,14 @@ _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomi
 class Course(NamedTuple):
     """A motion over a time: n nodes in it with weights (n,) of integrals, s.
 
-    time (n,) s; z (n, K), Z (n, K, P): the motion and its derivatives there; end (K, P): derivatives at its end.
+    time (n,) s; z (n, K), Z (n, K, P): the motion and its derivatives there; last (K,), end (K, P): at its end.
     """
 
     time: np.ndarray
     weight: np.ndarray
     z: np.ndarray
     Z: np.ndarray
+    last: np.ndarray
     end: np.ndarray
 
 
@@ -34,6 +35,7 @@ class Series:
     """The series of one flow X (K, K), with derivatives D (P, K, K)."""
 
     def __init__(self, X: np.ndarray, D: np.ndarray) -> None:
+        self.X = X
         self._norm = float(min(np.abs(X).sum(axis=0).max(), np.abs(X).sum(axis=1).max()))
         rows, columns = np.nonzero(X)
         number, at, of = np.nonzero(D)
@@ -42,7 +44,7 @@ class Series:
 
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
         """Return the motion from z (K,), Z (K, P) over a duration, s; at nodes, or without any."""
-        panels = max(int(np.ceil(self._norm * duration / _NORM)), 1)
+        panels = max(int(np.ceil(self._norm * abs(duration) / _NORM)), 1)
         step, (k, p) = duration / panels, Z.shape
         places = _NODES if nodes else np.zeros(0)
         g = len(places)
@@ -52,7 +54,7 @@ class Series:
         _advance(*self._X, *self._D, z, Z, step, panels, places, *room, of_z, of_Z)
         time = (np.arange(panels)[:, None] + places) * step
         weight = np.tile(_WEIGHTS if nodes else places, panels) * step
-        return Course(time.ravel(), weight, of_z, of_Z, Z)
+        return Course(time.ravel(), weight, of_z, of_Z, z, Z)
 
 
 @entry

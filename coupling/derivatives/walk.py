@@ -28,6 +28,9 @@ class Watch(Protocol):
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end. M: the derivative after it; shift: (P,) of its time, s."""
 
+    def end(self, before: Before) -> None:
+        """Take the end of the motion."""
+
 
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
@@ -58,6 +61,8 @@ class PassageWalk:
                 made.worsen(PassageStatus.STOPPED)
             else:
                 state = self._frame.state_of(final)
+                if self._watch is not None:
+                    self._watch.end(before)
                 if self._whole:
                     derivative, by_number = made.end(before, state, periods)
         peaks = run.records.peak[:periods].copy()

@@ -62,7 +62,7 @@ class Orbit:
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
     excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest fraction of the scale
     by which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a
-    period later.
+    period later; map: whose orbit it is.
     """
 
     status: OrbitStatus
@@ -74,6 +74,7 @@ class Orbit:
     residual: float
     iterations: int
     symmetric: bool = False
+    map: PeriodMap | None = field(default=None, repr=False)
 
     @cached_property
     def derivative(self) -> np.ndarray:
@@ -283,8 +284,9 @@ def solve(
             break
     missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
     return Orbit(
-        status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count
-    )
+        status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count,
+        map=problem.at(problem.parameter(y)),
+    )  # fmt: skip
 
 
 def corrected(problem: Problem, head: Point, step: float) -> Orbit | None:

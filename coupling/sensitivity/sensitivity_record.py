@@ -1,0 +1,134 @@
+"""The record of a sensitivity: values, their derivatives by numbers of the scene, and whether these mean something."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class SensitivityStatus(StrEnum):
+    """Whether derivatives exist and mean something. Unless `ok`, they are nan."""
+
+    OK = "ok"
+    GRAZING = "grazing"
+    """an event is tangential, or the motion begins with one: derivatives differ from side to side"""
+    COINCIDENT = "coincident"
+    """events that do not follow from each other meet at one instant"""
+    UNDETERMINED = "undetermined"
+    """contact forces that the laws do not determine, or a kink of the equations"""
+    STOPPED = "stopped"
+    """the engine did not reach the end, or the search found no orbit"""
+    FOLD = "fold"
+    """the orbit is at a fold or another point where it does not depend smoothly on numbers"""
+    PARTS = "parts"
+    """neighbouring motions part so fast that derivatives say nothing of a finite change"""
+
+
+@dataclass(frozen=True, eq=False)
+class Dual:
+    """Numbers with their derivatives: value (n,), turns (n, P), or of one number () and (P,)."""
+
+    value: np.ndarray
+    turns: np.ndarray
+
+    def __getitem__(self, place: Any) -> Dual:
+        return Dual(self.value[place], self.turns[place])
+
+    def __add__(self, other: Dual) -> Dual:
+        return Dual(self.value + other.value, self.turns + other.turns)
+
+    def __sub__(self, other: Dual) -> Dual:
+        return Dual(self.value - other.value, self.turns - other.turns)
+
+    def __mul__(self, other: Dual) -> Dual:
+        return Dual(
+            self.value * other.value, self.turns * other.value[..., None] + self.value[..., None] * other.turns
+        )  # fmt: skip
+
+    def __rmul__(self, factor: complex) -> Dual:
+        return Dual(factor * self.value, factor * self.turns)
+
+    def __truediv__(self, other: Dual) -> Dual:
+        value = self.value / other.value
+        return Dual(value, (self.turns - value[..., None] * other.turns) / other.value[..., None])
+
+    def conjugate(self) -> Dual:
+        """Return the conjugates."""
+        return Dual(np.conj(self.value), np.conj(self.turns))
+
+    def real(self) -> Dual:
+        """Return the real parts."""
+        return Dual(np.real(self.value), np.real(self.turns))
+
+    def root(self) -> Dual:
+        """Return the square roots."""
+        root = np.sqrt(np.maximum(self.value, 0.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return Dual(root, self.turns / (2.0 * root[..., None]))
+
+    def polar(self) -> tuple[Dual, Dual]:
+        """Return amplitude X and phase of -i X exp(i phase), the integral of X sin(omega t + phase)."""
+        size = np.abs(self.value)
+        turn = self.turns * np.conj(self.value)[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            amplitude = Dual(size, turn.real / size[..., None])
+            return amplitude, Dual(np.angle(1j * self.value), turn.imag / size[..., None] ** 2)
+
+
+class Impact(NamedTuple):
+    """An impact: time, s, speed of approach, m/s, and derivatives (P,) of both."""
+
+    time: float
+    speed: float
+    of_time: np.ndarray
+    of_speed: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """A motion's figures and their derivatives by P numbers of its scene.
+
+    paths            of the numbers; derivatives are by a unit of each
+    status, note     whether there are derivatives, and why not
+    values           figures by the names that a Response has; those of energies as "energy.friction"
+    derivatives      (P,) of each figure
+    names            (k,) of the coordinates of states
+    state            (k,) of an orbit at the start of its period; of a run at its end
+    state_derivative (k, P)
+    peak             (n,) m, largest displacement of each period; peak_derivative: (n, P)
+    impact_time      (m,) s; impact_time_derivative: (m, P)
+    impact_speed     (m,) m/s, of approach; impact_speed_derivative: (m, P)
+    time             (t,) s of the samples
+    motion           (t, 3) displacement, velocity and acceleration then; motion_derivative: (t, 3, P)
+    """
+
+    paths: tuple[str, ...]
+    status: SensitivityStatus
+    note: str
+    values: Mapping[str, float]
+    derivatives: Mapping[str, np.ndarray]
+    names: tuple[str, ...]
+    state: np.ndarray
+    state_derivative: np.ndarray
+    peak: np.ndarray
+    peak_derivative: np.ndarray
+    impact_time: np.ndarray
+    impact_speed: np.ndarray
+    impact_time_derivative: np.ndarray
+    impact_speed_derivative: np.ndarray
+    time: np.ndarray
+    motion: np.ndarray
+    motion_derivative: np.ndarray
+
+    def to_json(self) -> dict[str, Any]:
+        """Return figures and derivatives as plain data, by figure and path."""
+        return {
+            "status": self.status.value, "note": self.note, "values": dict(self.values),
+            "derivatives": {
+                name: dict(zip(self.paths, map(float, turns), strict=True)) for name, turns in self.derivatives.items()
+            },
+        }  # fmt: skip
