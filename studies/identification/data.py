@@ -18,6 +18,9 @@ from vanedamp.studies.identification.tables import DecayTable, ForcedTable, Impa
 _MOST_ROWS = 10_000
 
 Kind = Literal["forced", "decay", "impacts"]
+#: what a history of a decay may be of, and units
+MOTION = ("displacement", "velocity", "acceleration")
+_UNITS = {"amplitude": "m", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +98,16 @@ def forced(
 
 
 def decay(
-    name: str, time: Sequence[float] | np.ndarray, amplitude: Sequence[float] | np.ndarray,
+    name: str, time: Sequence[float] | np.ndarray, values: Sequence[float] | np.ndarray,
     changes: Mapping[str, float], table: DecayTable | None = None, noise: float | None = None,
+    quantity: str = "amplitude",
 ) -> Measured:  # fmt: skip
-    """Return a decay: times (n,) s since its start, amplitudes (n,) m; noise as in its table."""
+    """Return a decay: times (n,) s since its start, amplitudes (n,) m or a history of MOTION; noise as in its table."""
     table = table or DecayTable("", noise=noise)
-    channel = _sized("amplitude", "m", amplitude, table.noise, table.deviation)
+    if quantity == "amplitude":
+        channel = _sized(quantity, "m", values, table.noise, table.deviation)
+    else:
+        channel = Channel(quantity, _UNITS[quantity], frozen(values), "difference", table.deviation)
     return Measured("decay", name, dict(changes), frozen(time), (channel,))
 
 
@@ -138,8 +145,15 @@ def read_forced(table: ForcedTable, folder: Path) -> Measured:
 
 def read_decay(table: DecayTable, folder: Path) -> Measured:
     """Return the decay in a table's file. Raises InputError."""
-    rows = _rows(folder / table.file, ("time_s", "amplitude_m"))
-    return decay(Path(table.file).stem, _rising(rows, "time_s"), _positive(rows, "amplitude_m"), table.set, table)
+    path = folder / table.file
+    columns = {f"{name}_{unit}".replace("/", "_").replace("^", ""): name for name, unit in _UNITS.items()}
+    header = next((words for _, words in csv_table(path, InputError)), [])
+    given = next((column for column in columns if column in header), "amplitude_m")
+    rows, quantity = _rows(path, ("time_s", given), instead=tuple(columns)), columns[given]
+    if quantity != "amplitude" and table.noise is not None:
+        raise InputError(f"decay '{Path(table.file).stem}': noise is relative; for a history give deviation")
+    values = _positive(rows, given) if quantity == "amplitude" else np.array([row.number(given) for row in rows])
+    return decay(Path(table.file).stem, _rising(rows, "time_s"), values, table.set, table, quantity=quantity)
 
 
 def read_impacts(table: ImpactsTable, folder: Path) -> Measured:
@@ -148,13 +162,17 @@ def read_impacts(table: ImpactsTable, folder: Path) -> Measured:
     return impacts(Path(table.file).stem, _rising(rows, "time_s"), _positive(rows, "speed_m_s"), table.set, table)
 
 
-def _rows(path: Path, columns: Sequence[str], further: Sequence[str] = ()) -> list[CsvRow]:
-    """Return the rows of a file with some columns, and further ones if they are there. Raises InputError."""
+def _rows(path: Path, columns: Sequence[str], further: Sequence[str] = (), instead: Sequence[str] = ()) -> list[CsvRow]:
+    """Return the rows of a file with some columns, and further ones if they are there. Raises InputError.
+
+    instead: of which the last column is one.
+    """
     table = csv_table(path, InputError)
     header = table[0][1] if table else []
     wrong = [name for name in header if name not in (*columns, *further)]
     if wrong:
         known = ", ".join((*columns, *(f"{name} (if measured)" for name in further)))
+        known += "".join(f" or {name}" for name in instead if name not in columns)
         raise InputError(f"{path}: line {table[0][0]}: unknown column '{wrong[0]}'; expected {known}")
     rows = read_csv(path, [*columns, *(name for name in further if name in header)])
     if len(rows) > _MOST_ROWS:

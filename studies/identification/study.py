@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.model_order.choices import leaves_open
-from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import axis_values, number_at
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
@@ -189,8 +188,3 @@ class IdentificationStudy:
             ],
             "search": tables(self.search), "propose": plain(self.propose),
         }  # fmt: skip
-
-
-def with_orbit(scene: Scene, periods: int) -> Scene:
-    """Return a scene whose orbits repeat after some periods of the excitation."""
-    return replace(scene, orbit=Orbit(periods=periods))

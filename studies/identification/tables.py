@@ -76,10 +76,11 @@ class ForcedTable(MeasuredTable):
 
 @dataclass(frozen=True, config=STRICT)
 class DecayTable(MeasuredTable):
-    """A decay as the scene's [ring_down] says: time_s and amplitude_m, half a swing between turning points."""
+    """A decay as the scene's [ring_down] says: time_s, and amplitude_m, half a swing between turning points, or the
+    history displacement_m, velocity_m_s or acceleration_m_s2."""
 
     deviation: Positive | None = None
-    """standard deviation of an amplitude in place of a relative one [m]"""
+    """standard deviation of an amplitude in place of a relative one, or of a history [unit of the column]"""
 
     def __post_init__(self) -> None:
         _one_noise(self)
