@@ -23,6 +23,8 @@ _NOTHING = 30.0
 _ASSUMED = 0.05
 #: changes of the sum of squares, relative, and of the coordinates at which the minimum is found; most predictions
 _CLOSE, _STILL, _MOST = 1e-5, 1e-7, 60
+#: change of the residuals, in standard deviations together, over which their derivatives are the same
+_STRAIGHT = 0.5
 
 
 class Minimum(NamedTuple):
@@ -115,9 +117,10 @@ class Fit:
             whole[free] = part
             return whole
 
+        slopes = _Slopes(self)
         found = least_squares(
             lambda part: self.residual(full(part)), np.clip(z[free], 1e-9, 1 - 1e-9),
-            lambda part: self.jacobian(full(part))[:, free], bounds=(0.0, 1.0), ftol=close, xtol=_STILL, gtol=1e-12,
+            lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0), ftol=close, xtol=_STILL, gtol=1e-12,
             max_nfev=most,
         )  # fmt: skip
         return Minimum(full(found.x), float(2.0 * found.cost), bool(found.status > 0))
@@ -158,6 +161,20 @@ class Fit:
             arrays[channel.name] for measured, arrays in zip(self.study.measured, of, strict=True)
             for channel in measured.channels
         ]  # fmt: skip
+
+
+class _Slopes:
+    """Derivatives of residuals on the way to a minimum, where residuals are nearly straight those of a place before."""
+
+    def __init__(self, fit: Fit) -> None:
+        self._fit = fit
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def at(self, z: np.ndarray) -> np.ndarray:
+        """Return the derivatives (N, P)."""
+        if self._last is None or float(np.linalg.norm(self._last[1] @ (z - self._last[0]))) > _STRAIGHT:
+            self._last = np.array(z), self._fit.jacobian(z)
+        return self._last[1]
 
 
 def _assumed(channel: Channel) -> float:
