@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from vanedamp.studies.identification.tables import Number, SearchTable
 FORCE, FREQUENCY = "excitation.force", "excitation.frequency"
 #: relative standard deviation of all amplitudes
 NOISE = 0.02
-SCENE = {
+SCENE: dict[str, Any] = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
     "excitation": {"frequency": 15.9, "force": 0.5},
     "cavity": [{"name": "c1", "gap": 1e-3}],

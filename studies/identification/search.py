@@ -99,14 +99,11 @@ class _Work:
 
     def starts(self) -> list[np.ndarray]:
         """Return the best candidates that are apart, the best first: of the first guess and a Sobol sequence."""
-        table, size = self.study.search, len(self.study.numbers)
-        spread = qmc.Sobol(size, seed=table.seed).random(1 << max(table.candidates - 1, 1).bit_length())
-        own = np.clip(self.study.coordinates(self.study.start), 0.0, 1.0)
-        candidates = np.vstack([own, spread[: table.candidates - 1]])
-        misfits = self._each(_quick, itertools.repeat(self.study), candidates)
+        table, tried = self.study.search, candidates(self.study)
+        misfits = self._each(_quick, itertools.repeat(self.study), tried)
         chosen: list[np.ndarray] = []
         for place in np.argsort(misfits, kind="stable"):
-            z = candidates[place]
+            z = tried[place]
             if all(np.abs(z - other).max() > _APART for other in chosen):
                 chosen.append(z)
         return chosen[: table.starts]
@@ -168,6 +165,14 @@ class _Work:
         before = np.sqrt(np.diag(np.linalg.inv(told)))
         after = shrunk(told, [row / deviation for row in found])
         return Proposal(tuple(axes), frozen(places), frozen(after / before), int(np.argmax(before)))
+
+
+def candidates(study: IdentificationStudy) -> np.ndarray:
+    """Return coordinates (c, P) that are tried first: the first guess and a Sobol sequence."""
+    table = study.search
+    spread = qmc.Sobol(len(study.numbers), seed=table.seed).random(1 << max(table.candidates - 1, 1).bit_length())
+    own = np.clip(study.coordinates(study.start), 0.0, 1.0)
+    return np.vstack([own, spread[: table.candidates - 1]])
 
 
 def _quick(study: IdentificationStudy, z: np.ndarray) -> tuple[float, Counter[str]]:
