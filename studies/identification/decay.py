@@ -28,6 +28,7 @@ class Decay(Model):
         super().__init__(study, measured, count)
         self._name = measured.channels[0].name
         self._last: RingDown | None = None
+        self._slopes: tuple[RingDown, Sensitivity] | None = None
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction."""
@@ -60,7 +61,7 @@ class Decay(Model):
         if found is None:
             return nothing
         if self._name in MOTION:
-            sampled = sensitivity(found, (), times=self.measured.at.tolist()).motion
+            sampled = self._sampled(found).motion
             return sampled[:, MOTION.index(self._name)] if len(sampled) == len(nothing) else nothing
         half = found.half_cycles
         moving = half.amplitude > 0.0
@@ -68,11 +69,17 @@ class Decay(Model):
             return nothing
         return interpolated(self.measured.at, half.time[moving], np.log(half.amplitude[moving]))
 
+    def _sampled(self, found: RingDown) -> Sensitivity:
+        """Return the motion at the measured times, or at the turning points, with its derivatives."""
+        if self._slopes is None or self._slopes[0] is not found:
+            self.count["derivatives"] += 1
+            times = self.measured.at.tolist() if self._name in MOTION else ()
+            self._slopes = found, sensitivity(found, self.paths, times=times)
+        return self._slopes[1]
+
     def _exact(self, found: RingDown) -> np.ndarray | None:
         """Return the derivatives (n, P); None where the motion has none."""
-        self.count["derivatives"] += 1
-        times = self.measured.at.tolist() if self._name in MOTION else ()
-        slopes = sensitivity(found, self.paths, times=times)
+        slopes = self._sampled(found)
         if slopes.status is not SensitivityStatus.OK:
             return None
         if self._name in MOTION:

@@ -414,7 +414,7 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         products["reduced"] = folder / REDUCED
         made.append(folder / REDUCED)
     for one in pipeline.identify:
-        files = tuple(folder / f"{one.stem}{suffix}" for suffix in (".h5", ".toml"))
+        files = (folder / f"{one.stem}.h5", folder / one.scene)
         yield Identify(f"identify {one.stem}", (base / one.study).resolve(), files, (), one)
         made.append(files[0])
     for table in pipeline.sweep:

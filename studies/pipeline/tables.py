@@ -47,17 +47,22 @@ class ReduceStage:
 
 @dataclass(frozen=True, config=STRICT)
 class IdentifyStage:
-    """Stage `identify`: numbers of a scene from measurements, and NAME.toml, the scene with them, for a sweep."""
+    """Stage `identify`: numbers of a scene from measurements, and the scene with them, for a sweep."""
 
     study: str
     """study file of `vanedamp identify`, relative to the pipeline's"""
     name: str | None = None
-    """name of the stage and of its results NAME.h5 and NAME.toml; left out: that of the study with _found"""
+    """name of the stage and of its results NAME.h5 and NAME_found.toml, the scene; left out: that of the study file"""
 
     @property
     def stem(self) -> str:
         """The name of the result files, without suffix."""
-        return self.name or f"{Path(self.study).stem}_found"
+        return self.name or Path(self.study).stem
+
+    @property
+    def scene(self) -> str:
+        """The name of the scene file that it writes."""
+        return f"{self.stem}_found.toml"
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -170,4 +175,4 @@ class PipelineFile:
     @property
     def scenes_made(self) -> list[str]:
         """Names of the scenes that stages write."""
-        return [RIGID_SCENE] * (self.calibrate is not None) + [f"{table.stem}.toml" for table in self.identify]
+        return [RIGID_SCENE] * (self.calibrate is not None) + [table.scene for table in self.identify]
