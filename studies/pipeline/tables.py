@@ -147,9 +147,10 @@ class PipelineFile:
     def _check_name(self, key: str, table: SweepStage | IdentifyStage) -> None:
         if not table.stem or Path(table.stem).name != table.stem:
             raise ValueError(f"{key}.name: expected a file name without folder and suffix, not '{table.stem}'")
-        stems = [one.stem for one in self.sweep] + [one.stem for one in self.identify]
-        if stems.count(table.stem) > 1:
-            raise ValueError(f"{key}.name: two stages have the name '{table.stem}'; give one of them another")
+        sweeps, others = [one.stem for one in self.sweep], [one.stem for one in self.identify]
+        if (sweeps + others).count(table.stem) > 1:
+            kind = "stages" if table.stem in others else "sweeps"
+            raise ValueError(f"{key}.name: two {kind} have the name '{table.stem}'; give one of them another")
 
     @classmethod
     def load(cls, path: str | Path) -> PipelineFile:
