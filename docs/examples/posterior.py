@@ -18,6 +18,5 @@ sampler.run_mcmc(found.best + 0.3 * spread, STEPS)
 samples = sampler.get_chain(discard=DISCARDED, flat=True)
 for path, row, interval in zip(found.paths, samples.T, found.interval, strict=True):
     low, high = np.quantile(row, [0.025, 0.975])
-    print(
-        f"{path}: 95 % of the samples {low:.4g} to {high:.4g}, profile likelihood {interval[0]:.4g} to {interval[1]:.4g}"
-    )
+    samples_text, profile_text = (f"{low:.4g} to {high:.4g}" for low, high in ((low, high), interval))
+    print(f"{path}, 95 %: samples {samples_text}, profile likelihood {profile_text}")

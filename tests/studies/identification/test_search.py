@@ -63,7 +63,8 @@ def test_record_comes_back(found, tmp_path):
     record, _ = found
     record.save(tmp_path / "found.h5")
     back = Identification.load(tmp_path / "found.h5")
-    assert json.dumps(back.to_json()) == json.dumps(record.to_json()) and back.provenance == {"a": 1}
+    one, other = (json.dumps(each.to_json(), sort_keys=True) for each in (back, record))
+    assert one == other and back.provenance == {"a": 1}
     assert type(back.plot()).__name__ == "Figure"
     record.save_scene(tmp_path / "tuned.toml")
     assert Scene.load(tmp_path / "tuned.toml") == record.scene
@@ -134,7 +135,7 @@ def test_commands(folder, capfd):
 
 
 def test_pipeline_finds_numbers_and_sweeps_with_them(folder):
-    pipeline = {"folder": "out", "identify": [{"study": "study.toml"}], "sweep": [{"scene": "study_found.toml"}]}
+    pipeline = {"folder": "out", "identify": [{"study": "study.toml"}], "sweep": [{"scene": "out/study_found.toml"}]}
     (folder / "p.toml").write_text(tomli_w.dumps(pipeline))
     assert main(["pipeline", "p.toml", "--workers", "1"]) == 0
     assert Identification.load(folder / "out/study.h5").status is IdentificationStatus.OK
