@@ -103,10 +103,7 @@ class Fit:
         return [each * self.study.slope(values) for each in self._each([m.derivative(values) for m in self.models])]
 
     def minimum(self, z: np.ndarray, held: Sequence[int] = (), close: float = _CLOSE, most: int = _MOST) -> Minimum:
-        """Return the minimum near a start, some coordinates held.
-
-        Raises nothing: a search that does not converge says so.
-        """
+        """Return the minimum near a start, some coordinates held."""
         free = np.setdiff1d(np.arange(len(z)), held)
         if not len(free):
             residual = self.residual(z)
