@@ -6,9 +6,11 @@ from vanedamp import meshes as meshes
 from vanedamp import modal as modal
 from vanedamp import rom as rom
 from vanedamp import studies as studies
+from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection as MatrixDirection
 from vanedamp.coupling.methods import Method as Method
 from vanedamp.coupling.orbits.branch import Branches as Branches
 from vanedamp.coupling.orbits.orbits import find_orbit as find_orbit
+from vanedamp.coupling.orbits.orbits import orbit_at as orbit_at
 from vanedamp.coupling.orbits.orbits import orbits as orbits
 from vanedamp.coupling.response.response import Response as Response
 from vanedamp.coupling.response.response import Status as Status

@@ -29,6 +29,8 @@ _AGREEMENT, _LEAST = 1e-8, 1e-4
 _LAW = 1e-9
 #: speed that an engine has taken from a row by no impulse, relative to the fastest, beyond round-off
 _CAUGHT = 1e-11
+#: derivative by a number, relative to number and coordinate, to which round-off is relative at least
+_LEAST_TURN = 1e-2
 #: largest motion of rows at rest by the derivative, relative to its terms
 _STILL = 1e-7
 #: an event is tangential if its function would come back from beyond zero within this fraction of its scale
@@ -343,6 +345,8 @@ class Derivative:
         still = np.vstack([dynamics.speed[speeds], dynamics.gap[rigid]])[:, :k]
         own = np.vstack([self._own("speed", speeds, z), self._own("gap", rigid, z)])
         self._reach = np.maximum(self._reach, self._largest_of(M))
+        # a number that hardly moves anything leaves round-off of the coordinates' sizes
+        self._reach[:, 1:] = np.maximum(self._reach[:, 1:], _LEAST_TURN * self._size[:, None])
         terms = np.abs(still) @ self._reach + self._largest_of(own)
         if np.any(self._largest_of(still @ M + own) > _STILL * terms):
             raise Untrusted

@@ -12,8 +12,8 @@ from vanedamp.files.toml_input import InputError
 _STEP = 5e-3
 #: round-off of a function, and largest difference of the two longest formulas, relative to its size
 _NOISE, _AGREE = 16 * np.finfo(float).eps, 1e-9
-#: bend at a kink, relative to the change of the function over the step
-_KINK = 1e-3
+#: bend at a kink, relative to the change of the function over the step; bends below are round-off of eigenvectors
+_KINK, _ROUGH = 1e-3, 1e-12
 #: weights of antisymmetric formulas of order 2, 4, 6 and 8
 _CENTRAL = {
     2: (1 / 2,), 4: (2 / 3, -1 / 12), 6: (3 / 4, -3 / 20, 1 / 60), 8: (4 / 5, -1 / 5, 4 / 105, -1 / 280),
@@ -32,9 +32,9 @@ class NotSmooth(ArithmeticError):
 def derivative(function: Callable[[float], np.ndarray], at: float, size: float, here: np.ndarray) -> np.ndarray:
     """Return the derivative (n,) of a function of a number.
 
-    here: its value (n,) at the number; size: of the number, over which the function changes by its own size. At the
-    end of the range, where the function raises InputError beyond, the derivative is one-sided. Raises InputError for a
-    number without neighbours on either side, and NotSmooth.
+    here: its value (n,) at the number, of the order of 1; size: of the number, over which the function changes by as
+    much. At the end of the range, where the function raises InputError beyond, the derivative is one-sided. Raises
+    InputError for a number without neighbours on either side, and NotSmooth.
     """
     step, refused = _STEP * size, None
     try:
@@ -60,14 +60,20 @@ def _central(function: Callable[[float], np.ndarray], at: float, step: float, he
         return np.asarray(sum(w * (up - down) for w, (up, down) in zip(weights, known, strict=False)) / step)
 
     low, high = formula(2), formula(4)
-    size = np.maximum(np.abs(here), np.maximum(*np.abs(known[0])))
-    (up, down), (farther, back) = known[:2]
-    bend = np.abs((farther + back - 2 * here) - 4 * (up + down - 2 * here))
-    if np.any(bend > _KINK * (np.abs(up - here) + np.abs(down - here)) + 8 * _NOISE * size):
-        raise NotSmooth
+    size = np.maximum(1.0, np.maximum(*np.abs(known[0])))
+    changes = np.abs(known[0][0] - here) + np.abs(known[0][1] - here)
+    if np.any(np.abs(_bend(known, here, (-4.0, 1.0))) > _KINK * changes + _ROUGH * size):
+        formula(8)
+        if np.any(np.abs(_bend(known, here, (-56.0, 28.0, -8.0, 1.0))) > 20 * _KINK * changes + 20 * _ROUGH * size):
+            raise NotSmooth
     if np.all(np.abs(low - high) * step <= _NOISE * size):
         return low  # a straight line, or a parabola
     return _checked(formula(6), formula(8), step, size)
+
+
+def _bend(known: list[tuple[np.ndarray, np.ndarray]], here: np.ndarray, weights: tuple[float, ...]) -> np.ndarray:
+    """Return an even difference of high order (n,), in which a kink stays and smooth functions vanish."""
+    return np.asarray(sum(w * (up + down - 2 * here) for w, (up, down) in zip(weights, known, strict=False)))
 
 
 def _one_sided(function: Callable[[float], np.ndarray], at: float, step: float, here: np.ndarray) -> np.ndarray:
@@ -76,7 +82,7 @@ def _one_sided(function: Callable[[float], np.ndarray], at: float, step: float, 
         np.asarray(sum(w * value for w, value in zip(weights, values, strict=False)) / step)
         for weights in _ONE_SIDED.values()
     )
-    return _checked(low, high, step, np.abs(values).max(axis=0))
+    return _checked(low, high, step, np.maximum(1.0, np.abs(values).max(axis=0)))
 
 
 def _checked(low: np.ndarray, high: np.ndarray, step: float, size: np.ndarray) -> np.ndarray:

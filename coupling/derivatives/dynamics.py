@@ -58,7 +58,7 @@ class Dynamics:
         stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
         stiff = stiff + (system.spring[yields, None] * system.J[:u][yields] ** 2).sum(axis=0)
         own = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
-        self.rate = own if like is None else like.rate
+        self.rate: np.ndarray = own if like is None else like.rate
         self.unit = np.r_[self.root * self.rate, self.root]  # of u in terms of (q, q')
         self.rows = system.J / self.root
         self.places, self.rates, self.one = slice(0, size), slice(size, 2 * size), 2 * size
@@ -66,7 +66,7 @@ class Dynamics:
         sine = slice(cosine.stop, cosine.stop + e)
         loads = np.vstack([system.weight, np.abs(system.load)]) / self.root
         size_of_loads = float(np.abs(loads).max(initial=0.0) / self.rate.max(initial=0.0)) or 1.0
-        self.size = size_of_loads if like is None else like.size
+        self.size: float = size_of_loads if like is None else like.size
         self.turn = np.zeros((sine.stop, sine.stop))
         self.turn[self.places, self.rates] = np.diag(self.rate)
         self.turn[cosine, sine], self.turn[sine, cosine] = -np.diag(system.frequency), np.diag(system.frequency)

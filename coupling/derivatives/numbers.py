@@ -15,6 +15,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
@@ -112,8 +113,8 @@ class Numbers:
 
 
 def numbers_of(
-    scene: Scene, paths: Sequence[str], dynamics: Dynamics, speed: float | None, begins: StartOf | None = None,
-    derived: Callable[[Scene], Scene] = lambda scene: scene,
+    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics, speed: float | None,
+    begins: StartOf | None = None, derived: Callable[[Scene], Scene] = lambda scene: scene,
 ) -> Numbers:  # fmt: skip
     """Return the derivatives of a scene's equations by the numbers at some paths.
 
@@ -124,28 +125,32 @@ def numbers_of(
     data, start = scene.to_dict(), begins or (lambda _, frame: np.zeros(len(frame.to_state)))
     parts = Parts.of(dynamics, start(scene, dynamics.frame))
     here, values, sizes, found = parts.flat(), [], [], []
-    scale = _scales(parts)
+    scale = _scales(parts, dynamics)
     for path in paths:
-        value = _number(data, path)
+        if isinstance(path, MatrixDirection):
+            name, value, size = path.name, 0.0, path.size(scene)
+        else:
+            name, value = path, _number(data, path)
+            size = abs(value) or _size(path, dynamics)
 
-        def moved(number: float, path: str = path) -> np.ndarray:
-            other = scene.replace({path: number})
+        def moved(number: float, path: str | MatrixDirection = path) -> np.ndarray:
+            other = path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
             frame = Frame(derived(other), speed)
             made = Dynamics(frame, dynamics.scale, dynamics)
             flat = Parts.of(made, start(other, frame)).flat()
             if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:
-                raise NotSmooth(path)
+                raise NotSmooth
             return flat / scale
 
-        size = abs(value) or _size(path, dynamics)
         values.append(value)
         sizes.append(size)
         try:
             found.append(derivative(moved, value, size, here / scale) * scale * size)
         except NotSmooth:
-            raise NotSmooth(f"{path} = {value:g}: the equations of motion have a kink there") from None
+            raise NotSmooth(f"{name} = {value:g}: the equations of motion have a kink there") from None
     stacked = np.reshape(found, (len(paths), len(here)))
-    return Numbers(tuple(paths), np.array(values), np.array(sizes), parts.like(stacked), dynamics.system.frequency)
+    names = tuple(path if isinstance(path, str) else path.name for path in paths)
+    return Numbers(names, np.array(values), np.array(sizes), parts.like(stacked), dynamics.system.frequency)
 
 
 def _number(data: dict[str, object], path: str) -> float:
@@ -159,11 +164,10 @@ def _number(data: dict[str, object], path: str) -> float:
         raise InputError(f"numbers: {str(error).removeprefix('scene: ')}") from None
 
 
-def _scales(parts: Parts) -> np.ndarray:
+def _scales(parts: Parts, dynamics: Dynamics) -> np.ndarray:
     """Return the size of each entry (n,): the largest of its array, by which its round-off is judged."""
-    return np.concatenate([
-        np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts
-    ])  # fmt: skip
+    sizes = [np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts]
+    return np.concatenate([*sizes[:-1], np.maximum(np.abs(parts.start), dynamics.scale)])
 
 
 def _size(path: str, dynamics: Dynamics) -> float:

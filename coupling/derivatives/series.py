@@ -58,7 +58,9 @@ class Series:
 
 
 @entry
-def _advance(row, column, x, number, at, of, d, z, Z, step, panels, places, a, b, of_z, of_Z):
+def _advance(  # type: ignore[no-untyped-def]
+    row, column, x, number, at, of, d, z, Z, step, panels, places, a, b, of_z, of_Z
+):
     """Advance z and Z in place over panels; set them at places of each. a, b: room for the terms of the series."""
     terms, k, p = b.shape
     for panel in range(panels):

@@ -22,12 +22,17 @@ _NEAR = 1e-9
 class Start:
     """A state (k,) that a passage is to begin with, of a system of these dynamics.
 
-    turns: (k, P) how numbers of the scene change it; None: they do not.
+    turns: (k, P) how numbers of the scene change it; None: they do not. given: whether the motion begins so whatever
+    happens: then only what numbers change may make it kink there.
     """
 
     def __init__(
-        self, dynamics: Dynamics, state: np.ndarray, numbers: Numbers | None = None, turns: np.ndarray | None = None
-    ) -> None:
+        self, dynamics: Dynamics, state: np.ndarray, numbers: Numbers | None = None, turns: np.ndarray | None = None,
+        given: bool = False,
+    ) -> None:  # fmt: skip
+        self._fixed = given
+        #: derivative (2N, P) by numbers before units that are at rest stop what these would move
+        self.unheld = np.zeros((dynamics.one, 0))
         self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
         self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
         self._turns = np.zeros((len(state), 0 if numbers is None else len(numbers))) if turns is None else turns
@@ -61,8 +66,9 @@ class Start:
             w = given[dynamics.rates]
             jump = impact(self.system, w / dynamics.root, event, segment.speed, self._numbers)
             M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
-        if self._begins_at_event(segment, flow, z) or self._loose(segment, flow, z):
+        if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z):
             status = PassageStatus.GRAZING
+        self.unheld = M[:, k:]
         M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
         return M[:, :k], M[:, k:], status
 
@@ -99,8 +105,11 @@ class Start:
         M[:, k:] += own
         return np.asarray(M)
 
-    def _begins_at_event(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
-        """Return whether a contact parts with a speed, or begins to slip, as the passage begins."""
+    def _begins_at_event(self, segment: Segment, flow: Flow, z: np.ndarray, M: np.ndarray) -> bool:
+        """Return whether a contact parts with a speed, or begins to slip, as the passage begins.
+
+        M: (2N, k + P) of the start, which may keep what is to count.
+        """
         system, u = self.system, len(segment.state)
         contact = np.arange(u) < system.contacts
         gap = system.rest + system.J[:u] @ segment.q
@@ -108,7 +117,18 @@ class Start:
         slides = (flow.way != 0.0) & ~flow.slips_held & flow.rubs
         faster = flow.way * (self.dynamics.speed[u:] @ flow.X @ z) > 0.0  # one that stops at once has been at rest
         slips = slides & faster & (np.abs(system.J[u:] @ segment.v) <= _STILL * segment.speed)
+        if self._fixed:
+            parts &= self._turned("gap", np.arange(u), z, M)
+            slips &= self._turned("speed", u + np.arange(u), z, M)
         return bool(np.any(parts | slips))
+
+    def _turned(self, what: str, rows: np.ndarray, z: np.ndarray, M: np.ndarray) -> np.ndarray:
+        """Return whether numbers change some functionals (m,), "gap" or "speed", at the start."""
+        functional, own = getattr(self.dynamics, what)[rows], M[:, len(self._given) :]
+        turned = functional[:, : len(own)] @ own
+        if self._numbers is not None:
+            turned = turned + (getattr(self._numbers.parts, what)[:, rows] @ z).T
+        return np.asarray(np.abs(turned).max(axis=1, initial=0.0) > _NEAR * np.abs(functional) @ self.dynamics.typical)
 
     def _loose(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
         """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.

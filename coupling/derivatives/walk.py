@@ -22,6 +22,9 @@ from vanedamp.coupling.response.segment import EventRun, Segment, Walk
 class Watch(Protocol):
     """Measures a motion and its derivatives by numbers, P columns behind those by the start."""
 
+    def begin(self, unheld: np.ndarray) -> None:
+        """Take the derivative (2N, P) of the start as it is given, before what sticks is stopped."""
+
     def segment(self, begun: Before, course: Course) -> None:
         """Take the motion until the next event. begun: its start, with the derivative there."""
 
@@ -35,17 +38,20 @@ class Watch(Protocol):
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
-    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; half_way: (k,) the
-    state half a period after the start, None if the engine has not come so far.
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
+    a search for the clearance; given: as in Start; half_way: (k,) the state half a period after the start, None if the
+    engine has not come so far.
     """
 
     def __init__(
         self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
         numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
+        given: bool = False,
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole = dynamics, names, derivative
         self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
-        self.derivative = Derivative(dynamics, Start(dynamics, state, numbers, turns), numbers)
+        self._start = Start(dynamics, state, numbers, turns, given)
+        self.derivative = Derivative(dynamics, self._start, numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
         self.half_way: np.ndarray | None = None
 
@@ -85,9 +91,10 @@ class PassageWalk:
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue
-            least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
-            if least < self._clearance[0]:
-                self._clearance = least, self._names.possible(unit, what)
+            if self._watch is None:
+                least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
+                if least < self._clearance[0]:
+                    self._clearance = least, self._names.possible(unit, what)
             before = self._followed(Before(segment, segment.event, flow, z, M))
         return before
 
@@ -118,7 +125,10 @@ class PassageWalk:
             return self._dynamics.from_state
         try:
             if before is None:
-                return made.begin(walk.start, segment, flow, u)
+                M = made.begin(walk.start, segment, flow, u)
+                if self._watch is not None:
+                    self._watch.begin(self._start.unheld)
+                return M
             M = made.after(before, segment, flow, u, guards)
         except Untrusted:
             made.worsen(PassageStatus.UNDETERMINED)

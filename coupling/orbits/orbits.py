@@ -88,6 +88,19 @@ def orbits(
     return found()
 
 
+def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> Orbit:
+    """Return an orbit of branches, by the numbers of its branch and of its point there, with its period map.
+
+    Raises InputError where branches have no such point.
+    """
+    if not 0 <= branch < len(branches.branches) or not 0 <= point < len(branches.branches[branch].parameter):
+        points = ", ".join(str(len(each.parameter)) for each in branches.branches)
+        raise InputError(f"branch {branch}, point {point}: there are branches of {points} points, counted from 0")
+    own = branches.branches[branch]
+    found = map_along(branches.scene).over(own.periods).at(float(own.parameter[point]))
+    return replace(newton.find_orbit(found, own.state[point]), parameter=float(own.parameter[point]))
+
+
 def map_along(scene: Scene) -> PeriodMap:
     """Return the period map at the `from` of a scene's [orbit] table: orbits of its branches are fixed points of it."""
     return _Search(scene).map

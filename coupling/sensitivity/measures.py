@@ -45,10 +45,17 @@ class Measures:
         self.lost = Dual(np.zeros(1), np.zeros((1, self._P)))  # energy of impacts
         self.peaks: list[Peak] = []
         self.impacts: list[Impact] = []
+        self._unheld = np.zeros((0, self._P))
         self._times, self.samples = list(times), list[tuple[float, np.ndarray, np.ndarray]]()
-        self._since, self._begun, self._course = np.zeros(self._P), None, None
+        self._since: np.ndarray = np.zeros(self._P)
+        self._begun: Before | None = None
+        self._course: Course | None = None
 
     # --- what a walk calls
+
+    def begin(self, unheld: np.ndarray) -> None:
+        """Take the start as it is given: friction may take its momentum at once."""
+        self._unheld = unheld
 
     def segment(self, begun: Before, course: Course) -> None:
         """Take the motion until the next event."""
@@ -83,9 +90,9 @@ class Measures:
         for value, turns in summits(self._response, series, begun.z, Z, course, duration):
             peak.add(value, turns)
         for z, at, moves in ((begun.z, Z, self._since), (*end, shift)):
-            value, turns = self._response.of(z[None], at[None])
+            x, of_x = self._response.of(z[None], at[None])
             rate = float(self._response.rows[0] @ begun.flow.X @ z)
-            peak.add(float(value[0, 0]), turns[0, 0] + rate * moves)
+            peak.add(float(x[0, 0]), of_x[0, 0] + rate * moves)
         self._sample(begun, series, Z)
         if segment.period >= self.first:
             self._integrate(begun, Z, course, end, shift)
@@ -124,10 +131,11 @@ class Measures:
             whole = (turns[:, 0] + value * turning) * wave[:, None]
             self._waves.value[row] += weight @ (value[:, 0] * wave)
             self._waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
-        rate = flow.X
-        for place, (instant, moves) in enumerate(((begun.z, self._since), (end[0], shift))):
-            value, turns = self._momentum.of(instant[None], (Z, end[1])[place][None])
-            drift = self._momentum.rows @ rate @ instant
+        if segment.start == 0.0:
+            Z = np.vstack([self._unheld, Z[len(self._unheld) :]])
+        for instant, turned, moves in ((begun.z, Z, self._since), (*end, shift)):
+            value, turns = self._momentum.of(instant[None], turned[None])
+            drift = self._momentum.rows @ flow.X @ instant
             found = Dual(value[0], turns[0] + np.multiply.outer(drift, moves))
             self._ends = [*self._ends[:1], found]
 

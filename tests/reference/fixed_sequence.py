@@ -1,4 +1,4 @@
-"""A motion in 40 digits that passes given events in a given order, and its derivative by differences of 1e-16.
+"""A motion in 40 digits that passes given events in a given order, and its derivatives by differences of 1e-16.
 
 Nothing is decided and nothing searched: names of events say which function of the state vanishes
 next and what changes there. Equations of motion are set up from the scene's numbers, constraints as a whole matrix.
@@ -8,11 +8,11 @@ Structures are rigid, or prescribed (then bodies move relative to them).
 from __future__ import annotations
 
 import itertools
-import math
 
 import mpmath as mp
 import numpy as np
 
+from tests.reference.exact_scene import dashpots, exact_scene
 from tests.reference.multiprecision import exponential
 from vanedamp.coupling.scene.scene import Scene
 
@@ -31,7 +31,7 @@ class FixedSequence:
         self.mass = [mp.mpf(m) for m in ([] if self.prescribed else [scene.structure.mass])]
         self.mass += [mp.mpf(body.mass) for body in bodies]
         self.springs = [i for i, damper in enumerate(scene.friction_damper) if damper.stiffness is not None]
-        self.omega = mp.mpf(2 * math.pi * scene.excitation.frequency)  # the engine's own double
+        self.omega = 2 * mp.pi * mp.mpf(scene.excitation.frequency)
         self.shares = scene.excitation.shares
         self.rows = self._rows()
         self.width = 2 * self.n + len(self.springs)
@@ -179,7 +179,7 @@ class FixedSequence:
 
     def _end(self, state, crossings, states, contact):
         e, states, now = len(self.shares), dict(states), mp.mpf(0)
-        period = mp.mpf(2 * math.pi / float(self.omega))
+        period = 2 * mp.pi / self.omega
         z = mp.matrix([*self._absolute(state), 1, *[1] * e, *[0] * e])
         nominal = mp.mpf(0)
         for number, crossing in enumerate([*crossings, None]):
@@ -267,6 +267,24 @@ class FixedSequence:
         b, m = len(self.scene.damper), self.moving
         sizes = [1] * m + [self.omega] * m + [1] * b + [self.omega] * b + [1] * len(self.springs)
         return [mp.mpf(size) for size in sizes]
+
+
+def along(scene, state, crossings, states, direction, law=None):
+    """Derivative (k,) of the final state, from the same start, as numbers change together, by differences.
+
+    direction: path -> change of its number per unit; law: scene with exact numbers -> law of the speed in place of
+    Newton's.
+    """
+    with mp.workdps(DIGITS):
+        start, ends = [mp.mpf(float(value)) for value in state], []
+        for way in (1, -1):
+            exact = exact_scene(scene, {path: way * STEP * change for path, change in direction.items()})
+            sequence, contact = FixedSequence(exact, law and law(exact)), None
+            if exact.contact.law == "compliant":
+                contact = exact.contact.stiffness, dashpots(exact, sequence.rows, sequence.mass)
+            sequence._exponentials = {}
+            ends.append(sequence._end(start, crossings, states, contact))
+        return np.array([float((a - b) / (2 * STEP)) for a, b in zip(*ends, strict=True)])
 
 
 def _shift(generator, z, duration):

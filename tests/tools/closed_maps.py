@@ -40,7 +40,9 @@ class ClosedMap:
             crossings += new
         finite = np.isfinite(state).all() and np.abs(state).max() < 1e6
         status = PassageStatus.OK if finite else PassageStatus.STOPPED
-        return Passage(state, derivative, tuple(crossings), clearance, status, np.array(peaks), np.zeros((len(state), 0)))
+        return Passage(
+            state, derivative, tuple(crossings), clearance, status, np.array(peaks), np.zeros((len(state), 0))
+        )
 
     def at(self, value: float) -> ClosedMap:
         if value < self.lowest:
@@ -187,4 +189,12 @@ class ImpactOscillator:
         derivative = self.propagator(end - now) @ derivative
         state = self.driven(end) + self.propagator(end - now) @ (x - self.driven(now))
         clearance = (math.inf, "") if crossings else (1.0 - top, "impact stop 0")
-        return Passage(state, derivative, tuple(crossings), clearance, PassageStatus.OK, np.ones(self.periods), np.zeros((len(state), 0)))
+        return Passage(
+            state,
+            derivative,
+            tuple(crossings),
+            clearance,
+            PassageStatus.OK,
+            np.ones(self.periods),
+            np.zeros((len(state), 0)),
+        )

@@ -1,0 +1,144 @@
+"""A motion that is passed with its derivatives by numbers, and the record of what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.event_names import EventNames
+from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
+from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
+from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
+from vanedamp.coupling.derivatives.walk import PassageWalk
+from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.restart import fitted
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sensitivity.measures import Measures
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.files.store import frozen
+
+Paths = tuple[str | MatrixDirection, ...]
+#: events per period after which a motion gives up
+_EVENTS_PER_PERIOD = 2000
+#: growth of neighbouring motions beyond which derivatives of a run say nothing
+_PARTED = 1e6
+
+MEANING = {
+    PassageStatus.OK: (SensitivityStatus.OK, ""),
+    PassageStatus.GRAZING: (SensitivityStatus.GRAZING, "an event is tangential, or the motion begins with one"),
+    PassageStatus.COINCIDENT: (SensitivityStatus.COINCIDENT, "events meet at one instant"),
+    PassageStatus.UNDETERMINED: (SensitivityStatus.UNDETERMINED, "the laws do not determine the contact forces"),
+    PassageStatus.STOPPED: (SensitivityStatus.STOPPED, "the engine does not reach the end"),
+}
+
+
+class NoDerivative(ArithmeticError):
+    """A motion has no derivatives, or none that mean something: its status, and why."""
+
+    def __init__(self, status: SensitivityStatus, note: str) -> None:
+        super().__init__(note)
+        self.status, self.note = status, note
+
+
+class Motion:
+    """A motion of a scene from a state (k,), to be passed with its derivatives.
+
+    derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
+    (numbers.StartOf); speed, scale: as in PeriodMap. Raises InputError, and NotSmooth.
+    """
+
+    def __init__(
+        self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
+        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        self.scene = derived(scene)
+        self.frame = Frame(self.scene, speed)
+        if scale is None:
+            scale = self._sizes(None if begins is None else begins(scene, self.frame))
+        self.dynamics = Dynamics(self.frame, scale)
+        self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, speed, begins, derived)
+
+    def _sizes(self, start: np.ndarray | None) -> np.ndarray:
+        """Return sizes (k,) of the coordinates: modes move at least as far as from the start, if that is given."""
+        sizes, n, omega = self.frame.sizes().copy(), self.frame.system.modes, self.frame.system.omega
+        if start is not None:
+            moved = np.maximum(sizes[:n], np.hypot(start[:n], start[n : 2 * n] / omega))
+            sizes[:n], sizes[n : 2 * n] = moved, omega * moved
+        return sizes
+
+    def passed(
+        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None, given: bool
+    ) -> Passage:
+        """Return the passage from a state (k,) that numbers turn by (k, P); given: as in derivatives.start.Start."""
+        system = self.frame.system
+        start, records = fitted(system, self.frame.restart_of(state)), new_records(system, periods, 0)
+        run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
+        names, turned = EventNames(self.scene, system), turns * self.numbers.size
+        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given)
+        return walk.passage(run, periods)
+
+    def grown(self, passage: Passage) -> np.ndarray:
+        """Return the derivative (k, k) of a passage in units of the coordinates' sizes."""
+        scale = self.dynamics.scale
+        return np.asarray(passage.derivative * (scale / scale[:, None]))
+
+
+def check(status: PassageStatus, when: str = "") -> None:
+    """Raise NoDerivative for a passage that has none."""
+    found, note = MEANING[status]
+    if found is not SensitivityStatus.OK:
+        raise NoDerivative(found, f"{when}{note}")
+
+
+def check_together(growth: np.ndarray) -> None:
+    """Raise NoDerivative for a motion whose neighbours part: growth (k, k) of their distances."""
+    most = float(np.abs(growth).max(initial=0.0))
+    if not most <= _PARTED:
+        raise NoDerivative(SensitivityStatus.PARTS, f"neighbouring motions end {most:.1e} times as far apart")
+
+
+def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
+    """Return the record of a motion with derivatives. turns: (k, P) of the state."""
+    size, number = motion.numbers.size, len(motion.numbers)
+    figures, peaks = measures.figures(periods), measures.peaks
+    kinks = any(peak.derivatives(number)[1] for peak in peaks[measures.first :])
+    rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
+    return Sensitivity(
+        paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
+        note="summits of one height part: derivatives of amplitudes hold on one side" if kinks else "",
+        values={name: float(np.real(each.value)) for name, each in figures.items()},
+        derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
+        state=frozen(state), state_derivative=frozen(turns),
+        peak=frozen([peak.value for peak in peaks]),
+        peak_derivative=rows([peak.derivatives(number)[0] for peak in peaks]),
+        **_series(measures, rows),
+    )  # fmt: skip
+
+
+def _series(measures: Measures, rows: Callable[..., np.ndarray]) -> dict[str, Any]:
+    impacts, samples = measures.impacts, measures.samples
+    return {
+        "impact_time": frozen([each.time for each in impacts]),
+        "impact_speed": frozen([each.speed for each in impacts]),
+        "impact_time_derivative": rows([each.of_time for each in impacts]),
+        "impact_speed_derivative": rows([each.of_speed for each in impacts]),
+        "time": frozen([time for time, _, _ in samples]),
+        "motion": frozen(np.reshape([moved for _, moved, _ in samples], (-1, 3))),
+        "motion_derivative": rows([turned for _, _, turned in samples], 3),
+    }
+
+
+def nothing(paths: Sequence[str | MatrixDirection], status: SensitivityStatus, note: str) -> Sensitivity:
+    """Return the record of a motion without derivatives."""
+    none, rows, n = frozen(()), frozen(np.zeros((0, len(paths)))), len(paths)
+    return Sensitivity(
+        paths=tuple(path if isinstance(path, str) else path.name for path in paths), status=status, note=note,
+        values={}, derivatives={}, names=(), state=none, state_derivative=rows, peak=none, peak_derivative=rows,
+        impact_time=none, impact_speed=none, impact_time_derivative=rows, impact_speed_derivative=rows, time=none,
+        motion=frozen(np.zeros((0, 3))), motion_derivative=frozen(np.zeros((0, 3, n))),
+    )  # fmt: skip

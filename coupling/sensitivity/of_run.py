@@ -1,0 +1,145 @@
+"""Derivatives along motions from a given start: runs, ring-downs and ramps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.frame import Frame
+from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.orbits import find_orbit
+from vanedamp.coupling.response.restart import at_speed_of, start_of
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.orbit import Orbit as OrbitTable
+from vanedamp.coupling.scene.ramp import Ramp as RampTable
+from vanedamp.coupling.scene.ring_down import RingDownTable
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sensitivity.integrands import Functionals
+from vanedamp.coupling.sensitivity.measures import Measures
+from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, check_together, record
+from vanedamp.coupling.sensitivity.of_orbit import of_orbit
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+
+def of_run(scene: Scene, paths: Paths, start: RestartState | None, **options: Any) -> Sensitivity:
+    """Return the derivatives along the run of a scene. Raises NoDerivative, InputError and NotSmooth."""
+    if scene.solver.method != "exact":
+        raise InputError(f'solver.method: derivatives are those of the exact engine, not of "{scene.solver.method}"')
+    scene = _alone(scene)
+
+    def begins(other: Scene, frame: Frame) -> np.ndarray:
+        given = start_of(other, frame.system) if start is None else at_speed_of(other, start)
+        return frame.state_of(given)
+
+    motion = Motion(scene, paths, begins=begins)
+    periods, numbers = scene.time.simulated, motion.numbers
+    measures = Measures(motion.dynamics, numbers, scene.time.dropped, **options)
+    turns = numbers.parts.start.T / numbers.size
+    return _measured(motion, begins(scene, motion.frame), turns, periods, measures)
+
+
+def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Sequence[float]) -> Sensitivity:
+    """Return the derivatives along the free motion of a ring-down. Raises NoDerivative, InputError and NotSmooth."""
+    scene = _alone(found.scene)
+    table, state, turns = table_of(scene), None, None
+    if table.start == "steady":
+        state, turns = _steady(scene, paths)
+
+    def begins(other: Scene, frame: Frame) -> np.ndarray:
+        return frame.state_of(blown_or_pulled(other, table)) if state is None else state
+
+    motion = Motion(scene, paths, partial(_freed, table=table), begins)
+    numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode
+    row, own = np.zeros((1, len(response))), np.zeros((len(numbers), 1, len(response)))
+    row[0, mode], own[:, 0, mode] = response[mode], numbers.parts.response[:, mode]
+    measures = Measures(
+        motion.dynamics, numbers, 0, orders, times or found.time.tolist(), sampled=Functionals(row, own)
+    )  # fmt: skip
+    turns = numbers.parts.start.T / numbers.size if turns is None else turns
+    return _measured(motion, begins(scene, motion.frame), turns, motion.scene.time.simulated, measures)
+
+
+def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
+    """Return the derivatives along the first run of a ramp, period by period: of its peaks and its end.
+
+    Raises NoDerivative, InputError and NotSmooth.
+    """
+    scene, table = _alone(ramp.scene), ramp.table
+    course, peaks, turned = courses(ramp.scene)[0], list[float](), list[np.ndarray]()
+    for period, value in enumerate(course.value[: len(ramp.runs[0].time)].tolist()):
+        at = partial(_ramped, table=table, value=value)
+        motion = Motion(scene, paths, at, _at_rest, speed=float(course.speed[0]))
+        if period == 0:
+            state, turns = _at_rest(scene, motion.frame), motion.numbers.parts.start.T / motion.numbers.size
+            if table.start == "steady":
+                state, turns = _steady(motion.scene, paths)
+            growth = np.eye(len(state))
+        measures = Measures(motion.dynamics, motion.numbers, 0)
+        passage = motion.passed(state, turns, 1, measures, period == 0)
+        check(passage.status, f"period {period}: ")
+        growth = motion.grown(passage) @ growth
+        state, turns = passage.state, passage.by_number
+        peaks.append(measures.peaks[0].value)
+        turned.append(measures.peaks[0].derivatives(len(paths))[0] / motion.numbers.size)
+    check_together(growth)
+    top = int(np.argmax(peaks))
+    return replace(
+        record(motion, measures, 1, state, turns), peak=frozen(peaks), peak_derivative=frozen(turned),
+        values={"amplitude_max": peaks[top]}, derivatives={"amplitude_max": frozen(turned[top])},
+    )  # fmt: skip
+
+
+def _measured(motion: Motion, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures) -> Sensitivity:
+    passage = motion.passed(state, turns, periods, measures, True)
+    check(passage.status)
+    check_together(motion.grown(passage))
+    return record(motion, measures, periods, passage.state, passage.by_number)
+
+
+def _alone(scene: Scene) -> Scene:
+    """Return a scene without open choices and without tables of what other commands do over its numbers."""
+    return replace(choose(scene).scene, sweep={}, orbit=None)
+
+
+def _freed(scene: Scene, table: RingDownTable) -> Scene:
+    return free_scene(scene, table)
+
+
+def _ramped(scene: Scene, table: RampTable, value: float) -> Scene:
+    return scene_at(ramped(scene), table, value)
+
+
+def _at_rest(scene: Scene, frame: Frame) -> np.ndarray:
+    """Return the state with which the run of a scene begins."""
+    return frame.state_of(start_of(frame.scene, frame.system))
+
+
+def _steady(scene: Scene, paths: Paths) -> tuple[np.ndarray, np.ndarray]:
+    """Return the state (k,) on whose orbit a scene settles, and how numbers turn it (k, P). Raises NoDerivative."""
+    orbit = _settled(scene)
+    if orbit is None:
+        raise NoDerivative(SensitivityStatus.PARTS, "the steady motion that it begins with does not repeat")
+    found = of_orbit(orbit, paths)
+    return orbit.state, found.state_derivative
+
+
+def _settled(scene: Scene) -> Orbit | None:
+    response = simulate(scene)
+    kind = response.classification
+    if response.final is None or kind == "non-periodic":
+        return None
+    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
+    orbit = find_orbit(replace(scene, orbit=OrbitTable(periods=periods)), response.final)
+    return orbit if orbit.status is OrbitStatus.OK else None
