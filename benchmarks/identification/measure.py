@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.identification.coverage import rises
 from benchmarks.identification.derivative_free import compared
-from benchmarks.identification.truth import NUMBERS, TRUTH, study
+from benchmarks.identification.truth import HELD, NUMBERS, TRUTH, study
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.tables import SearchTable
 
@@ -41,7 +41,7 @@ class IdentificationBenchmark(Benchmark):
         rows = {
             _RECOVERY: Row(60.0, partial(_found, study(_SEED, search=search)), _text),
             _RUNS: Row(120.0, partial(compared, _SEED, self.candidates)),
-            _STUCK: Row(20.0, partial(_found, study(_SEED, stuck=True, search=search)), _text),
+            _STUCK: Row(20.0, partial(_found, study(_SEED, stuck=True, search=search, numbers=HELD)), _text),
             _BLOCK: Row(60.0, partial(_found, study(_SEED, block=True, search=search)), _text),
         }
         for first in range(0, self.sets, _CHUNK):

@@ -37,6 +37,8 @@ NUMBERS = {
     "cavity.c1.gap": Number(5e-4, 2e-3, 1.3e-3),
     "structure.damping_ratio": Number(0.003, 0.03, 0.005, "log"),
 }
+#: with friction that holds the body at the lowest level, whatever it is
+HELD = NUMBERS | {"damper.0.friction": Number(0.1, 0.8, 0.45)}
 TRUTH = np.array([0.25, 0.6, 1e-3, 0.01])
 #: force (N) and frequencies (Hz): the body slides without impacts, and strikes both walls once per period
 LEVELS = {0.1: (15.5, 15.65, 15.8, 15.95), 0.5: (15.2, 15.35, 16.0, 16.2)}

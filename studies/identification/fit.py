@@ -46,7 +46,7 @@ class Fit:
         self.study, self.count = study, Counter[str]()
         self.models = [_MODELS[one.kind](study, one, self.count) for one in study.measured]
         self.channels: list[Channel] = [channel for one in study.measured for channel in one.channels]
-        self.deviations = list(deviations or map(_assumed, self.channels))
+        self.deviations = list(map(_assumed, self.channels) if deviations is None else map(float, deviations))
         self._priors = [(place, one.prior) for place, one in enumerate(study.numbers.values()) if one.prior]
         self._last: tuple[np.ndarray, list[Predicted]] | None = None
 

@@ -86,6 +86,9 @@ def _notes(
     for path, ends, is_open in zip(study.paths, interval, opened, strict=True):
         if is_open.all():
             yield f"{path}: flat, the measurements do not tell it between {ends[0]:.4g} and {ends[1]:.4g}"
+        elif is_open.any():
+            side = f"at most {ends[1]:.4g}" if is_open[0] else f"at least {ends[0]:.4g}"
+            yield f"{path}: the measurements tell no more than that it is {side}"
     for values in others:
         found = ", ".join(f"{path} = {value:.4g}" for path, value in zip(study.paths, values, strict=True))
         yield f"other numbers fit as well: {found}"

@@ -36,7 +36,7 @@ def data_figure(record: Identification) -> go.Figure:
         edges = np.concatenate([model + band, (model - band)[::-1]])
         first = number == 0
         figure.add_scatter(
-            x=np.concatenate([at, at[::-1]]), y=edges, fill="toself", fillcolor=_BAND, line={"width": 0},
+            x=np.concatenate([at, at[::-1]]), y=edges, mode="lines", fill="toself", fillcolor=_BAND, line={"width": 0},
             hoverinfo="skip", name="its 95 % band", showlegend=first, **place,
         )  # fmt: skip
         figure.add_scatter(

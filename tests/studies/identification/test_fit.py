@@ -154,3 +154,4 @@ def test_density_and_its_gradient():
     )
     with pytest.raises(InputError, match="give noise there"):
         LogDensity(open_study)
+    assert LogDensity(open_study, np.array([0.02]))(TRUTH) == pytest.approx(0.0, abs=1e-6)
