@@ -77,8 +77,8 @@ class IdentificationBenchmark(Benchmark):
             yield f"{name}: {other['calls']} engine calls {until}; with derivatives {ours} ({share:.3f})"
 
 
-FULL = IdentificationBenchmark(300, 64, 3)
-QUICK = IdentificationBenchmark(2, 16, 1)
+FULL = IdentificationBenchmark(300, 128, 3)
+QUICK = IdentificationBenchmark(2, 128, 1)
 
 
 def _found(sought: Any) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def _one_noise(table: Any) -> None:
 class SearchTable:
     """How the numbers are sought."""
 
-    candidates: Annotated[Whole, Field(ge=1, le=100_000)] = 64
+    candidates: Annotated[Whole, Field(ge=1, le=100_000)] = 128
     """sets of numbers that are tried first, spread between the bounds"""
     starts: Annotated[Whole, Field(ge=1, le=1000)] = 3
     """best ones of these from which the search with derivatives begins"""

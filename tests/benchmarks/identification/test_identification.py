@@ -28,7 +28,7 @@ def test_measurements_are_those_of_the_truth_with_noise():
 
 @pytest.mark.slow
 def test_benchmark_leaves_its_results(tmp_path):
-    result = IdentificationBenchmark(2, 16, 1).run(tmp_path)
+    result = IdentificationBenchmark(2, 128, 1).run(tmp_path)
     assert json.loads((tmp_path / "bench_identification.json").read_text())["sets"] == result["sets"]
     with (tmp_path / "bench_identification.csv").open(newline="") as stream:
         assert [int(row["seed"]) for row in csv.DictReader(stream)] == [0, 1]
