@@ -149,7 +149,8 @@ class Fit:
         for measured, one in zip(self.study.measured, found, strict=True):
             for channel in measured.channels:
                 values = one.values[channel.name]
-                pairs.append((channel, values, one.errors * (1.0 if channel.compare == "ratio" else np.abs(values))))
+                size = np.abs(values) if channel.compare == "difference" else 1.0
+                pairs.append((channel, values, one.errors * size))
         return pairs
 
     def _each(self, of: list[Values]) -> list[np.ndarray]:

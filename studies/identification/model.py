@@ -22,7 +22,7 @@ Values = dict[str, np.ndarray]
 class Predicted(NamedTuple):
     """What a model says of a measurement at n places.
 
-    values: (n,) by channel, nan where the model says nothing; errors: (n,) relative standard deviations of amplitudes,
+    values: (n,) by channel, nan where the model says nothing; errors: (n,) standard deviations, relative or of angles,
     where they are means of runs; repeats: (n,) whether the motion repeats, or is one run.
     """
 
