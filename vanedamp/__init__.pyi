@@ -7,6 +7,8 @@ from vanedamp import modal as modal
 from vanedamp import rom as rom
 from vanedamp import studies as studies
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection as MatrixDirection
+from vanedamp.coupling.exponents.lyapunov import Exponents as Exponents
+from vanedamp.coupling.exponents.lyapunov import lyapunov as lyapunov
 from vanedamp.coupling.methods import Method as Method
 from vanedamp.coupling.orbits.branch import Branches as Branches
 from vanedamp.coupling.orbits.orbits import find_orbit as find_orbit

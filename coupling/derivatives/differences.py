@@ -10,6 +10,8 @@ from vanedamp.files.toml_input import InputError
 
 #: step, relative to the size of the number: truncation and round-off of the longest formula are some 1e-14
 _STEP = 5e-3
+#: by which it is shortened where formulas differ: modes close to each other turn fast
+_SHRINKS = (1.0, 0.2, 0.04)
 #: round-off of a function, and largest difference of the two longest formulas, relative to its size
 _NOISE, _AGREE = 16 * np.finfo(float).eps, 1e-9
 #: bend at a kink, relative to the change of the function over the step; bends below are round-off of eigenvectors
@@ -36,7 +38,16 @@ def derivative(function: Callable[[float], np.ndarray], at: float, size: float, 
     much. At the end of the range, where the function raises InputError beyond, the derivative is one-sided. Raises
     InputError for a number without neighbours on either side, and NotSmooth.
     """
-    step, refused = _STEP * size, None
+    for shrink in _SHRINKS:
+        try:
+            return _at_step(function, at, shrink * _STEP * size, here)
+        except NotSmooth:
+            if shrink == _SHRINKS[-1]:
+                raise
+    raise AssertionError
+
+
+def _at_step(function: Callable[[float], np.ndarray], at: float, step: float, here: np.ndarray) -> np.ndarray:
     try:
         return _central(function, at, step, here)
     except InputError as error:

@@ -24,14 +24,17 @@ class Frame:
 
     speed: of rotation at which the states' modes were taken, rad/s; None: the scene's own. A reduced model's modes turn
     with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
+    like: of a neighbouring scene, whose modes have the signs that these take.
     to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders of Jenkins elements have no rates
     of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
     state; longest: (j,) m, elongations at their bounds.
     """
 
-    def __init__(self, scene: Scene, speed: float | None = None) -> None:
+    def __init__(self, scene: Scene, speed: float | None = None, like: Frame | None = None) -> None:
         self.scene, self.system = scene, assemble(scene)
-        self._turn = self._back = np.eye(self.system.modes)  # from modes of the states to the scene's own, and back
+        self._sign = np.ones(self.system.modes) if like is None else _signs(self.system, like.system)
+        self.system = _turned(self.system, self._sign)
+        self._turn = self._back = np.diag(self._sign)  # from modes of the states to the scene's own, and back
         if speed is not None and isinstance(scene.structure, Rom):
             self._turn = modal_transfer(scene.structure, speed, scene.speed)
             self._back = np.linalg.inv(self._turn)
@@ -49,7 +52,7 @@ class Frame:
         system, unit, more = self.system, np.eye(len(self.system.mass)), self.extended
         x = system.along[more]
         parts = (
-            self._back @ (system.scale * unit[: system.modes]), unit[system.along] - system.floor,
+            self._back * self._sign @ (system.scale * unit[: system.modes]), unit[system.along] - system.floor,
             unit[x + 1] - system.rise[more], unit[x + 2] - system.turn[more],
         )  # fmt: skip
         elongation = np.pad(system.elongation, ((0, 0), (0, len(unit))))
@@ -150,6 +153,25 @@ class Frame:
             return None
         image: np.ndarray = self.to_state @ np.kron(np.eye(2), turned) @ self.from_state
         return image
+
+
+def _signs(system: System, like: System) -> np.ndarray:
+    """Return the signs (n,) that modes take to move places as those of a neighbouring system do."""
+    along = ((system.J * like.J).sum(axis=0) + system.response * like.response)[: system.modes]
+    return np.where(along < 0.0, -1.0, 1.0)
+
+
+def _turned(system: System, sign: np.ndarray) -> System:
+    """Return a system whose modes have other signs (n,)."""
+    if np.all(sign > 0.0):
+        return system
+    own, n = np.ones(len(system.mass)), system.modes
+    own[:n] = sign
+    rows = ("load", "weight", "response", "J", "elongation", "floor", "turn", "rise", "casing")
+    both = {name: getattr(system, name) * own * own[:, None] for name in ("stiffness", "damping")}
+    return system._replace(
+        viscous=system.viscous * sign * sign[:, None], **both, **{name: getattr(system, name) * own for name in rows}
+    )  # fmt: skip
 
 
 def _image_of(system: System) -> np.ndarray | None:

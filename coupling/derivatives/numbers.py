@@ -135,7 +135,7 @@ def numbers_of(
 
         def moved(number: float, path: str | MatrixDirection = path) -> np.ndarray:
             other = path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
-            frame = Frame(derived(other), speed)
+            frame = Frame(derived(other), speed, dynamics.frame)
             made = Dynamics(frame, dynamics.scale, dynamics)
             flat = Parts.of(made, start(other, frame)).flat()
             if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:

@@ -216,6 +216,8 @@ class Response(Plotted):
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    lyapunov: dict[str, Any] | None = None
+    """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
     def printed_units(self) -> dict[str, str]:
         """Return the units of the results that have one, by name."""
@@ -239,6 +241,8 @@ class Response(Plotted):
             data["estimate"] = self.estimate
         if self.advice is not None:
             data["advice"] = self.advice
+        if self.lyapunov is not None:
+            data["lyapunov"] = self.lyapunov
         if events:
             fields = self._event_fields()
             data["event_list"] = [{name: getattr(event, name) for name in fields} for event in self.event_list]

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
+from pydantic.json_schema import SkipJsonSchema
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.contact_laws.newton import Newton
@@ -91,26 +92,45 @@ class Time:
 _SAME_PERIOD = 1e-4
 #: where a scene names files, relative to its own
 _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
+#: fewest periods that tell Lyapunov exponents
+LEAST_EXPONENTS = 32
+#: keys of the [sweep] table that are no axes: their least values, and what they mean
+_KEPT = {
+    "sections": (1, "number of Poincare sections to keep of every point: those of its last periods"),
+    "exponents": (LEAST_EXPONENTS, "number of periods after each run over which its Lyapunov exponents are found"),
+}
+_NO_AXIS = "a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}"
 
 
 def _several(axis: Any) -> Any:
     if isinstance(axis, np.ndarray):
         return axis.tolist()
+    if type(axis) is int:  # of a key that is no axis, which the scene checks
+        return axis
     if not isinstance(axis, Mapping | list | tuple | Range):
-        raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
+        raise ValueError(_NO_AXIS)
     return axis
 
 
 def _form(axis: Any) -> str:
-    return "list" if isinstance(axis, list | tuple) else "range"
+    return "count" if isinstance(axis, int) else "list" if isinstance(axis, list | tuple) else "range"
 
 
-#: the values of one axis of a sweep
+#: the values of one axis of a sweep, or a number of periods
 Axis = Annotated[
-    Annotated[Range, Tag("range")] | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1), Tag("list")],
+    Annotated[Range, Tag("range")]
+    | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1), Tag("list")]
+    | Annotated[SkipJsonSchema[Whole], Tag("count")],
     Discriminator(_form),
     BeforeValidator(_several),
 ]
+
+
+def _describe_kept(schema: dict[str, Any]) -> None:
+    """Add the keys that are no axes to the JSON Schema of the [sweep] table."""
+    schema["properties"] = {
+        key: {"type": "integer", "minimum": least, "description": text} for key, (least, text) in _KEPT.items()
+    }
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -155,7 +175,7 @@ class Scene(OpenRecord, Displayed):
     """method of time integration, and its options"""
     continuation: Continuation = field(default_factory=Continuation)
     """how the runs of a sweep begin"""
-    sweep: dict[str, Axis] = field(default_factory=dict)
+    sweep: Annotated[dict[str, Axis], Field(json_schema_extra=_describe_kept)] = field(default_factory=dict)
     """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
     orbit: Orbit | None = None
     """periodic motion that `vanedamp orbits` finds and follows"""
@@ -188,6 +208,11 @@ class Scene(OpenRecord, Displayed):
         self._check_rotation()
         self._check_structure()
         self._check_elements()
+        for path, axis in self.sweep.items():
+            if path in _KEPT and not (isinstance(axis, int) and axis >= _KEPT[path][0]):
+                raise ValueError(f"sweep.{path}: expected a whole number of periods, at least {_KEPT[path][0]}")
+            if isinstance(axis, int) and path not in _KEPT:
+                raise ValueError(f"sweep.{path}: {_NO_AXIS}")
 
     @property
     def speed(self) -> float:
@@ -426,19 +451,29 @@ class Scene(OpenRecord, Displayed):
     def files(self) -> list[str]:
         """The files that the scene and its sweep name."""
         own = [table[key] for table, key in _named_files(self.to_dict())]
-        swept = [self.sweep.get(".".join(place), ()) for place in _FILES]
+        swept = [self.axes.get(".".join(place), ()) for place in _FILES]
         return own + [str(file) for files in swept if not isinstance(files, Range) for file in files]
+
+    @property
+    def axes(self) -> dict[str, Range | tuple[Any, ...]]:
+        """Axes of its sweep, by their paths."""
+        return {path: axis for path, axis in self.sweep.items() if not isinstance(axis, int)}
+
+    @property
+    def kept(self) -> dict[str, int]:
+        """Keys of the [sweep] table that are no axes: "sections" and "exponents"."""
+        return {path: axis for path, axis in self.sweep.items() if isinstance(axis, int)}
 
     @property
     def points(self) -> int:
         """Points of the grid of its sweep."""
-        return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.sweep.values())
+        return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.axes.values())
 
     @property
     def moved(self) -> bool:
         """Whether something moves the structure or the bodies, here or in an axis of the sweep."""
         given = self.excitation.force, self.excitation.base_acceleration, self.excitation.resonance_amplitude
-        swept = {path.split(".")[0] for path in self.sweep if path != "excitation.frequency"}
+        swept = {path.split(".")[0] for path in self.axes if path != "excitation.frequency"}
         return (
             isinstance(self.structure, Prescribed)
             or any(value is not None for value in given)
@@ -468,7 +503,7 @@ class Scene(OpenRecord, Displayed):
 
     def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
         """Return the grid of the [sweep] table: axes by path, points of their product with the last axis fastest."""
-        axes = {path: axis_values(values) for path, values in self.sweep.items()}
+        axes = {path: axis_values(values) for path, values in self.axes.items()}
         points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points
 

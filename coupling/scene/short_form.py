@@ -54,8 +54,8 @@ def _reads_as(data: dict[str, Any], whole: dict[str, Any]) -> bool:
 def _even(scene: Scene) -> dict[str, Any]:
     """Return a scene's data with ranges as lists."""
     data = scene.to_dict()
-    values = {path: axis_values(axis) for path, axis in scene.sweep.items()}
-    return data | {"sweep": values}
+    values = {path: axis_values(axis) for path, axis in scene.axes.items()}
+    return data | {"sweep": values | scene.kept}
 
 
 def _range(values: Any) -> Any:

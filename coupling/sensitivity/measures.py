@@ -16,8 +16,8 @@ from vanedamp.coupling.sensitivity.integrands import POWERS, Functionals, Produc
 from vanedamp.coupling.sensitivity.peaks import Peak, summits
 from vanedamp.coupling.sensitivity.sensitivity_record import Dual, Impact
 
-#: flows whose powers are kept
-_KEPT = 1000
+#: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
+_KEPT, _SAME = 1000, 1e-12
 
 
 class Measures:
@@ -151,19 +151,34 @@ class Measures:
         massive = np.ones(len(w), bool)
         massive[dynamics.sliders] = False
         flow, z = dynamics.flow(new.state, new.open_force), dynamics.extended(dynamics.state(new), new.time)
-        if new.period >= self.first and np.any((w != w_after)[massive]):
+        if new.period >= self.first:
+            self._let_go(before, flow, shift)
+        if new.period >= self.first and np.any(np.abs(w - w_after)[massive] > _SAME * np.abs(w).max()):
             turns = [
                 (derivative[:, k:] + np.multiply.outer((own.X @ at)[: dynamics.one], shift))[dynamics.rates]
                 for derivative, own, at in ((before.M, before.flow, before.z), (M, flow, z))
             ]
             self.lost.value[0] += 0.5 * float((w**2 - w_after**2)[massive].sum())
             self.lost.turns[0] += w[massive] @ turns[0][massive] - w_after[massive] @ turns[1][massive]
-        if len(event.struck) and event.impulse.any():
+        if len(event.struck):
             r = int(event.struck[np.argmin(event.before)])
             row = dynamics.speed[r]
             Z = self._whole(before.M, new.start)
             turned = row @ Z + self.numbers.parts.speed[:, r] @ before.z + float(row @ before.flow.X @ before.z) * shift
             self.impacts.append(Impact(new.start, -float(event.before.min()), shift, -turned))
+
+    def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
+        """Take the energy of springs whose force ends, or begins, while they are pressed: it is lost with contact."""
+        dynamics, of = self.dynamics, self.numbers.parts
+        own, new = before.flow.solved.springs, after.solved.springs
+        Z = self._whole(before.M, before.segment.start + before.segment.duration)
+        row = 1 + POWERS.index("contact")
+        for r in np.setxor1d(own, new).tolist():
+            way, spring = (1.0 if r in own else -1.0), float(dynamics.system.spring[r])
+            gap, rate = float(dynamics.gap[r] @ before.z), float(dynamics.gap[r] @ before.flow.X @ before.z)
+            turned = dynamics.gap[r] @ Z + of.gap[:, r] @ before.z + rate * shift
+            self._sums.value[row] += way * 0.5 * spring * gap**2
+            self._sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
 
     def _sample(self, begun: Before, series: object, Z: np.ndarray) -> None:
         """Take displacement, velocity and acceleration at the times within a segment."""

@@ -100,7 +100,8 @@ class Sensitivity:
     state            (k,) of an orbit at the start of its period; of a run at its end
     state_derivative (k, P)
     peak             (n,) m, largest displacement of each period; peak_derivative: (n, P)
-    impact_time      (m,) s; impact_time_derivative: (m, P)
+    impact_time      (m,) s, of impacts on rigid and compliant contacts, one for those at one instant
+    impact_time_derivative (m, P)
     impact_speed     (m,) m/s, of approach; impact_speed_derivative: (m, P)
     time             (t,) s of the samples
     motion           (t, 3) displacement, velocity and acceleration then; motion_derivative: (t, 3, P)

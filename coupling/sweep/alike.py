@@ -17,9 +17,9 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
 from vanedamp.coupling.engine.line.event_driven import EngineRun
-from vanedamp.coupling.engine.line.scenes import BEGINS, PLACE, STAGE, Job, new_job
+from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, PLACE, STAGE, Job, new_job
 from vanedamp.coupling.methods.registry import run_of
-from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, OUTSIDE
+from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, OUTSIDE, PERIOD
 from vanedamp.coupling.response.figures import measured_of
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -37,6 +37,8 @@ _OF_STARTS = ("initial.", ".position", ".velocity")
 
 #: runs point k of a group by itself, from a state; returns the state that it leaves, None if it broke off
 Alone = Callable[[int, RestartState | None], RestartState | None]
+#: takes the sections (p, s) of the evaluated periods of point k
+Keep = Callable[[int, np.ndarray], None]
 
 
 class Kind:
@@ -54,27 +56,42 @@ class Kind:
         self.statistics = setup, loose, held, free, stuck, measured_of(scene, run.whole)
 
     def run_all(
-        self, values: Mapping[str, np.ndarray], start: RestartState | None, linked: bool, alone: Alone
+        self,
+        values: Mapping[str, np.ndarray],
+        start: RestartState | None,
+        linked: bool,
+        alone: Alone,
+        keep: Keep | None = None,
     ) -> tuple[Job, np.ndarray, RestartState | None]:
         """Run scenes (k,). Return the job with their results, linear amplitudes (k, 2), and the state they leave.
 
         values: of all paths; start: of the first of linked scenes; alone: runs scenes that compiled code refuses, whose
-        codes stay 0.
+        codes stay 0; keep: takes the sections of every other one, before the next begins.
         """
         run, size = self.run, len(next(iter(values.values())))
         table = self._columns(values, start, size, linked)
         job, leaves = new_job(size, most_periods(self.scene), linked), False
-        while run.run_many(job, table, self.statistics) == OUTSIDE:
-            place = int(job.at[PLACE])
-            left = alone(place, self._left(place, start) if linked else None)
-            leaves = leaves or left is not None
-            if linked:
-                for name in STARTS:
-                    column = getattr(table, name)
-                    column[place + 1] = column[place] if left is None else getattr(left, name)
-            job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
+        for count in [size] if keep is None else range(1, size + 1):
+            job.at[COUNT] = count
+            while run.run_many(job, table, self.statistics) == OUTSIDE:
+                place = int(job.at[PLACE])
+                left = alone(place, self._left(place, start) if linked else None)
+                leaves = leaves or left is not None
+                if linked:
+                    for name in STARTS:
+                        column = getattr(table, name)
+                        column[place + 1] = column[place] if left is None else getattr(left, name)
+                job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
+            if keep is not None and job.codes[count - 1]:
+                keep(count - 1, self._section(job))
         leaves = linked and (leaves or bool(np.isin(job.codes, (DONE, NOT_STEADY)).any()))
         return job, self._linear(table, values), self._left(size, start) if leaves else start
+
+    def _section(self, job: Job) -> np.ndarray:
+        """Return the sections (p, s) of the evaluated periods of the run that has just ended."""
+        done = int(self.run.counters[PERIOD])
+        first = min(int(job.at[DROPPED]), max(done - 1, 0))
+        return np.delete(self.run.records.section[first : done + 1], 2, axis=1)
 
     def _columns(
         self, values: Mapping[str, np.ndarray], start: RestartState | None, size: int, linked: bool
@@ -159,7 +176,7 @@ def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list
     telling = [values for path, values in kept.items() if path not in paths]
     telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
     keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)
-    if not paths:
+    if not paths or "exponents" in base.kept:
         yield from (([], [place]) for place in range(len(points)))
     elif linked:
         yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), keys.__getitem__))

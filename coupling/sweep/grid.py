@@ -170,7 +170,7 @@ class PointList:
 
 def grid(scene: Scene) -> Grid:
     """Return the grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
-    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    axes = {path: axis_values(values) for path, values in scene.axes.items()}
     if not axes:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
@@ -178,7 +178,7 @@ def grid(scene: Scene) -> Grid:
     for path in axes:
         if path.split(".")[0] in _OF_OTHERS:
             raise InputError(f"sweep: {path} changes no run of a sweep; its table is for another command")
-    points = Points(replace(scene, sweep={}))
+    points = Points(replace(scene, sweep={**scene.kept}))
     first, linked, undecided = points.raw({path: values[0] for path, values in axes.items()}), False, False
     for made in _telling(points, axes):
         linked = linked or made.continuation.direction != "independent"
@@ -198,9 +198,9 @@ def grid(scene: Scene) -> Grid:
 
 
 def base_scene(scene: Scene) -> Scene:
-    """Return a scene without its sweep; its level refers to one resonance for all swept frequencies."""
-    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
-    base = replace(scene, sweep={})
+    """Return a scene without the axes of its sweep; its level refers to one resonance for all swept frequencies."""
+    axes = {path: axis_values(values) for path, values in scene.axes.items()}
+    base = replace(scene, sweep={**scene.kept})
     swept, hertz = resonance_axis(base, axes)
     if swept is None or not _ordered(axes[swept]) or base.excitation.resonance_near is not None:
         return base
@@ -256,6 +256,10 @@ def _check_method(scene: Scene) -> None:
     if direction != "independent" and (reason := why_no_restart(scene)):
         raise InputError(f'continuation.direction: "{direction}" {reason}; take "independent"')
     check_waveform(scene, scene.solver.method)
+    if "exponents" in scene.kept and scene.solver.method != "exact":
+        raise InputError(
+            f'sweep.exponents: derivatives are those of the exact engine, not of "{scene.solver.method}"; leave it out'
+        )
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Plotted, html_table
@@ -22,6 +23,7 @@ PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
+_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1")
 #: columns of the table in a notebook, beside the axes, and its rows
 _SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
 _MOST_ROWS = 20
@@ -44,6 +46,12 @@ class Sweep(SceneRecord, Plotted):
     in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
                           floor, what small tilts neglect over the smallest play, nan for sliders; impacts on walls per
                           period; empty for a scene of sliders
+    exponents             by the names of EXPONENTS, largest Lyapunov exponent, half width of its 95 % confidence
+                          interval, the second, and the largest per excitation period; `motion` in a word,
+                          `exponent_status`; empty unless the [sweep] table has `exponents`
+    sections              by the names of SECTIONS, (*grid, sections), of bodies (*grid, sections, bodies): states at
+                          the start of the last evaluated periods and at their end, nan where there are fewer; empty
+                          unless the table has `sections`
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
@@ -72,6 +80,8 @@ class Sweep(SceneRecord, Plotted):
     status: np.ndarray
     classification: np.ndarray
     in_plane: Mapping[str, np.ndarray] = field(default_factory=dict)
+    exponents: Mapping[str, np.ndarray] = field(default_factory=dict)
+    sections: Mapping[str, np.ndarray] = field(default_factory=dict)
     peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -103,8 +113,8 @@ class Sweep(SceneRecord, Plotted):
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
         notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
-        further = {**self.in_plane, **self.peaks}
-        units = self.units() | MEASURES | {name: (IN_PLANE | PEAKS)[name] for name in further}
+        further = {**self.in_plane, **self.exponents, **self.peaks}
+        units = self.units() | MEASURES | {name: _FURTHER[name] for name in further}
         return (
             {"axes": axes, "units": units}
             | {"loss": list(LOSSES)}
@@ -124,6 +134,10 @@ class Sweep(SceneRecord, Plotted):
             variables[name] = Variable(getattr(self, name), dims, unit)
         for name, values in self.in_plane.items():
             variables[name] = Variable(values, (*dims, "damper"), IN_PLANE[name])
+        variables |= {name: Variable(values, dims, _FURTHER[name]) for name, values in self.exponents.items()}
+        for name, values in self.sections.items():
+            own = (*dims, "section", "damper")
+            variables[name] = Variable(values, own[: values.ndim], SECTIONS[name])
         swept = resonance_axis(self.scene, self.axes)[0]
         others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
@@ -146,6 +160,12 @@ class Sweep(SceneRecord, Plotted):
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
             in_plane={name: frozen(values[name]) for name in IN_PLANE if name in values},
             peaks={name: frozen(values[name]) for name in PEAKS if name in values},
+            exponents={
+                name: frozen(values[name], object if name in WORDS else float)
+                for name in (*EXPONENTS, *WORDS)
+                if name in values
+            },
+            sections={name: frozen(values[name]) for name in SECTIONS if name in values},
             **given,
         )
 

@@ -18,6 +18,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.further import exponents_of, sections_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
@@ -30,6 +31,7 @@ from vanedamp.coupling.sweep.worker import (
     OF_A_POINT,
     TEXTS,
     SweepTable,
+    parts_of,
     width_of,
 )
 from vanedamp.coupling.system.assembly import assemble
@@ -93,7 +95,8 @@ def run_list(
 def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     """Return the record of a grid whose points are all finished."""
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
-    of_bodies = finished.values[:, len(COLUMNS) :]
+    parts = {name: finished.values[:, columns] for name, columns in parts_of(grid.base).items()}
+    of_bodies = parts["in_plane"]
     of_bodies = of_bodies.reshape(*grid.shape, len(IN_PLANE), of_bodies.shape[1] // len(IN_PLANE))
     return Sweep(
         scene=grid.scene,
@@ -102,6 +105,8 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         **{name: read_only(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
+        exponents=dict(exponents_of(parts["exponents"], grid.shape)),
+        sections=dict(sections_of(parts["sections"], grid.shape, len(grid.base.damper))),
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})

@@ -20,6 +20,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
+from vanedamp.coupling.sweep.further import exponent_width, put_exponents, put_sections, section_width
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
@@ -38,7 +39,7 @@ IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1", "wall_im
 #: losses of energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
-#: columns of every point: measures, then fractions of the losses; behind them IN_PLANE, body by body
+#: columns of every point: measures, then fractions of the losses; behind them `parts_of`
 COLUMNS = (*MEASURES, *LOSSES)
 #: faults of a point: errors of its parameters; all others, such as of imports, files and memory, would meet the
 #: next point as well
@@ -77,14 +78,17 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
     """
     started = time.perf_counter()
     points, maker, state = PointTable.of(points), Points(base, choices), task.start if task.linked else None
-    values = np.full((len(points), width_of(base)), np.nan)
+    values, parts = np.full((len(points), width_of(base)), np.nan), parts_of(base)
     texts = [("", "")] * len(points)
     for paths, places in groups(base, points, task.linked):
 
         def alone(place: int, start: RestartState | None, places: Sequence[int] = places) -> RestartState | None:
             place = places[place]
-            final, texts[place] = _run(maker, points[place], start, values[place])
+            final, texts[place] = _run(maker, points[place], start, values[place], parts)
             return final
+
+        def keep(place: int, section: np.ndarray, places: Sequence[int] = places) -> None:
+            put_sections(values[places[place], parts["sections"]], section)
 
         numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
         first, several = points[places[0]], len(places) > 1 and bool(paths)
@@ -92,7 +96,7 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
         found = None
         if kind is not None:
             with suppress(InputError):  # a start that does not fit: the runs say so
-                found = kind.run_all(numbers, state, task.linked, alone)
+                found = kind.run_all(numbers, state, task.linked, alone, keep if "sections" in base.kept else None)
         if found is None:
             for place in range(len(places)):
                 final = alone(place, state)
@@ -102,7 +106,7 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
         job, linear, state = found
         ran = np.flatnonzero(job.codes)
         at = np.array(places)[ran]
-        values[at] = _rows(job.figures[ran], linear[ran])
+        values[at, : len(COLUMNS)] = _rows(job.figures[ran], linear[ran])
         for place, code, motion, figures in zip(at, job.codes[ran], job.kinds[ran], job.figures[ran], strict=True):
             texts[place] = _status(int(code), figures).value, class_name(int(motion))
     return TaskResult(values, texts, state, time.perf_counter() - started)
@@ -122,9 +126,17 @@ def _status(code: int, figures: np.ndarray) -> Status:
     return closed_status(STATUS_OF[code], figures[FIGURES.index("energy_residual")], OPEN_LEDGER)
 
 
+def parts_of(base: Scene) -> dict[str, slice]:
+    """Return the columns of a scene's points behind COLUMNS: "in_plane", "exponents" and "sections"."""
+    in_plane = len(IN_PLANE) * len(base.damper) if base.planar else 0
+    ends = np.cumsum([len(COLUMNS), in_plane, exponent_width(base), section_width(base)]).tolist()
+    names = ("in_plane", "exponents", "sections")
+    return {name: slice(*between) for name, between in zip(names, itertools.pairwise(ends), strict=True)}
+
+
 def width_of(base: Scene) -> int:
     """Return the number of columns of a scene's points."""
-    return len(COLUMNS) + (len(IN_PLANE) * len(base.damper) if base.planar else 0)
+    return int(parts_of(base)["sections"].stop)
 
 
 def broken(error: BaseException, width: int = len(COLUMNS), points: int = 1) -> TaskResult:
@@ -179,13 +191,15 @@ class SweepTable:
 
 
 def _run(
-    maker: Points, point: Mapping[str, Any], start: RestartState | None, row: np.ndarray
+    maker: Points, point: Mapping[str, Any], start: RestartState | None, row: np.ndarray, parts: Mapping[str, slice]
 ) -> tuple[RestartState | None, tuple[str, str]]:
     """Run one point into its row. Returns its last state and its texts."""
     try:
         chosen = maker.chosen(point)
         row[_LINEAR] = _linear(chosen.scene)
         response = simulate(chosen.scene, start=start or chosen.start)
+        if periods := maker.base.kept.get("exponents"):
+            put_exponents(row[parts["exponents"]], chosen.scene, periods, response.final)
     except Exception as error:  # one broken point must not cost the others
         if isinstance(error, StoreError | CacheError) or not isinstance(error, OF_A_POINT):
             where = ", ".join(f"{path} = {value}" for path, value in point.items())
@@ -197,9 +211,11 @@ def _run(
         value = getattr(response, name)
         row[place] = np.nan if value is None else value
     row[len(MEASURES) : len(COLUMNS)] = _shares(np.array([[response.energy[name] for name in LOSSES]]))[0]
-    of_bodies = np.reshape(row[len(COLUMNS) :], (len(IN_PLANE), -1))
+    of_bodies = np.reshape(row[parts["in_plane"]], (len(IN_PLANE), -1))
     for place, name in enumerate(IN_PLANE if of_bodies.size else ()):
         of_bodies[place] = getattr(response, name)  # None, of sliders, is nan
+    section = np.hstack([response.section, response.slip, response.slip_velocity])
+    put_sections(row[parts["sections"]], section[response.transient :])
     return response.final, (response.status.value, response.classification)
 
 

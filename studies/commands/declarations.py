@@ -13,6 +13,7 @@ from vanedamp.studies.commands.support.arguments import (
     json_file,
     mode_count,
     output_file,
+    period_count,
     ratio,
     resume,
     spot_count,
@@ -133,6 +134,10 @@ COMMANDS = (
             input_file("SCENE.toml"), output_file("RESPONSE.h5"), json_file,
             argument("--events", action="store_true", help="keep the list of events"),
             argument("--samples", type=count, default=0, metavar="N", help="keep N samples of every period"),
+            argument(
+                "--exponents", type=period_count, metavar="N",
+                help="Lyapunov exponents by N periods after the run, at least 32: periodic, quasi-periodic or chaotic",
+            ),
         ),
         writes={"output": _RECORD}, reads=_SCENE,
     ),

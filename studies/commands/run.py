@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import replace
 from typing import Any
 
-from vanedamp.coupling.response.response import UNITS
+from vanedamp.coupling.exponents.lyapunov import lyapunov
+from vanedamp.coupling.response.response import UNITS, Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
+from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
@@ -24,6 +27,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
     compile_engine([scene])
     with progress("run") as report:
         response = simulate(scene, arguments.events, arguments.samples, progress=report)
+    if arguments.exponents is not None:
+        response = replace(response, lyapunov=_exponents(scene, arguments.exponents, response))
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
     lines = [
@@ -32,11 +37,24 @@ def run(arguments: Namespace, scene: Scene) -> None:
         for name, value in result.items()
         if not isinstance(value, dict | list)
     ]
+    if (found := response.lyapunov) is not None:
+        lines.append(
+            f"{'motion':26} {found['motion']}: largest exponent {found['exponent']:.4g} +- {found['confidence']:.2g} "
+            f"1/s, {found['exponent_per_period']:.4g} per period ({found['status']}, {found['periods']} periods)"
+        )
 
     def save(path: str) -> None:
         response.save(path, {"versions": versions(), "scene": scene.to_dict()})
 
     write_result(arguments, result, lines, output=save)
+
+
+def _exponents(scene: Scene, periods: int, response: Response) -> dict[str, Any]:
+    """Return the Lyapunov exponents of the motion from the end of a run. Raises InputError for one that ended early."""
+    if response.final is None:
+        raise InputError(f"--exponents: the run ends early ({response.status}); leave the option out")
+    with progress("exponents") as report:
+        return lyapunov(scene, periods, response.final, report).to_json()
 
 
 def _format(value: Any, scale: float) -> str:

@@ -146,9 +146,9 @@ def prepare(folder: Path) -> Structure:
 
 def write_scene(scene: Scene, path: Path, title: str) -> None:
     """Write a scene as one would write it by hand, with comments."""
-    command = "sweep" if scene.sweep else "run"
+    command = "sweep" if scene.axes else "run"
     notes = {"": f"{title}. `vanedamp {command} {path.name}` runs it; every key: `vanedamp schema scene`. SI units."}
-    if isinstance(scene.sweep.get(FREQUENCY), tuple):
+    if isinstance(scene.axes.get(FREQUENCY), tuple):
         notes["sweep"] = "The frequencies lie closer around the resonances with the bodies loose and fixed."
     write_commented(path, relative(short_form(scene), path), KINDS["scene"], notes)
 

@@ -150,7 +150,7 @@ def _ends(scene: Scene, band: Band) -> tuple[float, float]:
 
 def ends_of(scene: Scene) -> tuple[float | None, float | None]:
     """Return lowest and highest frequency that the [sweep] of a scene has, Hz; None without."""
-    axis = scene.sweep.get(FREQUENCY)
+    axis = scene.axes.get(FREQUENCY)
     if axis is None:
         return None, None
     values = [axis.start, axis.stop] if isinstance(axis, Range) else [float(value) for value in axis]

@@ -307,7 +307,7 @@ class Sweep(Stage):
 
     def _check(self, scene: Scene) -> None:
         check_moved(scene)
-        if not scene.sweep:
+        if not scene.axes:
             raise InputError(
                 'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
             )

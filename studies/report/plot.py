@@ -21,6 +21,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
 from vanedamp.studies.identification.record import Identification
+from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.identification_charts import data_figure
@@ -46,17 +47,19 @@ _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
 def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
 
-    A Sweep gives its forced responses, the best of many; a Response its time history (with the walls of its cavities if
-    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; an
-    Identification its measurements over the model; a file of `vanedamp modal` its modes; one
-    of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies. Raises
-    InputError for anything else, and for a response without samples.
+    A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a Response
+    its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and Campbell their
+    diagrams; an Identification its measurements over the model; a file of `vanedamp modal` its modes; one of
+    `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies. Raises InputError for
+    anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
 
 @plot.register
 def _(result: Sweep, scene: Scene | None = None) -> go.Figure:
+    if diagram_axis(result):
+        return bifurcation_figure(result)
     responses = best_first(forced_responses(result))[:_MOST_CURVES]
     return responses_figure(responses, [linear_curves(result, response) for response in responses])
 

@@ -113,6 +113,7 @@ def test_other_forms_of_a_value(text):
         {"ramp": {"from": 1.0, "to": 2.0, "rate": [3.0, 4]}},
         {"sweep": {"damper.0.mass": [1, 2.0], "structure.model": ["rigid"]}},
         {"sweep": {"time.periods": {"start": 1, "stop": 9, "num": 3}}},
+        {"sweep": {"time.periods": [1, 2], "sections": 8, "exponents": 50}},
         {"solver": {}},
         {"solver": {"max_events": 7}},
         {"solver": {"method": "cosim", "substeps": 3}},

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.sweep.further import section_width
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.terminal import duration
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 RUN, TOGETHER = 1.5e-3, 1e-5
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
+#: s of a period whose derivative is followed, with a few impacts (coupling.exponents)
+DERIVATIVE = 5e-3
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
 _IN_PLANE = 20
 #: at most: points of a sweep, bytes of a run, s of a command
@@ -51,6 +54,11 @@ def check_sweep(scene: Scene, workers: int) -> None:
         raise InputError(
             f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
+        )
+    needed = _SAMPLE * section_width(scene) * points
+    if needed > MOST_BYTES:
+        raise InputError(
+            f"sweep.sections: those of {points} points need {_amount(needed)}; at most {_amount(MOST_BYTES)}"
         )
     check_run(scene)
     _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {workers} workers", seconds)
@@ -87,12 +95,17 @@ def scenes_of(study: Study) -> int:
 
 def sweep_seconds(scene: Scene, workers: int) -> float:
     """Return the time of a sweep, s."""
-    return scene.points * run_seconds(scene) / workers
+    return scene.points * (run_seconds(scene) + exponent_seconds(scene)) / workers
+
+
+def exponent_seconds(scene: Scene) -> float:
+    """Return the processor time of the Lyapunov exponents of a point of a sweep, s."""
+    return DERIVATIVE * scene.kept.get("exponents", 0)
 
 
 def beginning(scene: Scene) -> float:
     """Return the processor time of a run in addition to its periods, s: of each point of a scene with a sweep."""
-    return TOGETHER if scene.sweep and len(columned(scene, scene.sweep)) == len(scene.sweep) else RUN
+    return TOGETHER if scene.axes and len(columned(scene, scene.axes)) == len(scene.axes) else RUN
 
 
 def run_seconds(scene: Scene) -> float:

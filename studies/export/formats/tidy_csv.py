@@ -17,7 +17,7 @@ from vanedamp.studies.export.record import Record
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
 ENDINGS = (".csv",)
 OPTIONS = (
-    Option("table", "of a .csv: which rows, such as time, full_period or event of a response", "NAME"),
+    Option("table", "of a .csv: which rows, such as time or event of a response, section of a sweep", "NAME"),
 )  # fmt: skip
 #: tables by kind: dimensions of their rows, the first that a result has is written
 _TABLES = {
@@ -26,27 +26,40 @@ _TABLES = {
     "ring_down": ("cycle", "half_cycle"),
     "modes": ("mode",),
 }  # fmt: skip
+#: dimension of the Poincare sections of a sweep
+_SECTION = "section"
 #: rows that are made at once, and columns that a variable may have
 _CHUNK, _MOST_COLUMNS = 4096, 1000
 
 Column = tuple[str, np.ndarray]
 
 
-def sweep(record: Record, path: Path) -> None:
-    """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures."""
+def sweep(record: Record, path: Path, table: str | None = None) -> None:
+    """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures.
+
+    table: "section" has a row for each Poincare section of every point instead. Raises InputError for other rows, and
+    for sections that the sweep has not kept.
+    """
     axes: Sequence[str] = record.attributes["axes"]
     dims = tuple(axis.replace(".", "_") for axis in axes)
+    known = ("point", *(name for name in (_SECTION,) if any(name in item.dims for item in record.variables.values())))
+    if table is not None and table not in known:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
+    rows = (*dims, _SECTION) if table == _SECTION else dims
     on_grid = {
         name: variable
         for name, variable in record.variables.items()
-        if variable.dims[: len(dims)] == dims and name not in dims
+        if variable.dims[: len(rows)] == rows and name not in dims and (rows != dims or _SECTION not in variable.dims)
     }
     texts = [name for name in ("status", "classification") if name in on_grid]
     names = [*texts, *(name for name in on_grid if name not in texts)]
-    columns = [column for name in names for column in _columns(record, name, len(dims))]
-    given = [record.variables[name] for name in dims]
-    points = np.meshgrid(*(np.asarray(item.values) for item in given), indexing="ij")
-    names = [_headed(axis, item.units) for axis, item in zip(axes, given, strict=True)]
+    columns = [column for name in names for column in _columns(record, name, len(rows))]
+    given = [(axis, record.variables[name]) for axis, name in zip(axes, dims, strict=True)]
+    if rows != dims:
+        count = np.shape(record.variables[names[0]].values)[len(dims)]
+        given.append((_SECTION, Variable(np.arange(1, count + 1))))
+    points = np.meshgrid(*(np.asarray(item.values) for _, item in given), indexing="ij")
+    names = [_headed(axis, item.units) for axis, item in given]
     _write(path, [*zip(names, (values.ravel() for values in points), strict=True), *columns])
 
 

@@ -14,6 +14,14 @@ import numpy as np
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
 from vanedamp.coupling.sweep.sweep import LOSSES
+from vanedamp.studies.report.bifurcation_chart import MOST_PANELS as PANELS
+from vanedamp.studies.report.bifurcation_chart import (
+    bifurcation_figure,
+    bifurcation_header,
+    bifurcation_rows,
+    diagram_axis,
+    diagram_panels,
+)
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.forced_response import (
     ForcedResponse,
@@ -73,6 +81,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
     return {
         "groups": [_group(group, sweeps, page) for group in _by_axis(_responses(sweeps, page))],
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
+        "diagrams": [_diagram(file, sweep, page) for file, sweep in sweeps.items() if diagram_axis(sweep)],
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
     }
@@ -185,6 +194,13 @@ def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
         header = (*states.parameters, "state", *SteadyState._fields)
         shown["counts"] = page.chart("states", count_figure(sweep, states), header, state_rows(sweep, states), [file])
     return shown
+
+
+def _diagram(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
+    """Return the bifurcation diagram of a sweep that keeps sections."""
+    header, panels = bifurcation_header(sweep), len(diagram_panels(sweep))
+    chart = page.chart("bifurcations", bifurcation_figure(sweep), header, bifurcation_rows(sweep), [file])
+    return {"chart": chart, "panels": panels, "drawn": min(panels, PANELS), "exponents": bool(sweep.exponents)}
 
 
 def _map(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:

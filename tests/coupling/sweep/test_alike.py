@@ -68,11 +68,12 @@ def _alone(monkeypatch, scene, points, task):
         return run_points(scene, NOTHING, points, task)
 
 
+@pytest.mark.parametrize("kept", [{}, {"sections": 50}], ids=["", "sections"])
 @pytest.mark.parametrize("linked", [False, True], ids=["apart", "linked"])
 @pytest.mark.parametrize("name", _POINTS)
-def test_points_run_as_one_are_those_run_one_by_one(name, linked, monkeypatch):
+def test_points_run_as_one_are_those_run_one_by_one(name, linked, kept, monkeypatch):
     tables, points = _POINTS[name]
-    scene, task = validate(Scene, tables, "scene"), Task(range(len(points)), linked)
+    scene, task = validate(Scene, tables | {"sweep": kept}, "scene"), Task(range(len(points)), linked)
     one_by_one, runs = _alone(monkeypatch, scene, points, task), []
     run = worker.simulate
     monkeypatch.setattr(worker, "simulate", lambda *args, **options: runs.append(1) or run(*args, **options))
@@ -87,7 +88,7 @@ def test_points_run_as_one_are_those_run_one_by_one(name, linked, monkeypatch):
 
 
 def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
-    scene = validate(Scene, _RIGID, "scene")
+    scene = validate(Scene, _RIGID | {"sweep": {"sections": 6}}, "scene")
     points = [{"damper.0.position": x} for x in (0.0, 1e-3, 3.1e-3, -2e-3)]
     task = Task(range(4))
     found, one_by_one = run_points(scene, NOTHING, points, task), _alone(monkeypatch, scene, points, task)
@@ -98,7 +99,7 @@ def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
 
 def test_runs_after_a_refused_point_are_those_by_themselves(monkeypatch):
     """A place is bounded by a gap: compiled code refuses one point between others, which know nothing of it."""
-    scene, calls = validate(Scene, _ONE, "scene"), []
+    scene, calls = validate(Scene, _ONE | {"sweep": {"sections": 6}}, "scene"), []
     pairs = [(6e-3, 9e-4), (4e-3, -5e-4), (2e-3, 2.5e-3), (3e-3, 2e-4), (2e-3, -2e-3), (5e-3, 1e-3)]
     points, task = [{"cavity.c.gap": gap, "damper.0.position": x} for gap, x in pairs], Task(range(6))
     one_by_one, run = _alone(monkeypatch, scene, points, task), worker._run

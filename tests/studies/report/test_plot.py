@@ -29,6 +29,49 @@ def test_sweep_shows_its_best_curves(tmp_path):
     assert len(vd.plot(tmp_path / "sweep.h5").data) == len(figure.data)
 
 
+def test_sweep_with_sections_shows_its_bifurcation_diagram(tmp_path, monkeypatch):
+    """Every section of every run that is ok is a point, and every exponent has its interval."""
+    monkeypatch.chdir(tmp_path)
+    axes = {"cavity.c1.gap": [3e-4, 5e-4], "excitation.frequency": {"start": 15.6, "stop": 16.0, "num": 3}}
+    body = {"cavity": "c1", "mass": 0.05, "restitution": 0.6, "friction": 0.0}
+    tables = {"time": {"periods": 60, "transient": 0}, "damper": [body], "cavity": [{"name": "c1", "gap": 5e-4}]}
+    data = validate(vd.Scene, OSCILLATOR | tables | {"sweep": axes | {"sections": 12, "exponents": 32}}, "x")
+    sweep = vd.sweep(data)
+    assert (sweep.status == "ok").all()
+    figure = vd.plot(sweep)
+    buttons = figure.layout.updatemenus[0].buttons
+    assert [button.label for button in buttons] == ["structure", "body 1 in its cavity"]
+    for button, values in zip(
+        buttons, (sweep.sections["section_displacement"], sweep.sections["section_slip"]), strict=True
+    ):
+        shown = [trace for trace, seen in zip(figure.data, button.args[1], strict=True) if seen and trace.meta]
+        points = np.concatenate([np.column_stack([trace.x, 1e-6 * trace.y]) for trace in shown])
+        expected = np.column_stack([np.tile(np.repeat(sweep.axes["excitation.frequency"], 12), 2), values.ravel()])
+        np.testing.assert_allclose(points[np.lexsort(points.T)], expected[np.lexsort(expected.T)], rtol=1e-12)
+        assert {trace.name for trace in shown if trace.showlegend} == set(sweep.exponents["motion"].flat)
+    exponents = [trace for trace in figure.data if trace.error_y.array is not None]
+    for trace, values, errors in zip(
+        exponents, sweep.exponents["exponent"], sweep.exponents["exponent_confidence"], strict=True
+    ):
+        np.testing.assert_array_equal(trace.y, values)
+        np.testing.assert_array_equal(trace.error_y.array, errors)
+
+    sweep.save("sweep.h5")
+    assert main(["report", "sweep.h5", "-o", "report.html"]) == 0
+    assert "Bifurcation diagram" in Path("report.html").read_text(encoding="utf-8")
+    plain = vd.sweep(data.replace({"sweep": axes}))
+    assert "Bifurcation diagram" not in vd.plot(plain).to_json()
+    assert main(["export", "sweep.h5", "-o", "points.csv"]) == 0
+    assert main(["export", "sweep.h5", "-o", "sections.csv", "--table", "section"]) == 0
+    with pytest.raises(InputError, match="--table: no rows 'section'"):
+        vd.export(plain, "no.csv", table="section")
+    points, sections = (np.genfromtxt(f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8",
+                                      deletechars="") for name in ("points", "sections"))  # fmt: skip
+    assert len(points) == 6 and not any("section" in name for name in points.dtype.names)
+    assert len(sections) == 72 and sections["section"].tolist() == [*range(1, 13)] * 6
+    np.testing.assert_array_equal(sections["section_slip.1_[m]"], sweep.sections["section_slip"].ravel())
+
+
 def test_run_shows_its_history():
     scene = validate(vd.Scene, OSCILLATOR, "x")
     response = vd.simulate(scene, events=True, samples_per_period=20)

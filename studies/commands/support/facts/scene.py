@@ -24,7 +24,7 @@ from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep
+from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds
 from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
 from vanedamp.studies.commands.support.trial import mean_cost, tried
@@ -40,7 +40,7 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 def facts(path: str | Path) -> list[Fact]:
     """Return the facts of the scene in a file. Raises InputError, as its commands do."""
     scene = load_scene(path)
-    if scene.sweep:
+    if scene.axes:
         check_sweep(scene, available_cores())
     else:
         check_run(scene)
@@ -57,7 +57,7 @@ def facts_of(scene: Scene) -> list[Fact]:
     """Return the facts of a scene, warnings last. Raises InputError for one that cannot run."""
     warnings: list[str] = []
     whole = scene
-    if scene.sweep and not leaves_open(scene):
+    if scene.axes and not leaves_open(scene):
         points = grid(scene)
         scene, warnings = points.base, list(points.warnings)
     scene = replace(scene, sweep={})
@@ -70,7 +70,7 @@ def facts_of(scene: Scene) -> list[Fact]:
     resonance = _resonance(scene)
     if resonance is not None and scene.excitation.signal is None:
         warnings += gap_doubts(scene, _top(scene, resonance))
-    if whole.sweep:
+    if whole.axes:
         warnings += sweep_doubts(_closed(whole))
     found = [*_of_structure(scene), *_of_level(scene, resonance), *_of_bodies(scene, resonance)]
     return [*found, *_of_cost(scene, whole), Fact("warnings", warnings)]
@@ -167,16 +167,17 @@ def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
         yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
     told = "of processor time, by a trial of its first periods"
     yield Fact("run_seconds", mean_cost([lasting]) if scene.moved else None, "s", told)
-    if whole.sweep:
+    if whole.axes:
         points, cores = whole.points, available_cores()
-        cost = mean_cost(list(_some_points(whole)), beginning(whole)) * math.ceil(points / cores)
+        cost = mean_cost(list(_some_points(whole)), beginning(whole)) + exponent_seconds(whole)
+        cost *= math.ceil(points / cores)
         yield Fact("sweep_points", points)
         yield Fact("sweep_seconds", cost, "s", f"on {cores} cores, by trials of {len(tried(points))} points")
 
 
 def _some_points(scene: Scene) -> Iterator[Scene]:
     """Yield points of a sweep that stand for all, with the lengths of their runs."""
-    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    axes = {path: axis_values(values) for path, values in scene.axes.items()}
     points = Points(base_scene(scene))
     for number in tried(scene.points):
         places = np.unravel_index(number, [len(values) for values in axes.values()])

@@ -26,7 +26,7 @@ def sweep_doubts(scene: Scene) -> Iterator[str]:
 
     scene: without open choices. Of the first values of the other axes.
     """
-    swept = resonance_axis(scene, scene.sweep)[0]
+    swept = resonance_axis(scene, scene.axes)[0]
     if swept is None:
         return
     points = grid(replace(scene, sweep={swept: scene.sweep[swept]}))

@@ -1,0 +1,74 @@
+"""What a sweep keeps of a point if its table asks for it: Poincare sections, and Lyapunov exponents."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.exponents.lyapunov import Motion, lyapunov
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.store import frozen, read_only
+
+#: measures of the exponents and their units, each an array over the grid; words, kept as their numbers
+EXPONENTS = {
+    "exponent": "1/s", "exponent_confidence": "1/s", "exponent_second": "1/s", "exponent_per_period": "1",
+}  # fmt: skip
+WORDS = {"motion": tuple(Motion), "exponent_status": tuple(PassageStatus)}
+#: parts of a section and their units, each an array over the grid and the sections, those of bodies over these as well
+SECTIONS = {
+    "section_displacement": "m", "section_velocity": "m/s", "section_slip": "m", "section_slip_velocity": "m/s",
+}  # fmt: skip
+
+
+def exponent_width(base: Scene) -> int:
+    """Return the number of columns of a point's exponents."""
+    return len(EXPONENTS) + len(WORDS) if "exponents" in base.kept else 0
+
+
+def section_width(base: Scene) -> int:
+    """Return the number of columns of a point's sections."""
+    return base.kept.get("sections", 0) * (2 + 2 * len(base.damper))
+
+
+def put_sections(row: np.ndarray, section: np.ndarray) -> None:
+    """Put the last of the sections (p, s) of a run into a row; the first places stay free where there are fewer."""
+    given = row.reshape(-1, section.shape[1])
+    count = min(len(given), len(section))
+    given[len(given) - count :] = section[len(section) - count :]
+
+
+def put_exponents(row: np.ndarray, scene: Scene, periods: int, final: RestartState | None) -> None:
+    """Put the exponents of the motion from the end of a run into a row; final: None of one that ended early."""
+    words = Motion.UNDECIDED, PassageStatus.STOPPED
+    if final is not None:
+        found = lyapunov(scene, periods, final)
+        second = found.exponents[1] if len(found.exponents) > 1 else np.nan
+        row[: len(EXPONENTS)] = found.largest, found.error, second, found.per_period
+        words = found.motion, found.status
+    row[len(EXPONENTS) :] = [known.index(word) for known, word in zip(WORDS.values(), words, strict=True)]
+
+
+def exponents_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the exponents of a grid from the columns (points, n) of its points, words as text."""
+    if not values.shape[1]:
+        return
+    for name, column in zip(EXPONENTS, values.T, strict=False):
+        yield name, read_only(column.reshape(shape))
+    for (name, known), column in zip(WORDS.items(), values.T[len(EXPONENTS) :], strict=True):
+        texts = np.array([*(word.value for word in known), ""], object)  # without a number: a run that broke
+        yield name, frozen(texts[np.nan_to_num(column, nan=-1.0).astype(int)].reshape(shape), object)
+
+
+def sections_of(values: np.ndarray, shape: tuple[int, ...], bodies: int) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the sections of a grid from the columns (points, n) of its points."""
+    if not values.shape[1]:
+        return
+    given = values.reshape(*shape, -1, 2 + 2 * bodies)
+    yield "section_displacement", frozen(given[..., 0])
+    yield "section_velocity", frozen(given[..., 1])
+    if bodies:
+        yield "section_slip", frozen(given[..., 2 : 2 + bodies])
+        yield "section_slip_velocity", frozen(given[..., 2 + bodies :])
