@@ -15,9 +15,14 @@ KINDS = {
         FileKind(
             "pipeline",
             "vanedamp.studies.pipeline.tables:PipelineFile",
-            ("calibrate", "modal", "reduce", "report", "folder"),
+            ("calibrate", "modal", "reduce", "identify", "report", "folder"),
         ),
         FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
+        FileKind(
+            "identification",
+            "vanedamp.studies.identification.tables:IdentificationFile",
+            ("numbers", "forced", "decay", "impacts"),
+        ),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
         FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),

@@ -47,6 +47,10 @@ from vanedamp.rom.reduction import reduce as reduce
 from vanedamp.studies.case.stages import assemble as assemble
 from vanedamp.studies.case.tables import Case as Case
 from vanedamp.studies.export.export import export as export
+from vanedamp.studies.identification.density import LogDensity as LogDensity
+from vanedamp.studies.identification.record import Identification as Identification
+from vanedamp.studies.identification.search import identify as identify
+from vanedamp.studies.identification.study import IdentificationStudy as IdentificationStudy
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study
 from vanedamp.studies.parallel_sweep import sweep as sweep

@@ -57,6 +57,7 @@ PARTS = (
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),
+    Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density")),
 )
 
 

@@ -190,6 +190,15 @@ COMMANDS = (
         writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(
+        "identify", "numbers of a scene from measurements, with what these tell of each", 95,
+        (
+            input_file("STUDY.toml"), output_file("IDENTIFICATION.h5"),
+            argument("--scene", metavar="TUNED.toml", help="the scene with the numbers found"),
+            json_file, workers,
+        ),
+        writes={"output": _RECORD, "scene": (".toml",)},
+    ),
+    Command(
         "report", "one HTML page of results", 100,
         (
             output_file("REPORT.html", required=True),

@@ -208,6 +208,15 @@ def _optimisation(record: _Record) -> Iterator[Fact]:
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
 
 
+def _identification(record: _Record) -> Iterator[Fact]:
+    attributes = record.attributes
+    yield Fact("status", attributes["status"])
+    yield Fact("answer", attributes["sentence"])
+    yield Fact("notes", list(attributes["notes"]))
+    yield Fact("measured", len(record.variables["data_value"].values), "", "values")
+    yield Fact("counts", attributes["counts"], "", "engine runs and evaluations of period maps")
+
+
 def _any(record: _Record) -> Iterator[Fact]:
     """Yield the numbers and words of a record of another kind."""
     for name, value in record.attributes.items():
@@ -241,6 +250,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "ramp": ("run-ups and run-downs", "ramp", _ramp),
     "ring_down": ("a ring-down", "ringdown", _ring_down),
     "optimisation": ("an optimisation", "optimise", _optimisation),
+    "identification": ("numbers of a scene from measurements", "identify", _identification),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),
     "system-matrices": ("matrices of finite elements", None, _any),

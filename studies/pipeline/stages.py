@@ -26,6 +26,7 @@ from vanedamp.studies.pipeline.tables import (
     REDUCED,
     RIGID_SCENE,
     TUNED_CASE,
+    IdentifyStage,
     PipelineFile,
     ReduceStage,
     SweepStage,
@@ -204,6 +205,47 @@ class Reduce(CaseStage):
 
 
 @dataclass(frozen=True)
+class Identify(Stage):
+    """From measurements to the numbers of a scene, and the scene with them."""
+
+    table: IdentifyStage
+
+    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+        """Check the study, and return it, its scene and the measurements."""
+        from vanedamp.studies.identification.study import IdentificationStudy
+
+        study = IdentificationStudy.load(self.file)
+        check_scene(study.base, False)
+        return [self.file, *self._named(), *study.scene.files]
+
+    def _named(self) -> list[Path]:
+        """Return the files that the study names."""
+        tables = read_toml(self.file)
+        measured = [entry for kind in ("forced", "decay", "impacts") for entry in tables.get(kind, ())]
+        return [self.file.parent / name for name in (tables["scene"], *(entry["file"] for entry in measured))]
+
+    def inputs(self) -> dict[str, Any]:
+        """Return the study, its scene, and the files that both name."""
+        scene, *measured = self._named()
+        files: list[str | Path] = [*measured, *Scene.load(scene).files]
+        of = {f"study {self.file.name}": read_toml(self.file), f"scene {scene.name}": read_toml(scene)}
+        return of | _digests(files, self.file.parent) | _software()
+
+    def work(self, tools: Tools) -> str:
+        """Identify."""
+        from vanedamp.studies.identification.search import identify
+        from vanedamp.studies.terminal import progress
+
+        with progress(self.name) as report:
+            found = identify(self.file, tools.pool(), report, {"versions": versions()})
+        record, scene = self.outputs
+        found.save(record)
+        found.save_scene(scene)
+        tools.warn(found.notes)
+        return f"{found.status.value}, {found.sentence.removesuffix('.')}"
+
+
+@dataclass(frozen=True)
 class Sweep(Stage):
     """From a scene to its sweep. products: the files of the rigid model and of the reduced one, by their kind."""
 
@@ -371,6 +413,10 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         yield Reduce("reduce", case, (folder / REDUCED,), tuned, pipeline.reduce)
         products["reduced"] = folder / REDUCED
         made.append(folder / REDUCED)
+    for one in pipeline.identify:
+        files = (folder / f"{one.stem}.h5", folder / one.scene)
+        yield Identify(f"identify {one.stem}", (base / one.study).resolve(), files, (), one)
+        made.append(files[0])
     for table in pipeline.sweep:
         stage = _sweep(table, base, folder, products, pipeline)
         yield stage
@@ -384,7 +430,7 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
 def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path], pipeline: PipelineFile) -> Sweep:
     scene = (base / table.scene).resolve()
     takes = []
-    if pipeline.calibrate is not None and scene == folder / RIGID_SCENE:
+    if scene in [folder / name for name in pipeline.scenes_made]:
         takes.append(scene)
     if table.structure == "rigid" or table.level is not None:
         takes.append(products["rigid"])

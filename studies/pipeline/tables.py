@@ -46,6 +46,26 @@ class ReduceStage:
 
 
 @dataclass(frozen=True, config=STRICT)
+class IdentifyStage:
+    """Stage `identify`: numbers of a scene from measurements, and the scene with them, for a sweep."""
+
+    study: str
+    """study file of `vanedamp identify`, relative to the pipeline's"""
+    name: str | None = None
+    """name of the stage and of its results NAME.h5 and NAME_found.toml, the scene; left out: that of the study file"""
+
+    @property
+    def stem(self) -> str:
+        """The name of the result files, without suffix."""
+        return self.name or Path(self.study).stem
+
+    @property
+    def scene(self) -> str:
+        """The name of the scene file that it writes."""
+        return f"{self.stem}_found.toml"
+
+
+@dataclass(frozen=True, config=STRICT)
 class SweepStage:
     """Stage `sweep`: a run at every point of a scene's [sweep] grid."""
 
@@ -81,8 +101,8 @@ class ReportStage:
 
 @dataclass(frozen=True, config=STRICT)
 class PipelineFile:
-    """A pipeline: a stage runs if its table is there, an empty one too, in the order calibrate, modal, reduce, sweep,
-    report."""
+    """A pipeline: a stage runs if its table is there, an empty one too, in the order calibrate, modal, reduce,
+    identify, sweep, report."""
 
     case: str | None = None
     """case file of calibrate, modal and reduce, relative to this file"""
@@ -94,6 +114,8 @@ class PipelineFile:
     """modes, effective masses, rigid model"""
     reduce: ReduceStage | None = None
     """reduced model at the case's interface"""
+    identify: tuple[IdentifyStage, ...] = ()
+    """numbers of scenes from measurements, one table each"""
     sweep: tuple[SweepStage, ...] = ()
     """scenes to run, one table each"""
     report: ReportStage | None = None
@@ -105,10 +127,13 @@ class PipelineFile:
             raise ValueError(f"case: missing; [{structural[0]}] needs a case file")
         if self.case is not None and not structural:
             raise ValueError("case: no stage takes it; give [calibrate], [modal] or [reduce], or leave it out")
-        if not (structural or self.sweep):
-            raise ValueError("sweep: missing; give a stage: [calibrate], [modal], [reduce] or [[sweep]]")
+        if not (structural or self.sweep or self.identify):
+            raise ValueError("sweep: missing; give a stage: [calibrate], [modal], [reduce], [[identify]] or [[sweep]]")
+        for index, one in enumerate(self.identify):
+            self._check_name(f"identify[{index}]", one)
         for index, table in enumerate(self.sweep):
             self._check_sweep(f"sweep[{index}]", table)
+            self._check_name(f"sweep[{index}]", table)
 
     def _check_sweep(self, key: str, table: SweepStage) -> None:
         rigid = self.calibrate is not None or self.modal is not None
@@ -118,10 +143,14 @@ class PipelineFile:
             raise ValueError(f'{key}.structure: "reduced" is that of [reduce]; add this table')
         if table.level is not None and not rigid:
             raise ValueError(f'{key}.level: "fatigue" is that of [calibrate] or [modal]; add one of these tables')
+
+    def _check_name(self, key: str, table: SweepStage | IdentifyStage) -> None:
         if not table.stem or Path(table.stem).name != table.stem:
             raise ValueError(f"{key}.name: expected a file name without folder and suffix, not '{table.stem}'")
-        if sum(other.stem == table.stem for other in self.sweep) > 1:
-            raise ValueError(f"{key}.name: two sweeps have the name '{table.stem}'; give one of them another")
+        sweeps, others = [one.stem for one in self.sweep], [one.stem for one in self.identify]
+        if (sweeps + others).count(table.stem) > 1:
+            kind = "stages" if table.stem in others else "sweeps"
+            raise ValueError(f"{key}.name: two {kind} have the name '{table.stem}'; give one of them another")
 
     @classmethod
     def load(cls, path: str | Path) -> PipelineFile:
@@ -135,10 +164,16 @@ class PipelineFile:
     @property
     def named_files(self) -> dict[str, str]:
         """The files that it names, by their keys."""
+        studies = {f"identify[{index}].study": table.study for index, table in enumerate(self.identify)}
         scenes = {f"sweep[{index}].scene": table.scene for index, table in enumerate(self.sweep)}
         further = {} if self.report is None else {f"report.results[{i}]": n for i, n in enumerate(self.report.results)}
-        return ({} if self.case is None else {"case": self.case}) | scenes | further
+        return ({} if self.case is None else {"case": self.case}) | studies | scenes | further
 
     def makes(self, name: str) -> bool:
-        """Say whether a scene is the one that `calibrate` writes."""
-        return self.calibrate is not None and Path(name).name == RIGID_SCENE
+        """Say whether a scene is one that `calibrate` or `identify` writes."""
+        return Path(name).name in self.scenes_made
+
+    @property
+    def scenes_made(self) -> list[str]:
+        """Names of the scenes that stages write."""
+        return [RIGID_SCENE] * (self.calibrate is not None) + [table.scene for table in self.identify]

@@ -52,7 +52,8 @@ def summary(results: Results, page: Any) -> dict[str, Any]:
         history = next(iter(results.kinds["response"].values())).record
         scene = history.scene
         answer.append(_of_run(history.measures))
-    answer += [result.record.sentence for result in results.kinds["optimisation"].values()]
+    for kind in ("optimisation", "identification"):
+        answer += [result.record.sentence for result in results.kinds[kind].values()]
     picture, facts, mass = _structure(results, scene)
     bodies = [] if scene is None else list(_bodies(scene, mass))
     return {"picture": picture, "facts": facts, "bodies": bodies, "answer": answer, "chart": chart}

@@ -23,6 +23,7 @@ FILES = {
     "work-precision": {f"work_precision.{ending}" for ending in ("json", "csv", "png")},
     "stability": {f"stability.{ending}" for ending in ("json", "csv", "png")},
     "sensitivity": {f"bench_sensitivity.{ending}" for ending in ("json", "csv")},
+    "identification": {f"bench_identification.{ending}" for ending in ("json", "csv")},
     "doubling": {f"bench_doubling.{ending}" for ending in ("json", "csv", "png")},
     "ladder": {
         "ladder.json", "ladder_rom.h5", "auto_beam.h5", "auto_cluster.h5", "auto.csv", "bodies.csv",

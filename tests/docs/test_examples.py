@@ -21,12 +21,14 @@ from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.external_model import External
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
+from vanedamp.studies.identification.tables import IdentificationFile
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.pipeline.tables import PipelineFile
 
@@ -93,7 +95,7 @@ OSCILLATOR = changed(SCENE, ("stiffness = 1e4", "stiffness = 2.26e8"), ("frequen
 
 def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
-    if "matrices" in tables:
+    if {"matrices", "numbers"} & tables.keys():
         return tables
     scene = {
         "structure",
@@ -134,6 +136,8 @@ def test_files_are_read(example, tmp_path):
     path.write_text(tomli_w.dumps(whole))
     if "matrices" in tables:
         assert External.read(path).interface.keys() == tables["interface"].keys()
+    elif "numbers" in tables:
+        assert len(validate(IdentificationFile, tables, "study").numbers) == 2
     elif "optimise" in tables:
         assert Study.load(path).table.variables.bodies == (1, 4)
     elif "orbit" in tables:

@@ -44,5 +44,7 @@ def faults(kind: str, tables: dict[str, Any]) -> list[str]:
 
 def kind_of(tables: dict[str, Any]) -> str:
     """The kind of a file, from its tables."""
-    names = {"matrices": "external", "optimise": "study", "mesh": "case", "report": "pipeline"}
+    names = {
+        "matrices": "external", "numbers": "identification", "optimise": "study", "mesh": "case", "report": "pipeline",
+    }  # fmt: skip
     return next((kind for table, kind in names.items() if table in tables), "scene")

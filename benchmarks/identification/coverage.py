@@ -1,0 +1,40 @@
+"""How often intervals cover the truth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.identification.truth import TRUTH, study
+from vanedamp.studies.identification.fit import Fit
+from vanedamp.studies.identification.statistics import covariance, held_at
+
+#: fall of the misfit by which a minimum with a number held shows that the free one was none
+_LOWER = 0.01
+
+
+def rises(seeds: range) -> list[dict[str, Any]]:
+    """Return for each data set the misfit, the best numbers, and the rise of the misfit with each number at its truth.
+
+    The interval of a number covers the truth if that rise is below the threshold. Searches begin at the truth.
+    """
+    return [_rises(seed) for seed in seeds]
+
+
+def _rises(seed: int) -> dict[str, Any]:
+    sought = study(seed)
+    fit, truth = Fit(sought), sought.coordinates(TRUTH)
+    best = fit.minimum(truth)
+    for _ in range(3):
+        scatter = covariance(fit.jacobian(best.z))
+        held = [held_at(fit, best, scatter, number, float(truth[number])) for number in range(len(truth))]
+        lowest = min(held, key=lambda each: each.misfit)
+        if lowest.misfit > best.misfit - _LOWER:
+            break
+        best = fit.minimum(lowest.z)
+    return {
+        "seed": seed, "misfit": best.misfit, "best": sought.values(best.z).tolist(),
+        "deviation": (np.sqrt(np.diag(scatter)) * sought.slope(sought.values(best.z))).tolist(),
+        "rise": [each.misfit - best.misfit for each in held],
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Numbers of a scene from measurements, with what the measurements tell of each."""

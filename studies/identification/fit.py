@@ -1,0 +1,181 @@
+"""The misfit of a scene's numbers to measurements, as a sum of squares, and its minimum near a start."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from vanedamp.studies.identification.data import Channel, Measured
+from vanedamp.studies.identification.decay import Decay
+from vanedamp.studies.identification.forced import Forced
+from vanedamp.studies.identification.impacts import Impacts
+from vanedamp.studies.identification.model import Model, Predicted, Values
+from vanedamp.studies.identification.study import IdentificationStudy
+
+_MODELS: dict[str, type[Model]] = {"forced": Forced, "decay": Decay, "impacts": Impacts}
+#: residual, in standard deviations, of a value of which the model says nothing, and the largest of others
+_NOTHING = 30.0
+#: relative standard deviation that is assumed before the residuals tell it
+_ASSUMED = 0.05
+#: changes of the sum of squares, relative, and of the coordinates at which the minimum is found; most predictions
+_CLOSE, _STILL, _MOST = 1e-5, 1e-7, 60
+#: change of the residuals, in standard deviations together, over which their derivatives are the same
+_STRAIGHT = 0.5
+
+
+class Minimum(NamedTuple):
+    """Where a search has ended: coordinates (P,), sum of squares, and whether it converged."""
+
+    z: np.ndarray
+    misfit: float
+    converged: bool
+
+
+class Fit:
+    """Predictions of all measurements, and their weighted residuals (N,) with derivatives (N, P).
+
+    Numbers are given by coordinates z (P,) from 0 to 1 between their bounds (IdentificationStudy.coordinates).
+    deviations: standard deviation of each channel; count: of engine runs and passages.
+    """
+
+    def __init__(self, study: IdentificationStudy, deviations: Sequence[float] | None = None) -> None:
+        self.study, self.count = study, Counter[str]()
+        self.models = [_MODELS[one.kind](study, one, self.count) for one in study.measured]
+        self.channels: list[Channel] = [channel for one in study.measured for channel in one.channels]
+        self.deviations = list(map(_assumed, self.channels) if deviations is None else map(float, deviations))
+        self._priors = [(place, one.prior) for place, one in enumerate(study.numbers.values()) if one.prior]
+        self._last: tuple[np.ndarray, list[Predicted]] | None = None
+
+    @property
+    def estimated(self) -> list[bool]:
+        """Which channels have deviations from the residuals."""
+        return [channel.deviation is None for channel in self.channels]
+
+    def quick(self, z: np.ndarray) -> float:
+        """Return the sum of squares by runs from the scene's own start."""
+        values = self.study.values(z)
+        residual = self._residual(values, [model.quick(values) for model in self.models])
+        return float(residual @ residual)
+
+    def predict(self, z: np.ndarray) -> list[Predicted]:
+        """Return the predictions of all measurements."""
+        if self._last is None or not np.array_equal(self._last[0], z):
+            values = self.study.values(z)
+            self._last = np.array(z), [model.predict(values) for model in self.models]
+        return self._last[1]
+
+    def residual(self, z: np.ndarray) -> np.ndarray:
+        """Return the residuals (N,), in standard deviations: of channels, then of priors."""
+        return self._residual(self.study.values(z), self.predict(z))
+
+    def compared(self, z: np.ndarray) -> list[tuple[Measured, Channel, np.ndarray, np.ndarray]]:
+        """Return each channel with its measurement, the model's values (n,), and whether its motions repeat (n,)."""
+        return [
+            (measured, channel, one.values[channel.name], one.repeats)
+            for measured, one in zip(self.study.measured, self.predict(z), strict=True) for channel in measured.channels
+        ]  # fmt: skip
+
+    def by_channel(self, z: np.ndarray) -> list[np.ndarray]:
+        """Return the differences (n,) of the channels, not weighted; nan where the model says nothing."""
+        return [channel.difference(values) for channel, values, _ in self._pairs(self.predict(z))]
+
+    def jacobian(self, z: np.ndarray) -> np.ndarray:
+        """Return the derivatives (N, P) of the residuals by the coordinates."""
+        values, found = self.study.values(z), self.predict(z)
+        slope, rows = self.study.slope(values), list[np.ndarray]()
+        of = [model.derivative(values) for model in self.models]
+        for (channel, model, error), derivative, deviation in zip(
+            self._pairs(found), self._each(of), self.deviations, strict=True
+        ):
+            row = channel.slope(model, derivative) * slope / np.hypot(deviation, error)[:, None]
+            rows.append(np.where(np.isfinite(row), row, 0.0))
+        rows += [np.eye(len(z))[[place]] * slope[place] / prior.deviation for place, prior in self._priors]
+        return np.concatenate(rows)
+
+    def sensitivity(self, z: np.ndarray) -> list[np.ndarray]:
+        """Return the derivatives (n, P) of the channels' values by the coordinates."""
+        values = self.study.values(z)
+        self.predict(z)
+        return [each * self.study.slope(values) for each in self._each([m.derivative(values) for m in self.models])]
+
+    def minimum(self, z: np.ndarray, held: Sequence[int] = (), close: float = _CLOSE, most: int = _MOST) -> Minimum:
+        """Return the minimum near a start, some coordinates held."""
+        free = np.setdiff1d(np.arange(len(z)), held)
+        if not len(free):
+            residual = self.residual(z)
+            return Minimum(np.array(z), float(residual @ residual), True)
+
+        def full(part: np.ndarray) -> np.ndarray:
+            whole = np.array(z)
+            whole[free] = part
+            return whole
+
+        slopes = _Slopes(self)
+        found = least_squares(
+            lambda part: self.residual(full(part)), np.clip(z[free], 1e-9, 1 - 1e-9),
+            lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0), ftol=close, xtol=_STILL, gtol=1e-12,
+            max_nfev=most,
+        )  # fmt: skip
+        return Minimum(full(found.x), float(2.0 * found.cost), bool(found.status > 0))
+
+    def estimate(self, z: np.ndarray) -> bool:
+        """Take the deviations that are not given from the residuals at z. Returns whether any changed by 2 %."""
+        share = 1.0 - len(z) / max(sum(len(channel.values) for channel in self.channels), len(z) + 1)
+        changed = False
+        for place, (channel, off) in enumerate(zip(self.channels, self.by_channel(z), strict=True)):
+            off = off[np.isfinite(off)]
+            if channel.deviation is None and len(off):
+                floor = 1e-9 * (1.0 if channel.compare == "ratio" else float(np.abs(channel.values).max()))
+                own = max(float(np.sqrt(off @ off / (len(off) * share))), floor)
+                changed = changed or abs(own / self.deviations[place] - 1.0) > 0.02
+                self.deviations[place] = own
+        return changed
+
+    def _residual(self, values: np.ndarray, found: list[Predicted]) -> np.ndarray:
+        rows = []
+        for (channel, model, error), deviation in zip(self._pairs(found), self.deviations, strict=True):
+            row = channel.difference(model) / np.hypot(deviation, error)
+            rows.append(np.where(np.isfinite(row), row, _NOTHING))
+        rows += [np.array([(values[place] - prior.mean) / prior.deviation]) for place, prior in self._priors]
+        return np.concatenate(rows)
+
+    def _pairs(self, found: list[Predicted]) -> list[tuple[Channel, np.ndarray, np.ndarray]]:
+        """Return each channel with the model's values (n,) and their own errors in its terms (n,)."""
+        pairs = []
+        for measured, one in zip(self.study.measured, found, strict=True):
+            for channel in measured.channels:
+                values = one.values[channel.name]
+                size = np.abs(values) if channel.compare == "difference" else 1.0
+                pairs.append((channel, values, one.errors * size))
+        return pairs
+
+    def _each(self, of: list[Values]) -> list[np.ndarray]:
+        """Return arrays by channel in the order of the channels."""
+        return [
+            arrays[channel.name] for measured, arrays in zip(self.study.measured, of, strict=True)
+            for channel in measured.channels
+        ]  # fmt: skip
+
+
+class _Slopes:
+    """Derivatives of residuals on the way to a minimum, where residuals are nearly straight those of a place before."""
+
+    def __init__(self, fit: Fit) -> None:
+        self._fit = fit
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def at(self, z: np.ndarray) -> np.ndarray:
+        """Return the derivatives (N, P)."""
+        if self._last is None or float(np.linalg.norm(self._last[1] @ (z - self._last[0]))) > _STRAIGHT:
+            self._last = np.array(z), self._fit.jacobian(z)
+        return self._last[1]
+
+
+def _assumed(channel: Channel) -> float:
+    if channel.deviation is not None:
+        return channel.deviation
+    return _ASSUMED if channel.compare != "difference" else _ASSUMED * float(np.abs(channel.values).max())

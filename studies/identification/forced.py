@@ -1,0 +1,100 @@
+"""Forced responses: the steady motion at each measured frequency."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.studies.identification.data import Measured
+from vanedamp.studies.identification.model import Model, Predicted, Values
+from vanedamp.studies.identification.steady import Follower, Steady, over_orbit, run
+from vanedamp.studies.identification.study import IdentificationStudy
+
+#: steps of differences over the range of a number: of motions that are exact, and of means of runs
+_EXACT, _MEAN = 1e-5, 2e-2
+#: half width of a 95 % confidence interval over the standard deviation
+_NORMAL = 1.96
+_TINY = float(np.finfo(float).tiny)
+
+
+class Forced(Model):
+    """A measured forced response."""
+
+    def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
+        super().__init__(study, measured, count)
+        self._names = (measured.measure, *(["phase"] if len(measured.channels) > 1 else []))
+        self._followers = [Follower(study.paths, count) for _ in measured.at]
+
+    def quick(self, values: np.ndarray) -> Predicted:
+        """Return the prediction by runs; those that go up or down begin with the state of their neighbour."""
+        motions: list[Steady | None] = [None] * len(self._followers)
+        before: RestartState | None = None
+        for place, linked in self._order():
+            scene = self._at(values, place)
+            motions[place] = None if scene is None else run(scene, before if linked else None, self.count)
+            before = _end(motions[place])
+        return self._predicted(motions)
+
+    def predict(self, values: np.ndarray) -> Predicted:
+        """Return the prediction by orbits near the last ones, and by runs where there are none."""
+        before: RestartState | None = None
+        for place, linked in self._order():
+            found = self._followers[place].follow(self._at(values, place), values, before if linked else None)
+            before = _end(found)
+        return self._predicted([follower.motion for follower in self._followers])
+
+    def derivative(self, values: np.ndarray) -> Values:
+        """Return the derivatives: of orbits exact ones, of means of runs differences."""
+        of = np.array([self._slopes(values, place) for place in range(len(self._followers))]).transpose(1, 0, 2)
+        return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
+
+    def _order(self) -> Iterator[tuple[int, bool]]:
+        """Yield places as they were measured, and whether each was reached from the one before."""
+        direction, at = np.array(self.measured.direction), self.measured.at
+        for way in ("", "up", "down"):
+            places = np.flatnonzero(direction == way)
+            places = places[np.argsort(-at[places] if way == "down" else at[places], kind="stable")]
+            for number, place in enumerate(places.tolist()):
+                yield place, bool(way) and number > 0
+
+    def _slopes(self, values: np.ndarray, place: int) -> np.ndarray:
+        """Return derivatives (c, P) of the channels at a place."""
+        follower = self._followers[place]
+        found, motion = follower.sensitivity(), follower.motion
+        if found is not None:
+            return np.array([found.derivatives[name] for name in self._names])
+        if motion is None:
+            return np.zeros((len(self._names), len(values)))
+
+        def figures(moved: np.ndarray) -> np.ndarray:
+            return self._figures(follower.near(self._at(moved, place)) or motion)[0]
+
+        return self.differences(values, figures, _MEAN if motion.orbit is None else _EXACT)
+
+    def _at(self, values: np.ndarray, place: int) -> Scene | None:
+        return self.scene(values, {FREQUENCY: float(self.measured.at[place])})
+
+    def _figures(self, steady: Steady) -> tuple[np.ndarray, float]:
+        """Return the measured quantities (c,) of a motion, and the relative error of the amplitude."""
+        if steady.orbit is not None and self._names in (("amplitude_mean",), ("amplitude_max",)):
+            return np.array([getattr(steady.orbit, self._names[0])]), 0.0
+        response = steady.response or over_orbit(steady, self.count)
+        figures = np.array([getattr(response, name) for name in self._names])
+        error = response.amplitude_mean_confidence if steady.orbit is None else 0.0
+        return figures, (error or 0.0) / _NORMAL / max(response.amplitude_mean, _TINY)
+
+    def _predicted(self, motions: Sequence[Steady | None]) -> Predicted:
+        nothing = np.full(len(self._names), np.nan), 0.0
+        figures, errors = zip(*(nothing if one is None else self._figures(one) for one in motions), strict=True)
+        of = dict(zip((channel.name for channel in self.measured.channels), np.transpose(figures), strict=True))
+        repeats = [one is not None and not error for one, error in zip(motions, errors, strict=True)]
+        return Predicted(of, np.array(errors), np.array(repeats))
+
+
+def _end(steady: Steady | None) -> RestartState | None:
+    return None if steady is None else steady.restart

@@ -1,0 +1,70 @@
+"""What a scene with given numbers predicts of a measurement, with derivatives by the numbers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import Points
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.identification.data import Measured
+from vanedamp.studies.identification.study import IdentificationStudy
+
+#: arrays by the names of a measurement's channels
+Values = dict[str, np.ndarray]
+
+
+class Predicted(NamedTuple):
+    """What a model says of a measurement at n places.
+
+    values: (n,) by channel, nan where the model says nothing; errors: (n,) standard deviations, relative or of angles,
+    where they are means of runs; repeats: (n,) whether the motion repeats, or is one run.
+    """
+
+    values: Values
+    errors: np.ndarray
+    repeats: np.ndarray
+
+
+class Model(ABC):
+    """What scenes say of one measurement. count: of engine runs, to which it adds."""
+
+    def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
+        self.measured, self.paths, self.count = measured, study.paths, count
+        self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
+        self._points = Points(study.base.replace(measured.changes))
+
+    def scene(self, values: np.ndarray, further: Mapping[str, float] | None = None) -> Scene | None:
+        """Return the scene with values (P,) of the numbers; None where they make no scene."""
+        try:
+            return self._points.scene(dict(zip(self.paths, map(float, values), strict=True)) | dict(further or {}))
+        except InputError:
+            return None
+
+    @abstractmethod
+    def quick(self, values: np.ndarray) -> Predicted:
+        """Return the prediction of values (P,) of the numbers by runs from the scene's own start."""
+
+    @abstractmethod
+    def predict(self, values: np.ndarray) -> Predicted:
+        """Return the prediction of values (P,) of the numbers, from the last motions found where that is faster."""
+
+    @abstractmethod
+    def derivative(self, values: np.ndarray) -> Values:
+        """Return derivatives (n, P) of the channels at values of the numbers that `predict` was called with last."""
+
+    def differences(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float) -> np.ndarray:
+        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges."""
+        low, high = self._bounds
+        columns = []
+        for place, size in enumerate(step * (high - low)):
+            ends = np.array([values, values])
+            ends[:, place] = np.clip(values[place] + [-size, size], low[place], high[place])
+            below, above = (of(end) for end in ends)
+            columns.append((above - below) / (ends[1, place] - ends[0, place]))
+        return np.stack(columns, axis=-1)

@@ -1,0 +1,141 @@
+"""The file of an identification: which numbers of a scene are sought, and which measurements tell them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.paths import Range
+from vanedamp.files.toml_input import STRICT, Positive, Real, Whole
+
+_INLINE = STRICT | ConfigDict(json_schema_extra={"x-inline": True})
+
+
+@dataclass(frozen=True, config=_INLINE)
+class Prior:
+    """What is known of a number beforehand: a normal distribution."""
+
+    mean: Real
+    """expected value [unit of the number]"""
+    deviation: Positive
+    """standard deviation [unit of the number]"""
+
+
+@dataclass(frozen=True, config=STRICT)
+class Number:
+    """A number of the scene that is sought, between bounds."""
+
+    min: Real
+    """smallest value that it may have [unit of the number]"""
+    max: Real
+    """largest value that it may have [unit of the number]"""
+    start: Real | None = None
+    """value that is tried first (default: the scene's) [unit of the number]"""
+    scale: Literal["linear", "log"] = "linear"
+    """how values between the bounds are spread: "log" for a number that is known to some powers of ten"""
+    prior: Prior | None = None
+    """what is known of it beforehand (default: nothing but the bounds)"""
+
+    def __post_init__(self) -> None:
+        if self.min >= self.max:
+            raise ValueError(f"max: expected more than min = {self.min:g}, not {self.max:g}")
+        if self.start is not None and not self.min <= self.start <= self.max:
+            raise ValueError(f"start: expected {self.min:g} to {self.max:g}, not {self.start:g}")
+        if self.scale == "log" and self.min <= 0.0:
+            raise ValueError(f'min: expected a positive number with scale = "log", not {self.min:g}')
+
+
+@dataclass(frozen=True, config=STRICT)
+class MeasuredTable:
+    """A measurement: its file, and how the scene differs from that of the study as it was made."""
+
+    file: str
+    """CSV file, relative to this one"""
+    set: dict[str, Real] = Field(default_factory=dict)
+    """numbers of the scene as the measurement was made, by their dotted paths [units of the numbers]"""
+    noise: Annotated[Real, Field(gt=0, lt=1)] | None = None
+    """standard deviation of an amplitude or a speed, relative (default, without `deviation`: from the residuals) [-]"""
+
+
+@dataclass(frozen=True, config=STRICT)
+class ForcedTable(MeasuredTable):
+    """A forced response: frequency_hz, amplitude_m and, if measured, phase_rad and direction (up or down)."""
+
+    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] = "amplitude_mean"
+    """which amplitude of a response was measured, by its name there"""
+    deviation: Positive | None = None
+    """standard deviation of an amplitude in place of a relative one [m]"""
+    phase_deviation: Positive | None = None
+    """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
+
+    def __post_init__(self) -> None:
+        _one_noise(self)
+
+
+@dataclass(frozen=True, config=STRICT)
+class DecayTable(MeasuredTable):
+    """A decay as the scene's [ring_down] says: time_s, and amplitude_m, half a swing between turning points, or the
+    history displacement_m, velocity_m_s or acceleration_m_s2."""
+
+    deviation: Positive | None = None
+    """standard deviation of an amplitude in place of a relative one, or of a history [unit of the column]"""
+
+    def __post_init__(self) -> None:
+        _one_noise(self)
+
+
+@dataclass(frozen=True, config=STRICT)
+class ImpactsTable(MeasuredTable):
+    """Impacts of the steady motion: time_s since the start of a period of the excitation, and speed_m_s."""
+
+    deviation: Positive | None = None
+    """standard deviation of a speed in place of a relative one [m/s]"""
+    time_deviation: Positive | None = None
+    """standard deviation of a time (default: from the residuals) [s]"""
+
+    def __post_init__(self) -> None:
+        _one_noise(self)
+
+
+def _one_noise(table: Any) -> None:
+    if table.noise is not None and table.deviation is not None:
+        raise ValueError("give one of noise (relative) and deviation")
+
+
+@dataclass(frozen=True, config=STRICT)
+class SearchTable:
+    """How the numbers are sought."""
+
+    candidates: Annotated[Whole, Field(ge=1, le=100_000)] = 128
+    """sets of numbers that are tried first, spread between the bounds"""
+    starts: Annotated[Whole, Field(ge=1, le=1000)] = 3
+    """best ones of these from which the search with derivatives begins"""
+    seed: Annotated[Whole, Field(ge=0)] = 1
+    """seed of the candidates"""
+
+
+@dataclass(frozen=True, config=STRICT)
+class IdentificationFile:
+    """A scene, the numbers of it that are sought, and measurements."""
+
+    scene: str
+    """scene file, relative to this one"""
+    numbers: Annotated[dict[str, Number], Field(min_length=1)]
+    """the numbers that are sought, by their dotted paths as axes of a sweep have them"""
+    forced: tuple[ForcedTable, ...] = ()
+    """forced responses, one table each"""
+    decay: tuple[DecayTable, ...] = ()
+    """decays, one table each"""
+    impacts: tuple[ImpactsTable, ...] = ()
+    """times and speeds of impacts, one table each"""
+    search: SearchTable = Field(default_factory=SearchTable)
+    """how the numbers are sought"""
+    propose: dict[str, Range | Annotated[tuple[Real, ...], Field(min_length=1)]] = Field(default_factory=dict)
+    """measurements of forced responses to choose the next from: values by paths, all combinations (default: levels and
+    frequencies around the measured ones)"""
+
+    def __post_init__(self) -> None:
+        if not (self.forced or self.decay or self.impacts):
+            raise ValueError("forced: missing; give a measurement: [[forced]], [[decay]] or [[impacts]]")
