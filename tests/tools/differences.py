@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import reduce
 from typing import NamedTuple
 
@@ -206,8 +207,11 @@ def by_numbers(
     def observe(change: float) -> Observed | None:
         try:
             moved = short.replace({path: value + change * size for path, (value, size) in moves.items()})
-            start = None if state is None or way is None else walked.restart_of(state + way * change)
-            return observed(moved, known, start)
+            if state is None or way is None:
+                return observed(moved, known, None)
+            # of the scene as it is now: a body in touch with a wall would follow it from another gap
+            there = replace(walked, scene=moved, _earlier=[])
+            return observed(moved, known, there.restart_of(state + way * change))
         except InputError:
             return None
 
