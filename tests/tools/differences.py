@@ -32,6 +32,8 @@ STEPS, ENOUGH = (1e-3, 1e-4, 1e-2, 1e-5, 1e-6), 1e-10
 SURE = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: round-off of a run's results relative to their sizes, apart from what its derivatives multiply
 _ROUND_OFF = 3e-15
+#: amplitude, relative to the size of the first coordinate, of a motion that is none
+STILL = 1e-6
 #: events per period after which a run is given up
 MOST_EVENTS = 200
 FIGURES = (
@@ -97,7 +99,7 @@ def observed(scene: Scene, known: Coordinates, start: RestartState | None) -> Ob
         **{name: _one(getattr(response, name)) for name in FIGURES},
         **{f"energy.{name}": energies[[k]] for k, name in enumerate(ENERGIES)},
     }  # fmt: skip
-    motion = np.array([max(float(response.amplitude_max), 1e-300)])
+    motion = np.array([max(float(response.amplitude_max), STILL * float(known.scale[0]))])
     fastest = np.array([np.abs(hits[:, 1]).max(initial=0.0) or 1.0])
     sizes = {"state": known.scale, "impact_time": np.array([1.0 / scene.frequency]), "impact_speed": fastest}
     sizes |= dict.fromkeys(("peak", *FIGURES[:4]), motion) | dict.fromkeys(FIGURES[4:], np.ones(1))
