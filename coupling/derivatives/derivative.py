@@ -157,6 +157,11 @@ class Derivative:
             return np.full((k, k), np.nan), np.full((k, self._none.shape[1]), np.nan)
         if periods * period - self._last[0] <= _SIMULTANEOUS * period:
             self.worsen(PassageStatus.COINCIDENT)  # an event at the very end
+        return self.reached(before, periods)
+
+    def reached(self, before: Before, periods: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of the state after some periods: by the start (k, k), by numbers (k, P)."""
+        dynamics, k = self.dynamics, len(self._scale)
         by_state = dynamics.to_state @ before.M[:, :k] / self._scale
         if self.numbers is None:
             return by_state, np.zeros((k, 0))

@@ -157,6 +157,8 @@ class Frame:
 
 def _signs(system: System, like: System) -> np.ndarray:
     """Return the signs (n,) that modes take to move places as those of a neighbouring system do."""
+    if system.J.shape != like.J.shape:
+        return np.ones(system.modes)  # another motion: numbers_of says so
     along = ((system.J * like.J).sum(axis=0) + system.response * like.response)[: system.modes]
     return np.where(along < 0.0, -1.0, 1.0)
 

@@ -39,8 +39,8 @@ class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
     turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
-    a search for the clearance; given: as in Start; half_way: (k,) the state half a period after the start, None if the
-    engine has not come so far.
+    a search for the clearance; given: as in Start; half_way: state (k,) and derivatives (k, k) and (k, P) half a period
+    after the start, of a passage without its derivative only the state; None if the engine has not come so far.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class PassageWalk:
         self._start = Start(dynamics, state, numbers, turns, given)
         self.derivative = Derivative(dynamics, self._start, numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
-        self.half_way: np.ndarray | None = None
+        self.half_way: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
@@ -86,8 +86,8 @@ class PassageWalk:
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
             if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
-                middle, _ = flow.after(z, half - segment.time)
-                self.half_way = dynamics.to_state @ middle[: dynamics.one]
+                middle = self._followed(Before(segment, segment.event, flow, z, M), half - segment.time, None)
+                self.half_way = dynamics.to_state @ middle.u, *self.derivative.reached(middle, 0.5)
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue
@@ -95,21 +95,21 @@ class PassageWalk:
                 least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
                 if least < self._clearance[0]:
                     self._clearance = least, self._names.possible(unit, what)
-            before = self._followed(Before(segment, segment.event, flow, z, M))
+            before = self._followed(Before(segment, segment.event, flow, z, M), segment.duration, self._watch)
         return before
 
-    def _followed(self, begun: Before) -> Before:
-        """Return the end of a segment from its start."""
+    def _followed(self, begun: Before, duration: float, watch: Watch | None) -> Before:
+        """Return the motion a duration after the start of a segment, s."""
         segment, flow, k = begun.segment, begun.flow, len(self._dynamics.scale)
-        z, power = flow.after(begun.z, segment.duration)
+        z, power = flow.after(begun.z, duration)
         if self._numbers is None:
             return begun._replace(z=z, M=power @ begun.M)
         Z = self._numbers.harmonics(self._dynamics, segment.start).T
         Z[: len(power)] = begun.M[:, k:]
         series = derivative_of(flow, self._numbers).series
-        course = series.course(begun.z, Z, segment.duration, self._watch is not None)
-        if self._watch is not None:
-            self._watch.segment(begun, course)
+        course = series.course(begun.z, Z, duration, watch is not None)
+        if watch is not None:
+            watch.segment(begun, course)
         return begun._replace(z=z, M=np.hstack([power @ begun.M[:, :k], course.end[: len(power)]]))
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:

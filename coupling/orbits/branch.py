@@ -8,6 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.orbits.border import Border, borders_of
+from vanedamp.coupling.orbits.border import variables as border_variables
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
@@ -131,7 +133,7 @@ class Branches(SceneRecord, Plotted):
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
     were found; iterations: of Newton's method; warnings: to be read before results are used; provenance: versions and
-    further data of the caller (JSON-able).
+    further data of the caller (JSON-able); borders: of special points over `second`.
     """
 
     KIND: ClassVar[str] = "orbits"
@@ -142,6 +144,13 @@ class Branches(SceneRecord, Plotted):
     iterations: int
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    borders: tuple[Border, ...] = ()
+
+    @property
+    def second(self) -> str:
+        """Dotted path of the number over which special points are followed, "" without."""
+        track = None if self.scene.orbit is None else self.scene.orbit.track
+        return "" if track is None else track.parameter
 
     @property
     def parameter(self) -> str:
@@ -163,6 +172,7 @@ class Branches(SceneRecord, Plotted):
             "parameter": self.parameter, "unit": unit_of(self.parameter),
             "branches": [branch.to_json() for branch in self.branches], "special_points": special,
             "iterations": self.iterations, "warnings": list(self.warnings),
+            "second": self.second, "borders": [border.to_json() for border in self.borders],
         }  # fmt: skip
 
     def variables(self) -> dict[str, Variable]:
@@ -198,6 +208,7 @@ class Branches(SceneRecord, Plotted):
             "special_state": Variable(states, ("special", "coordinate")),
             **{name: Variable(values, ("special",)) for name, values in of_special.items()},
             **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
+            **border_variables(self.borders, (unit, unit_of(self.second)), len(self.names)),
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -228,5 +239,5 @@ class Branches(SceneRecord, Plotted):
             )  # fmt: skip
         return cls(
             names=tuple(values["coordinate"]), scale=frozen(values["scale"]), branches=tuple(branches),
-            iterations=int(attributes["iterations"]), **cls.common(attributes, path),
+            iterations=int(attributes["iterations"]), borders=borders_of(values), **cls.common(attributes, path),
         )  # fmt: skip

@@ -70,7 +70,7 @@ class Continuation:
             return None
         missed = float(np.abs(problem.residual(y, passage)).max(initial=0.0))
         orbit = Orbit(OrbitStatus.OK, last.parameter, last.state, branch.periods, problem.map.scale, passage, missed, 0)
-        head = Point(y, orbit, problem.slope(y, passage), tangent)
+        head = Point(y, orbit, problem.slope(y), tangent)
         resumed = cls(problem, table, branch.points, head, branch.source)
         resumed.special, resumed.step, resumed.end = list(branch.special), step, branch.end
         return resumed

@@ -181,10 +181,10 @@ class Diagram:
         for quarters in range(_QUARTERS):
             step = self.table.step / 4.0**quarters
             start = y + step * row
-            if (passage := problem.passage(start)) is None:
+            if problem.passage(start) is None:
                 continue
             # the slope at the bifurcation itself says nothing of the other branch
-            orbit = solve(problem, start, row, problem.slope(start, passage))
+            orbit = solve(problem, start, row, problem.slope(start))
             problem.count["iterations"] += orbit.iterations
             if orbit.status is OrbitStatus.OK:
                 onward = problem.pack(orbit.state, orbit.parameter) - y

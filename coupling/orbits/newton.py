@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import lstsq
 
+from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
 from vanedamp.coupling.orbits.period_map import PeriodMap
@@ -28,13 +29,6 @@ _SMALL = 1e-8
 _RESIDUAL = 1e-13
 #: the same for an orbit whose map's derivative is nearly singular, so that steps do not become small
 _ROUND_OFF = 1e-13
-#: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
-#: order one, has the smallest error (some 1e-9) at the cube root
-_DIFFERENCE = 3e-5
-#: by which steps are shortened where the passage is not smooth over them, and how far from straight it may be
-_SHRINKS, _BEND = (1.0, 1e-2, 1e-4, 1e-6), 1e-2
-#: smallest size of a parameter, as a fraction of the branch's range, that its differences are relative to
-_FLOOR = 1e-3
 #: scaled distance of an orbit from its mirror image
 _SYMMETRIC = 1e-6
 #: corrections of a point of a branch before its step is shortened, which is better than many
@@ -206,27 +200,15 @@ class Problem:
         """Return by how much an orbit misses itself, scaled (k,)."""
         return np.asarray(passage.state / self.weight - y[:-1])
 
-    def slope(self, y: np.ndarray, passage: Passage) -> np.ndarray:
-        """Return the derivative of the residual by the scaled parameter (k,).
-
-        Central differences of the passage, over steps that shrink as long as the sequence of events changes within
-        them, or the passage bends as it does near a grazing impact; where one side stays another motion, one-sided.
-        """
-        parameter = self.parameter(y)
-        state, here = y[:-1] * self.weight, passage.state
-        known = 1e3 * np.finfo(float).eps * np.abs(here)
-        found = None
-        for shrink in _SHRINKS:
-            h = shrink * _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
-            sides = [self._passage(state, parameter + way * h, False) for way in (1, -1)]
-            above, below = (side.state if side and side.sequence == passage.sequence else None for side in sides)
-            if above is not None and below is not None:
-                found = (above - below) / (2 * h)
-                if np.all(np.abs(above - 2 * here + below) <= _BEND * np.abs(above - below).max() + known):
-                    break
-            elif found is None and (above is not None or below is not None):
-                found = (above - here) / h if above is not None else (here - below) / h
-        return np.zeros(self.size) if found is None else np.asarray(found / self.weight * self.span)
+    def slope(self, y: np.ndarray) -> np.ndarray:
+        """Return the derivative of the residual by the scaled parameter (k,); 0 where there is none."""
+        try:
+            along = replace(self.at(self.parameter(y)), numbers=(self.map.parameter,))
+            found = along(y[:-1] * self.weight).by_number[:, 0]
+        except (InputError, NotSmooth):
+            return np.zeros(self.size)
+        known = np.asarray(found / self.weight * self.span)
+        return known if np.isfinite(known).all() else np.zeros(self.size)
 
 
 def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
@@ -299,7 +281,7 @@ def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.nda
     for renewed in (False, True):
         if renewed:
             given, passage = slope, problem.passage(predicted)
-            if passage is None or np.array_equal(given, slope := problem.slope(predicted, passage)):
+            if passage is None or np.array_equal(given, slope := problem.slope(predicted)):
                 return None
         orbit = solve(problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
         problem.count["iterations"] += orbit.iterations
@@ -359,7 +341,7 @@ def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.nd
 def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
     """Return an orbit as a point of a branch that continues in the direction of `row` (k + 1,)."""
     y = problem.pack(orbit.state, orbit.parameter)
-    slope = problem.slope(y, orbit.passage)
+    slope = problem.slope(y)
     return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))
 
 

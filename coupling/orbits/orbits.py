@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,12 +12,13 @@ from typing import Any
 from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
+from vanedamp.coupling.orbits.borders import Borders
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
-from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
+from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -49,6 +51,19 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     return replace(found, parameter=search.low)
 
 
+def settled_orbit(scene: Scene) -> Orbit | None:
+    """Return the orbit on which the run of a scene settles; None if it does not."""
+    response = simulate(scene)
+    kind = response.classification
+    if response.final is None or kind == "non-periodic":
+        return None
+    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
+    turns = scene.rotation if scene.excitation.engine_order is not None else None
+    parameter = FREQUENCY if turns is None else f"rotation.{'speed' if turns.rpm is None else 'rpm'}"
+    orbit = find_orbit(replace(scene, orbit=Table(parameter=parameter, periods=periods)), response.final)
+    return orbit if orbit.status is OrbitStatus.OK else None
+
+
 def orbits(
     scene: Scene,
     progress: Callable[[int, int], None] | None = None,
@@ -67,17 +82,23 @@ def orbits(
         raise InputError("orbit: missing; name the branch in a table [orbit], such as from = 95.0 and to = 105.0")
     search = _Search(scene)
     diagram = Diagram(search.map, search.table, search.low, search.to, search.starts)
+    borders = search.borders()
     described = replace(scene, orbit=search.table)
     data = dict(provenance or {})
 
     def found() -> Branches:
-        notes = (*warnings_of(search.first), *dict.fromkeys(diagram.notes))
+        notes = (*warnings_of(search.first), *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ())]))
         names, scale = tuple(search.map.names), frozen(search.map.scale)
-        return Branches(described, names, scale, tuple(diagram.branches), diagram.iterations, notes, data)
+        return Branches(
+            described, names, scale, tuple(diagram.branches), diagram.iterations, notes, data,
+            () if borders is None else tuple(borders.finished),
+        )  # fmt: skip
 
     with Checkpoint(checkpoint, scene, data, lambda: (found(), *diagram.place)) as kept:
         if kept.found is not None:
             diagram.resume(kept.found.branches, kept.tangent, kept.step, kept.found.iterations)
+            if borders is not None:
+                borders.resume(kept.found.borders)
 
         def changed(done: int, total: int) -> None:
             kept.changed()
@@ -85,6 +106,9 @@ def orbits(
                 progress(done, total)
 
         diagram.follow(changed)
+        if borders is not None:
+            points = sum(len(branch.parameter) for branch in diagram.branches)
+            borders.follow(diagram.branches, lambda done, total: changed(points + done, points + total))
     return found()
 
 
@@ -112,16 +136,17 @@ class _Search:
     def __init__(self, scene: Scene) -> None:
         """Raise InputError for a parameter that is no number of the motion's equations, or bad at an end."""
         self.scene, self.table = scene, scene.orbit or Table()
-        path, self.to = self.table.parameter, self.table.to
-        if path.split(".")[0] in _NO_PARAMETERS:
-            raise InputError(
-                f"orbit.parameter: {path} is no number of the motion's equations; take one such as {FREQUENCY}"
-            )
-        try:
-            given = number_at(scene.to_dict(), path)
-        except InputError as error:
-            raise InputError(f"orbit.parameter: {str(error).removeprefix('scene: ')}") from None
+        path, self.to, track = self.table.parameter, self.table.to, self.table.track
+        given = _number(scene, path, "orbit.parameter")
         self.low = given if self.table.from_ is None else self.table.from_
+        if track is not None:
+            self.second = _number(scene, track.parameter, "orbit.track.parameter")
+            self.first_second = self.second if track.from_ is None else track.from_
+            if track.to == self.first_second or not 0.0 <= self._share(self.second) <= 1.0:
+                raise InputError(
+                    f"orbit.track: {track.parameter} = {self.second:g} of the scene must lie in a range from "
+                    f"`from` ({self.first_second:g}) to `to` ({track.to:g})"
+                )
         if self.to == self.low:
             raise InputError(f"orbit.to: {self.to:g} is where the branch begins; give another value")
         base = replace(scene, sweep={}, orbit=None)
@@ -130,12 +155,30 @@ class _Search:
             # the level refers to one resonance along the branch, as in a sweep
             near = (hertz * min(self.low, self.to), hertz * max(self.low, self.to))
             base = replace(base, excitation=replace(base.excitation, resonance_near=near))
-        ends = [_at(base, path, value) for value in (self.low, self.to) if value is not None]
+        ends = [_at(base, {path: value}) for value in (self.low, self.to) if value is not None]
+        if track is not None and self.to is not None:
+            corners = itertools.product((self.low, self.to), (self.first_second, track.to))
+            ends += [_at(centred(base), {path: one, track.parameter: two}) for one, two in corners]
         if leaves_open(base):
             choices = choices_of(ends)
             ends = [with_choices(end, choices).scene for end in ends]
         self.first = ends[0]
-        self.map: PeriodMap = period_map(self.first, path, self.table.periods or 1)
+        second = "" if track is None else track.parameter
+        self.map: PeriodMap = period_map(self.first, path, self.table.periods or 1, second)
+
+    def _share(self, second: float) -> float:
+        """Return where a value lies in the range of the second number, 0 to 1."""
+        assert self.table.track is not None
+        return (second - self.first_second) / (self.table.track.to - self.first_second)
+
+    def borders(self) -> Borders | None:
+        """Return the search for borders over the second number; None without one."""
+        track = self.table.track
+        if track is None or self.to is None:
+            return None
+        low, high = track.within or (self.low, self.to)
+        origin, span = (low, self.first_second), (high - low, track.to - self.first_second)
+        return Borders(self.map, self.table, origin, span, self.second)
 
     def starts(self) -> Starts:
         """Return the states from which the first orbit is sought. Raises InputError if the run ends early."""
@@ -144,8 +187,19 @@ class _Search:
         return of_run(self.map, simulate(self.first), self.table.periods)
 
 
-def _at(scene: Scene, path: str, value: float) -> Scene:
+def _number(scene: Scene, path: str, key: str) -> float:
+    """Return a number of the motion's equations. Raises InputError for another one; key: that names it."""
+    if path.split(".")[0] in _NO_PARAMETERS:
+        raise InputError(f"{key}: {path} is no number of the motion's equations; take one such as {FREQUENCY}")
     try:
-        return scene.replace({path: value})
+        return number_at(scene.to_dict(), path)
     except InputError as error:
-        raise InputError(f"orbit: at {path} = {value:g}: {str(error).removeprefix('scene: ')}") from None
+        raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
+
+
+def _at(scene: Scene, values: Mapping[str, float]) -> Scene:
+    try:
+        return scene.replace(values)
+    except InputError as error:
+        where = " and ".join(f"{path} = {value:g}" for path, value in values.items())
+        raise InputError(f"orbit: at {where}: {str(error).removeprefix('scene: ')}") from None

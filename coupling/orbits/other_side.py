@@ -79,7 +79,7 @@ class OtherSide:
                 beyond = problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
                 if beyond is None:
                     continue
-                orbit = near(problem, image, ahead, problem.slope(image, beyond), _FARTHER * size)
+                orbit = near(problem, image, ahead, problem.slope(image), _FARTHER * size)
                 if orbit is not None:
                     return point_of(problem, orbit, ahead)
         return None
@@ -159,7 +159,7 @@ class OtherSide:
             found = problem.passage(start)
             if found is None:
                 continue
-            orbit = near(problem, start, alpha / length, problem.slope(start, found), 2 * length * measure)
+            orbit = near(problem, start, alpha / length, problem.slope(start), 2 * length * measure)
             if orbit is not None and orbit.passage.sequence != sequence:
                 return orbit
         return None

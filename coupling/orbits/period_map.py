@@ -5,6 +5,7 @@ The engine's motion is walked segment by segment, and with it the derivative of 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -82,8 +83,10 @@ class PeriodMap:
             return Passage.stopped(state, self.periods, len(self.numbers))
         return self._walk(state, self.periods, derivative)[0]
 
-    def _walk(self, state: np.ndarray, periods: int, derivative: bool) -> tuple[Passage, np.ndarray | None]:
-        """Return a passage from a state (k,), and the state half a period after the start."""
+    def _walk(
+        self, state: np.ndarray, periods: int, derivative: bool
+    ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
+        """Return a passage from a state (k,), and state and derivatives half a period after the start."""
         system = self._frame.system
         start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
@@ -96,7 +99,11 @@ class PeriodMap:
 
     def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
-        return replace(self, scene=self.scene.replace({self.parameter: value}))
+        return self.with_numbers({self.parameter: value})
+
+    def with_numbers(self, values: Mapping[str, float]) -> PeriodMap:
+        """Return the map with numbers of its scene, by their paths, at values. Raises InputError as `at`."""
+        return replace(self, scene=self.scene.replace(values))
 
     def over(self, periods: int) -> PeriodMap:
         """Return the map of the same scene over another number of periods."""
@@ -143,13 +150,26 @@ class PeriodMap:
         if image is None:
             return None
         passage, half = self._walk(state, 1, False)
-        return None if half is None or passage.status is PassageStatus.STOPPED else image @ half
+        return None if half is None or passage.status is PassageStatus.STOPPED else image @ half[0]
+
+    def half(self, state: np.ndarray, derivative: bool = True) -> Passage:
+        """Return a passage of one period that ends, mirrored, half a period after the start.
+
+        Symmetric orbits are fixed points of it, and one that loses its symmetry has a multiplier of -1 there. Of a
+        scene with that symmetry (`mirrored`).
+        """
+        image = self._frame.image
+        passage, half = self._walk(state, 1, derivative) if np.all(np.isfinite(state)) else (None, None)
+        if image is None or passage is None or half is None:
+            return Passage.stopped(state, 1, len(self.numbers))
+        return passage._replace(state=image @ half[0], derivative=image @ half[1], by_number=image @ half[2])
 
 
-def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1) -> PeriodMap:
+def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "") -> PeriodMap:
     """Return the map of a scene over excitation periods, with a number of it as parameter (dotted path).
 
-    Open choices of the scene are made first. Raises InputError for a scene that the exact engine cannot run.
+    second: another number that will change; bodies then begin in the middle of their cavities. Open choices of the
+    scene are made first. Raises InputError for a scene that the exact engine cannot run.
     """
     if scene.solver.method != "exact":
         raise InputError(
@@ -157,5 +177,11 @@ def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: i
         )
     chosen = choose(scene).scene
     check_waveform(chosen, "exact")
-    turns = parameter in SPEEDS and isinstance(chosen.structure, Rom)
+    turns = (parameter in SPEEDS or second in SPEEDS) and isinstance(chosen.structure, Rom)
+    chosen = centred(chosen) if second else chosen
     return PeriodMap(chosen, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None)
+
+
+def centred(scene: Scene) -> Scene:
+    """Return a scene whose bodies begin in the middle: where they begin may lie outside of another gap."""
+    return scene.replace({f"damper.{number}.position": 0.0 for number in range(len(scene.damper))})

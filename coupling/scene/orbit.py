@@ -9,6 +9,28 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, Real, Whole
 
+#: what is followed over a second number
+Kind = Literal["fold", "pitchfork", "period doubling", "neimark-sacker", "grazing", "sequence", "peak"]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Track:
+    """A second number of the scene, over which special points of the branches are followed: borders of motions."""
+
+    parameter: str
+    """dotted path of the second number"""
+    to: Real
+    """value of the second number where borders end [unit of the number]"""
+    from_: Annotated[Real | None, Field(alias="from")] = None
+    """other value where they end; the scene's own must lie between (default: the scene's own) [unit of the number]"""
+    within: tuple[Real, Real] | None = None
+    """values of the branch's own parameter between which borders are followed (default: its `from` and `to`)
+    [unit of the parameter]"""
+    kinds: tuple[Kind, ...] = ("fold", "pitchfork", "period doubling", "neimark-sacker", "grazing", "peak")
+    """special points that are followed; "peak": the largest amplitude of a branch"""
+    max_points: Annotated[Whole, Field(ge=2, le=100_000)] = 300
+    """most points of a border on each side of the branch"""
+
 
 @dataclass(frozen=True, config=STRICT)
 class Orbit:
@@ -34,6 +56,8 @@ class Orbit:
     """most points of a branch"""
     switch: bool = False
     """follow the branches that begin at period doublings and pitchforks as well"""
+    track: Track | None = None
+    """follow special points over a second number of the scene, such as {parameter = "cavity.c1.gap", to = 7e-6}"""
 
     def __post_init__(self) -> None:
         if not self.min_step <= self.step <= self.max_step:
@@ -44,3 +68,10 @@ class Orbit:
             raise ValueError("to: say where the branch that begins at `from` ends, or leave `from` out")
         if self.to is not None and self.to == self.from_:
             raise ValueError(f"to ({self.to:g}) must differ from `from`")
+        if self.track is not None and self.to is None:
+            raise ValueError("track: special points are those of a branch; give `to`")
+        within = None if self.track is None else self.track.within
+        if within is not None and within[0] >= within[1]:
+            raise ValueError(f"track.within: {within[0]:g} must be smaller than {within[1]:g}")
+        if self.track is not None and self.track.parameter == self.parameter:
+            raise ValueError(f"track.parameter: {self.parameter} is the branch's own; take another number")

@@ -19,7 +19,7 @@ from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, Sensit
 _ROUND_OFF, _UNCERTAIN = 1e-13, 1e-8
 #: part of a derivative that no move of the orbit makes up for, relative: neutral orbits that numbers would drive away
 _DRIVEN = 1e-7
-#: imbalance of the energies' derivatives, relative to the largest of a number, and of all
+#: imbalance of the energies' derivatives, relative to the largest of a number, and of all and the energies
 _OPEN, _NOTHING = 1e-6, 1e-9
 
 
@@ -57,9 +57,10 @@ def _moved(orbit: Orbit, passage: Passage, numbers: Numbers) -> np.ndarray:
 
 def _check_energies(measures: Measures) -> None:
     """Raise NoDerivative where energies of an orbit balance, but their derivatives do not."""
-    turns = np.array([
-        each.turns if name == "excitation" else -each.turns for name, each in measures.energies().items()
-    ])  # fmt: skip
+    energies = measures.energies()
+    turns = np.array([each.turns if name == "excitation" else -each.turns for name, each in energies.items()])
     largest = np.abs(turns).max(axis=0, initial=0.0)
-    if np.any(np.abs(turns.sum(axis=0)) > _OPEN * largest + _NOTHING * largest.max(initial=0.0)):
+    # numbers that change next to nothing leave the round-off of the energies themselves
+    size = max(largest.max(initial=0.0), *(float(abs(each.value)) for each in energies.values()))
+    if np.any(np.abs(turns.sum(axis=0)) > _OPEN * largest + _NOTHING * size):
         raise NoDerivative(SensitivityStatus.UNDETERMINED, "the derivatives of the energies do not balance")

@@ -11,11 +11,9 @@ import numpy as np
 
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
-from vanedamp.coupling.orbits.orbits import find_orbit
+from vanedamp.coupling.orbits.orbits import settled_orbit
 from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.orbit import Orbit as OrbitTable
 from vanedamp.coupling.scene.ramp import Ramp as RampTable
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
@@ -24,7 +22,6 @@ from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, check_together, record
 from vanedamp.coupling.sensitivity.of_orbit import of_orbit
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
-from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
@@ -128,18 +125,8 @@ def _at_rest(scene: Scene, frame: Frame) -> np.ndarray:
 
 def _steady(scene: Scene, paths: Paths) -> tuple[np.ndarray, np.ndarray]:
     """Return the state (k,) on whose orbit a scene settles, and how numbers turn it (k, P). Raises NoDerivative."""
-    orbit = _settled(scene)
+    orbit = settled_orbit(scene)
     if orbit is None:
         raise NoDerivative(SensitivityStatus.PARTS, "the steady motion that it begins with does not repeat")
     found = of_orbit(orbit, paths)
     return orbit.state, found.state_derivative
-
-
-def _settled(scene: Scene) -> Orbit | None:
-    response = simulate(scene)
-    kind = response.classification
-    if response.final is None or kind == "non-periodic":
-        return None
-    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
-    orbit = find_orbit(replace(scene, orbit=OrbitTable(periods=periods)), response.final)
-    return orbit if orbit.status is OrbitStatus.OK else None

@@ -174,6 +174,9 @@ def _orbits(record: _Record) -> Iterator[Fact]:
         f"{found['unit']}, {branch['stable_points']} stable" for branch in found["branches"]
     ])  # fmt: skip
     yield Fact("special_points", dict(Counter(point["kind"] for point in found["special_points"])))
+    yield Fact("borders", [
+        f"{border['kind']}, {border['points']} points over {branches.second}" for border in found["borders"]
+    ])  # fmt: skip
 
 
 def _ramp(record: _Record) -> Iterator[Fact]:

@@ -37,6 +37,7 @@ def run(arguments: Namespace) -> None:
 
 def _summary(optimisation: Optimisation) -> Iterator[str]:
     yield optimisation.sentence
+    yield from optimisation.remarks
     if optimisation.trouble:
         yield (
             f"{optimisation.trouble} of {optimisation.scenes} scenes are not ok and count as undamped, so that the "

@@ -53,4 +53,11 @@ def _summary(result: Branches, seconds: float) -> Iterator[str]:
         for point in branch.special:
             if point.kind != "end":
                 yield f"  {point.kind} at {name} = {point.parameter:.9g}" + (f": {point.note}" if point.note else "")
+    for number, border in enumerate(result.borders):
+        points = (0, -1) if border.second[0] <= border.second[-1] else (-1, 0)
+        where = " to ".join(f"({border.parameter[at]:.9g}, {border.second[at]:.6g})" for at in points)
+        yield f"border {number}, {border.kind}: ({name}, {result.second}) = {where}, {len(border.second)} points"
+        for named in border.special:
+            what = f"{named.kind} at ({named.parameter:.9g}, {named.second:.6g})"
+            yield f"  {what}" + (f": {named.note}" if named.note else "")
     yield f"{sum(len(branch.parameter) for branch in result.branches)} orbits in {seconds:.1f} s"

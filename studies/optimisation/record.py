@@ -17,7 +17,7 @@ _KIND = "optimisation"
 _PLAIN = (
     "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
 )  # fmt: skip
-_TABLES = ("study", "headlines", "provenance")
+_TABLES = ("study", "headlines", "gradient", "provenance")
 _ARRAYS = {
     "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
     "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
@@ -30,11 +30,15 @@ _ARRAYS = {
 
 @dataclass(frozen=True)
 class Optimum:
-    """A design with its amplitude in the band over the undamped one there: as designed, and within the tolerances."""
+    """A design with its amplitude in the band over the undamped one there: as designed, and within the tolerances.
+
+    estimate: the latter by derivatives (tolerances.estimate); empty without tolerances.
+    """
 
     design: Design
     amplitude: float
     amplitude_tolerances: float
+    estimate: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def reduction(self) -> float:
@@ -46,18 +50,34 @@ class Optimum:
         """The same within the tolerances."""
         return 1.0 - self.amplitude_tolerances
 
+    @property
+    def to_first_order(self) -> str:
+        """What derivatives say of the tolerances, in words; empty without tolerances."""
+        found = self.estimate
+        if found and found["worst"] is None:
+            at, [reason] = found["frequency_hz"], found["without"]
+            return f"no tolerances to first order: the response at {at:.6g} Hz has none ({_words(reason)})"
+        if not found:
+            return ""
+        most, added = found["by"][0]
+        return (
+            f"tolerances to first order: at worst {1 - found['worst']:.1%} gained (runs there: "
+            f"{1 - found['run']:.1%}), in the mean {1 - found['mean']:.1%}; {most} costs most, {added:.2%}"
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
         return self.design._asdict() | {
             "amplitude": self.amplitude, "amplitude_tolerances": self.amplitude_tolerances,
             "reduction": self.reduction, "reduction_tolerances": self.reduction_tolerances,
+            "estimate": dict(self.estimate),
         }  # fmt: skip
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Optimum:
         """Return the record of `to_json`."""
         design = Design(data["mass_ratio"], data["gap_ratio"], int(data["bodies"]))
-        return cls(design, data["amplitude"], data["amplitude_tolerances"])
+        return cls(design, data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +95,7 @@ class Optimisation:
     frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
                        where a run is not ok
     headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
+    gradient           where derivatives led the best design as designed (gradient.descend)
     scenes, trouble    number of runs, and of those with another status than ok
     wall_time_s        s
     sentence           the answer in words
@@ -102,12 +123,37 @@ class Optimisation:
     wall_time_s: float
     sentence: str
     headlines: Mapping[str, Any] = field(default_factory=dict)
+    gradient: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What derivatives led to, and what they say of the tolerances, in words."""
+        remarks, found = [], self.gradient
+        if found.get("taken"):
+            remarks.append(
+                f"the gradient leads from {found['before']:.4f} to {found['after']:.4f} of the amplitude without "
+                f"bodies in {found['taken']} steps, which runs confirm"
+            )
+        elif found.get("without"):
+            counted = ", ".join(f"{count} {_words(reason)}" for reason, count in found["without"].items())
+            remarks.append(f"the gradient leads no further; responses that count without derivatives: {counted}")
+        optima = {"as designed": self.nominal} if self.robust == self.nominal else self.optima
+        return remarks + [f"{name}, {text}" for name, optimum in optima.items() if (text := optimum.to_first_order)]
+
+    @property
+    def optima(self) -> dict[str, Optimum]:
+        """Both optima by what they are best for."""
+        return {"as designed": self.nominal, "within the tolerances": self.robust}
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
-        return self._plain() | {"study": dict(self.study), "headlines": dict(self.headlines)} | arrays
+        return (
+            self._plain()
+            | {"study": dict(self.study), "headlines": dict(self.headlines), "gradient": dict(self.gradient)}
+            | arrays
+        )
 
     def _plain(self) -> dict[str, Any]:
         optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}
@@ -131,5 +177,9 @@ class Optimisation:
             **arrays,
             nominal=Optimum.of(json.loads(attributes["nominal"])),
             robust=Optimum.of(json.loads(attributes["robust"])),
-            **{name: json.loads(attributes[name]) for name in _TABLES},
+            **{name: json.loads(attributes.get(name, "{}")) for name in _TABLES},
         )
+
+
+def _words(reason: str) -> str:
+    return reason.replace("_", " ")

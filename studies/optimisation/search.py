@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +23,14 @@ from vanedamp.files.store import finite, frozen
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.checkpoint import Checkpoint
+from vanedamp.studies.optimisation.gradient import descend
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
-from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.tolerances import estimate
 from vanedamp.studies.terminal import stage
 
 #: generations of a search, at least
 _GENERATIONS = 5
-#: of a design as it is
-NO_DEVIATION = {"mass": 0.0, "gap": 0.0, "excitation": 0.0, "restitution": 0.0, "friction": 0.0, "orientation_deg": 0.0}
 _Deviation = Mapping[str, float]
 
 
@@ -59,7 +59,7 @@ def _measures(study: Study) -> tuple[str, str]:
 def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
     started, table = time.perf_counter(), study.table
     with stage("search as designed"):
-        first = trial.search(False, None)
+        first, gradient = descend(study, trial.tried, trial.best_designs(trial.search(False, [])))
     with stage("search within tolerances"):
         second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
     nominal, robust = trial.optimum(first), trial.optimum(second)
@@ -76,6 +76,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     best = {"nominal": nominal.design, "robust": robust.design}
     responses = {name: trial.response(design) for name, design in best.items()}
     headlines = {name: trial.headline(design, responses[name][0]) for name, design in best.items()}
+    with stage("derivatives by tolerances"):
+        estimates = {name: estimate(study, best[name], responses[name][0], trial.sample, trial.within) for name in best}
     took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": tables(table), "scene": study.scene.to_dict()},
@@ -83,8 +85,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         amplitude=study.amplitude,
         reference=study.reference,
         resonance_frequency=study.resonance.frequency,
-        nominal=nominal,
-        robust=robust,
+        nominal=replace(nominal, estimate=estimates["nominal"]),
+        robust=replace(robust, estimate=estimates["robust"]),
         map_mass_ratio=frozen(masses),
         map_gap_ratio=frozen(gaps),
         map_amplitude=frozen(amplitudes),
@@ -96,6 +98,7 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
+        gradient=gradient,
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
@@ -147,6 +150,17 @@ class _Trial:
         damped, undamped = self._run([design], self.sample[:1])
         return damped[0, 0], undamped[0, 0]
 
+    def tried(self, design: Design) -> tuple[float, np.ndarray]:
+        """Return the amplitude of a design as it is, and those at the frequencies (f,), nan where a run is not ok."""
+        damped, undamped = self._run([design], self.sample[:1])
+        amplitude = float(self._judged(damped, undamped)[0])
+        self.history.append((design, amplitude, False))
+        return amplitude, damped[0, 0]
+
+    def within(self, design: Design, deviation: _Deviation) -> float:
+        """Return the amplitude of a design that is off by a deviation."""
+        return float(self._judged(*self._run([design], [deviation]))[0])
+
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
         known, (undamped, fixed, peaks) = self.study.reference * damped, self.study.linear(design, self.sample[0])
@@ -154,8 +168,8 @@ class _Trial:
         curves = (known, known, none, none, none, undamped, fixed)
         return headline(self.study.frequencies, *curves, peaks, along_frequency=True)
 
-    def search(self, robust: bool, first: np.ndarray | None) -> Design:
-        """Return the best design by differential evolution, from a first generation or from a Latin hypercube.
+    def search(self, robust: bool, designs: Sequence[Design]) -> Design:
+        """Return the best design by differential evolution, from the first of some designs or from a Latin hypercube.
 
         robust: within the tolerances, or as designed.
         """
@@ -164,23 +178,23 @@ class _Trial:
             return self._design([])
         bounds = [getattr(table.variables, name) for name in names]
         size = max(5, table.evaluations // max(_GENERATIONS, math.isqrt(table.evaluations)))
-        if first is None:
+        first = np.array([[getattr(design, name) for name in names] for design in designs[:size]], float)
+        if not designs:
             first = qmc.scale(qmc.LatinHypercube(len(names), seed=table.seed).random(size), *np.transpose(bounds))
 
         def objective(columns: np.ndarray) -> np.ndarray:
             return self._tried([self._design(column) for column in np.atleast_2d(columns.T)], robust)
 
         minimum = differential_evolution(
-            objective, bounds, init=first[:size], maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
+            objective, bounds, init=first, maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
             seed=table.seed, updating="deferred", vectorized=True, integrality=[name == "bodies" for name in names],
         )  # fmt: skip
         return self._design(minimum.x)
 
-    def best_designs(self, best: Design) -> np.ndarray:
-        """Return the best designs so far (s, variables), that one first, as the first generation of another search."""
+    def best_designs(self, best: Design) -> list[Design]:
+        """Return the designs so far, that one first, then the others from the best to the worst."""
         ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
-        distinct = list(dict.fromkeys(design for design, _, _ in ordered))
-        return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
+        return list(dict.fromkeys([best, *(design for design, _, _ in ordered)]))
 
     def _tried(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes of `judge`, and keep them in the history."""
@@ -196,7 +210,11 @@ class _Trial:
 
     def judge(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes (d,) of designs within the tolerances, or as they are."""
-        table, (damped, undamped) = self.study.table, self._run(designs, self.sample if robust else self.sample[:1])
+        return self._judged(*self._run(designs, self.sample if robust else self.sample[:1]))
+
+    def _judged(self, damped: np.ndarray, undamped: np.ndarray) -> np.ndarray:
+        """Return the amplitudes (d,) of what counts of runs (d, s, f)."""
+        table = self.study.table
         # a design with a run that is not ok has damped nothing
         bad = np.isnan(damped)
         damped = np.where(bad, np.fmax(undamped, 1.0), damped)

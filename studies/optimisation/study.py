@@ -85,6 +85,10 @@ class Tolerances:
     """of the angle of gravity [degree]"""
 
 
+#: of a design as it is
+NO_DEVIATION: dict[str, float] = asdict(Tolerances())
+
+
 @dataclass(frozen=True, config=STRICT)
 class Map:
     """The map of designs over mass ratio and gap ratio."""
@@ -121,6 +125,8 @@ class Optimise:
     """samples of the tolerances, by Latin hypercube"""
     evaluations: Annotated[Whole, Field(ge=5, le=100_000)] = 150
     """designs that each of the two searches may try"""
+    gradient_steps: Annotated[Whole, Field(ge=0, le=1000)] = 20
+    """designs by gradient that follow the best one as designed, at most; 0: none"""
     seed: Annotated[Whole, Field(ge=0)] = 1
     """seed of searches and samples"""
 
@@ -262,10 +268,7 @@ class Study(NamedTuple):
         design = Design(variables.mass_ratio[1], variables.gap_ratio[0], variables.bodies[1])
         for side in (-1.0, 1.0):
             deviation = {name: side * width for name, width in widths.items()}
-            scene = Points(self.with_bodies(design.bodies)).scene(
-                self.point(design, deviation, float(self.frequencies[0]))
-            )
-            assemble(scene)
+            assemble(self.scene_of(design, deviation, float(self.frequencies[0])))
 
     def with_bodies(self, count: int) -> Scene:
         """Return the scene with `bodies` bodies like its first one, put into its cavities in turn."""
@@ -279,35 +282,45 @@ class Study(NamedTuple):
 
     def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
         """Return the amplitudes (f,), m, without bodies, and with a design's bodies fixed, and their peaks by PEAKS."""
-        point = self.point(design, deviation, float(self.frequencies[0]))
-        scene = Points(self.with_bodies(design.bodies)).scene(point)
+        scene = self.scene_of(design, deviation, float(self.frequencies[0]))
         peaks = tops(*linear_peaks(scene, *_ends(scene, self.frequencies)))
         return *linear_amplitudes(scene, self.frequencies), peaks
+
+    def scene_of(self, design: Design, deviation: Mapping[str, float], frequency: float) -> Scene:
+        """Return the scene of a design, off by a deviation of the tolerances, at a frequency, Hz."""
+        return Points(self.with_bodies(design.bodies)).scene(self.point(design, deviation, frequency))
+
+    @property
+    def paths(self) -> dict[str, str]:
+        """Paths in the scene of the numbers that tolerances change."""
+        excitation = self.scene.excitation
+        level = "load_factor" if excitation.distributed else "force"
+        level = level if excitation.resonance_amplitude is None else "resonance_amplitude"
+        return {
+            "mass": "damper.mass", "gap": "cavity.gap", "excitation": f"excitation.{level}",
+            "restitution": "damper.restitution", "friction": "damper.friction",
+            "orientation_deg": "gravity.orientation_deg",
+        }  # fmt: skip
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
         """Return the changes in the scene by a design, off by a deviation of the tolerances."""
         scene, first = self.scene, self.scene.damper[0]
         gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
         level = scene.excitation.resonance_amplitude or scene.excitation.level
-        key = "load_factor" if scene.excitation.distributed else "force"
-        key = key if scene.excitation.resonance_amplitude is None else "resonance_amplitude"
         cavities = [damper.cavity for damper in self.with_bodies(design.bodies).damper]
         places = {
             f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)
             for index, name in enumerate(cavities)
         }
-        return (
-            places
-            | _drive(scene, frequency)
-            | {
-                f"excitation.{key}": level * (1 + deviation["excitation"]),
-                "cavity.gap": gap,
-                "damper.mass": design.mass_ratio * self.mass / design.bodies * (1 + deviation["mass"]),
-                "damper.restitution": float(np.clip(first.restitution + deviation["restitution"], 0.0, 1.0)),
-                "damper.friction": max(first.friction + deviation["friction"], 0.0),
-                "gravity.orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
-            }
-        )
+        values = {
+            "excitation": level * (1 + deviation["excitation"]),
+            "gap": gap,
+            "mass": design.mass_ratio * self.mass / design.bodies * (1 + deviation["mass"]),
+            "restitution": float(np.clip(first.restitution + deviation["restitution"], 0.0, 1.0)),
+            "friction": max(first.friction + deviation["friction"], 0.0),
+            "orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
+        }
+        return places | _drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
 
 
 def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:

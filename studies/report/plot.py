@@ -21,6 +21,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
+from vanedamp.studies.report.border_chart import borders_figure
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
@@ -36,7 +37,8 @@ from vanedamp.studies.report.time_history import History, history_figure
 _MOST_CURVES = 8
 #: charts of records that one figure shows in full
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
-    Branches: branches_figure, Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure
+    Branches: lambda found: (borders_figure if found.borders else branches_figure)(found),
+    Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
 }  # fmt: skip
 
 
@@ -46,8 +48,9 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
 
     A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a Response
     its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and Campbell their
-    diagrams; a file of `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or
-    else the tuned frequencies. Raises InputError for anything else, and for a response without samples.
+    diagrams, Branches with borders the map of these; a file of `vanedamp modal` its modes; one of `vanedamp calibrate`
+    the measured response with its fit, or else the tuned frequencies. Raises InputError for anything else, and for a
+    response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 

@@ -29,10 +29,10 @@ class ImpactOscillator:
         self.matrix = np.array([[0.0, 1.0], [-k, -c]])
         self.steady = A / (k - w**2 + 1j * w * c)
         flow = expm(self.matrix * 2 * np.pi / w)
-        share = np.linalg.solve(flow - np.eye(2), np.array([0.0, 1.0]) + flow @ np.array([0.0, e]))
+        self.share = share = np.linalg.solve(flow - np.eye(2), np.array([0.0, 1.0]) + flow @ np.array([0.0, e]))
         # (d, 0) - s(phi) = share v, and s(phi) lies on the ellipse of the steady motion
         quadratic = [share[0] ** 2 + (share[1] / w) ** 2, -2 * d * share[0], d**2 - abs(self.steady) ** 2]
-        self.speed = float(np.roots(quadratic).max())
+        self.speed = float(np.roots(quadratic).max().real)
         place, rate = d - share[0] * self.speed, -share[1] * self.speed
         self.phase = float(np.arctan2(-rate / w, place) - np.angle(self.steady))
 

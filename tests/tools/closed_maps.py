@@ -15,6 +15,9 @@ from vanedamp.files.toml_input import InputError
 #: state (k,) and parameter -> state, derivative (k, k), crossings, clearance
 Step = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray, tuple[Crossing, ...], tuple[float, str]]]
 
+#: step of differences by numbers
+_STEP = 1e-5
+
 
 @dataclass(frozen=True)
 class ClosedMap:
@@ -26,6 +29,8 @@ class ClosedMap:
     periods: int = 1
     mirror: bool = False
     lowest: float = -math.inf
+    numbers: tuple[str, ...] = ()
+    parameter: str = "value"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -33,6 +38,7 @@ class ClosedMap:
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         derivative, crossings, clearance, peaks = np.eye(len(state)), [], (math.inf, ""), []
+        start = np.asarray(state, float)
         for _ in range(self.periods):
             peaks.append(abs(state[0]))
             state, one, new, near = self.step(np.asarray(state, float), self.value)
@@ -40,14 +46,27 @@ class ClosedMap:
             crossings += new
         finite = np.isfinite(state).all() and np.abs(state).max() < 1e6
         status = PassageStatus.OK if finite else PassageStatus.STOPPED
-        return Passage(
-            state, derivative, tuple(crossings), clearance, status, np.array(peaks), np.zeros((len(state), 0))
-        )
+        by_number = np.zeros((len(state), 0)) if not self.numbers else self._by_number(start)
+        return Passage(state, derivative, tuple(crossings), clearance, status, np.array(peaks), by_number)
+
+    def _by_number(self, state: np.ndarray) -> np.ndarray:
+        """Return differences by its value, or by the first of its two values or both."""
+        columns, values = [], np.atleast_1d(self.value).astype(float)
+        for step in _STEP * np.eye(len(values))[: len(self.numbers)]:
+            moved = [values + way * step for way in (1, -1)]
+            kinds = [tuple(each) if isinstance(self.value, tuple) else float(each[0]) for each in moved]
+            up, down = (replace(self, value=each, numbers=())(state).state for each in kinds)
+            columns.append((up - down) / (2 * _STEP))
+        return np.array(columns).T
 
     def at(self, value: float) -> ClosedMap:
         if value < self.lowest:
             raise InputError(f"scene: value: {self.lowest:g} is the least")
         return replace(self, value=value)
+
+    def with_numbers(self, values: dict[str, float]) -> ClosedMap:
+        """Return the map at two values, a tuple of them."""
+        return replace(self, value=tuple(values.values()))
 
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
@@ -127,6 +146,8 @@ class ImpactOscillator:
     periods: int = 1
     damping: float = 0.1
     restitution: float = 0.8
+    numbers: tuple[str, ...] = ()
+    parameter: str = "value"
     names = ("x", "x rate")
     scale = np.ones(2)
 
@@ -153,7 +174,8 @@ class ImpactOscillator:
         return np.array([x[1], self.value * math.cos(t) - self.damping * x[1] - x[0]])
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
-        end, now, x, derivative = 2 * math.pi * self.periods, 0.0, np.asarray(state, float), np.eye(2)
+        first, derivative = np.asarray(state, float), np.eye(2)
+        end, now, x = 2 * math.pi * self.periods, 0.0, first
         crossings, top = [], -math.inf
         while len(crossings) < 50:
 
@@ -196,5 +218,9 @@ class ImpactOscillator:
             clearance,
             PassageStatus.OK,
             np.ones(self.periods),
-            np.zeros((len(state), 0)),
+            self._by_number(first) if self.numbers else np.zeros((len(state), 0)),
         )
+
+    def _by_number(self, state: np.ndarray) -> np.ndarray:
+        up, down = (replace(self, value=self.value + way * _STEP, numbers=())(state).state for way in (1, -1))
+        return ((up - down) / (2 * _STEP))[:, None]

@@ -36,6 +36,6 @@ def _optimisation(file: str, record: Optimisation, page: Page) -> dict[str, Any]
     figure = dressed(optimisation_figure(record), height=560)
     return {
         "record": record,
-        "optima": {"as designed": record.nominal, "within the tolerances": record.robust},
+        "tolerances": [name for name, _ in record.robust.estimate.get("by") or record.nominal.estimate.get("by", ())],
         "chart": page.chart("optimum", figure, header, rows, [file]),
     }

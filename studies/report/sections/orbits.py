@@ -14,11 +14,13 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.branch import Branch, Branches, SpecialPoint
 from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
+from vanedamp.studies.report.border_chart import borders_figure, borders_table, maps_of
 from vanedamp.studies.report.charts import Table, axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, quantity
 from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_table
@@ -71,10 +73,26 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     shown["multipliers"] = page.chart(
         "multipliers", _multipliers_figure(branches), *_multipliers_table(branches), files
     )
+    tracked = {record.second: record for record in records.values() if record.borders}
+    shown["borders"] = [
+        _borders(replace(record, borders=joined_borders(list(records.values()), second)), page, files)
+        for second, record in tracked.items()
+    ]
     named, shown["missing"] = _histories(branches)
     if named:
         shown["orbits"] = page.chart("orbits", orbits_figure(named), *orbits_table(named), files)
     return shown
+
+
+def _borders(branches: Branches, page: Page, files: list[str]) -> dict[str, Any]:
+    """Return the chart of borders over the first sweep with the same two axes."""
+    sweeps = {file: result.record for file, result in page.results.kinds["sweep"].items()}
+    maps = maps_of(branches, sweeps)
+    figure = borders_figure(branches, next(iter(maps.values()), None))
+    return {
+        "record": branches, "units": unit_of(branches.second),
+        "chart": page.chart("borders", figure, *borders_table(branches), [*files, *list(maps)[:1]]),
+    }  # fmt: skip
 
 
 def _row(branches: Branches, number: int) -> dict[str, Any]:
@@ -158,6 +176,16 @@ def joined(records: Sequence[Branches]) -> Branches:
             branches.append(replace(branch, source=source))
     warnings = dict.fromkeys(warning for record in records for warning in record.warnings)
     return replace(records[0], branches=tuple(branches), warnings=tuple(warnings))
+
+
+def joined_borders(records: Sequence[Branches], second: str) -> tuple[Border, ...]:
+    """Return the borders over a second number of several files, their branches numbered as in `joined`."""
+    found, first = list[Border](), 0
+    for record in records:
+        for border in record.borders if record.second == second else ():
+            found.append(replace(border, source=(border.source[0] + first, border.source[1])))
+        first += len(record.branches)
+    return tuple(found)
 
 
 def branch_name(number: int, branch: Branch) -> str:

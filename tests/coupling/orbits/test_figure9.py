@@ -94,3 +94,47 @@ def test_a_body_in_the_middle_of_the_reference_gap_is_touched_where_its_reach_en
     for share in np.linspace(0.93, 1.03, 51):
         orbit = replace(closed_form(1.0), omega=2 * math.pi * NATURAL * share)
         assert not orbit.inside or np.abs(orbit.multipliers).max() > 1
+
+
+def borders(gap, start, to, low, high, within, kinds, position=0.49):
+    """Borders over the gap, between two in amplitudes, by their kinds: frequencies in natural ones and gaps."""
+    track = {
+        "parameter": "cavity.c1.gap", "from": low * AMPLITUDE, "to": high * AMPLITUDE, "kinds": kinds,
+        "within": [share * NATURAL for share in within],
+    }  # fmt: skip
+    table = {"from": start * NATURAL, "to": to * NATURAL, "track": track}
+    found = {border.kind: border for border in orbits(figure9(gap, start, position, orbit=table)).borders}
+    assert sorted(found) == sorted(kinds)
+    return found
+
+
+@pytest.mark.slow
+def test_the_doublings_of_half_and_a_tenth_of_the_gap_are_one_border():
+    """And over wider gaps it turns back: at 0.7 and more the motion of three impacts has none."""
+    (border,) = borders(0.5, 0.98, 0.983, 0.1, 0.7, (0.95, 0.987), ["period doubling"], position=0.0).values()
+    places = np.column_stack([border.parameter / NATURAL, border.second / AMPLITUDE])
+    tenth = places[np.isclose(places[:, 1], 0.1)]
+    assert tenth.min(axis=0) == pytest.approx([0.95218538, 0.1], abs=1e-7)
+    (turn,) = (point for point in border.special if point.kind == "extremum")
+    assert turn.second == pytest.approx(border.second.max(), rel=1e-3) and turn.second / AMPLITUDE < 0.64
+
+
+@pytest.mark.slow
+def test_fold_and_pitchfork_meet_in_points_of_codimension_two():
+    """Both borders are followed on their own, and have the same points where both conditions hold."""
+    found = borders(0.5, 0.96, 0.995, 0.48, 0.9, (0.965, 0.995), ["fold", "pitchfork"])
+    meet = {
+        kind: np.array(sorted(
+            [point.parameter / NATURAL, point.second / AMPLITUDE]
+            for point in border.special if point.kind == "fold-pitchfork"
+        ))
+        for kind, border in found.items()
+    }  # fmt: skip
+    assert meet["fold"] == pytest.approx(meet["pitchfork"], abs=1e-8)
+    assert meet["fold"] == pytest.approx(np.array([[0.982314, 0.809811], [0.990541, 0.503703]]), abs=1e-6)
+    # without friction the pitchfork is the closed form's
+    border, unit = found["pitchfork"], 2 * math.pi * NATURAL
+    below = border.parameter < 0.975 * NATURAL
+    for frequency, gap in zip(border.parameter[below] / NATURAL, border.second[below] / AMPLITUDE, strict=True):
+        closed = closed_form(gap).pitchfork((frequency - 2e-3) * unit, (frequency + 2e-3) * unit) / unit
+        assert frequency == pytest.approx(closed, abs=2e-4)

@@ -1,6 +1,7 @@
 """Pictures of orbits: their motion in time, and the runs of sweeps that belong beside their branches."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
+from vanedamp.studies.report.border_chart import maps_of
 from vanedamp.studies.report.page import write_report
+from vanedamp.studies.report.plot import plot
 from vanedamp.studies.report.results import collect
 from vanedamp.studies.report.sections.orbits import joined
 from vanedamp.studies.report.sweep_beside import points_beside
@@ -159,3 +162,37 @@ def test_branches_of_several_files_are_numbered_through(followed):
     assert isinstance(whole, Branches)
     assert [each.source for each in whole.branches] == [None, (0, 0), None, (2, 0), None]
     assert whole.warnings == ("w",)
+
+
+def test_report_draws_borders_over_the_colours_of_a_sweep_with_their_axes(tmp_path):
+    """The border of grazing of an oscillator below a stop, over force and gap; vd.plot has the same lines."""
+    data = {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+        "excitation": {"frequency": 1.2 / (2 * np.pi), "force": 0.4555}, "stop": [{"side": "right", "gap": 1.0}],
+        "time": {"periods": 4, "transient": 2},
+    }  # fmt: skip
+    scene = validate(Scene, data, "scene")
+    track = {"parameter": "stop.0.gap", "to": 1.02, "kinds": ["grazing"], "within": (0.45, 0.47)}
+    table = {
+        "parameter": "excitation.force", "to": 0.4565, "start": "linear", "max_points": 12, "step": 0.1,
+        "min_step": 0.01, "max_step": 1.0,
+    }  # fmt: skip
+    orbits(scene.replace({"orbit": table | {"track": track}})).save(tmp_path / "borders.h5")
+    axes = {"excitation.force": [0.45, 0.46], "stop.0.gap": [1.0, 1.01, 1.02]}
+    sweep(scene.replace({"sweep": axes})).save(tmp_path / "runs.h5")
+    sweep(scene.replace({"sweep": axes, "structure.damping": 0.2})).save(tmp_path / "other.h5")
+    found = collect([tmp_path])
+    write_report(found, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Borders over stop.0.gap" in page
+    drawn = charts(page)["borders-0"]
+    assert [trace["type"] for trace in drawn] == ["heatmap", "scatter"]
+    figure = plot(Branches.load(tmp_path / "borders.h5"))
+    (line,) = figure.data
+    assert line.name == "grazing"
+    assert np.asarray(line.x) == pytest.approx(0.4560701700396551 * np.asarray(line.y) / 1e6)
+    two = {
+        file.name: result.record
+        for file, result in ((Path(file), result) for file, result in found.kinds["sweep"].items())
+    }
+    assert list(maps_of(Branches.load(tmp_path / "borders.h5"), two)) == ["runs.h5"]

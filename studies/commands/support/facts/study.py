@@ -13,8 +13,7 @@ from vanedamp.studies.commands.support.budget import check_optimise, designs_of,
 from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene import facts_of
 from vanedamp.studies.commands.support.trial import mean_cost, tried
-from vanedamp.studies.optimisation.search import NO_DEVIATION
-from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
 from vanedamp.studies.workers import available_cores
 
 

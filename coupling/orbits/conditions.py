@@ -1,0 +1,269 @@
+"""Conditions on orbits over two numbers: scalar functions that vanish where orbits bifurcate, graze or peak.
+
+A singular matrix is seen by a bordered system, which is regular and whose last unknown vanishes with the determinant
+(Griewank and Reddien 1984; Govaerts 2000, Numerical Methods for Bifurcations of Dynamical Equilibria, chapter 3).
+Normal forms are those of maps (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 5.4 and 9).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.linalg import eigvals, solve, svd
+
+from vanedamp.coupling.derivatives.passage import Passage
+from vanedamp.coupling.orbits.multipliers import decided, indicators
+from vanedamp.coupling.orbits.surface import Surface, difference
+
+#: clearance, relative to its scale, up to which an orbit is followed that does not graze yet: the border itself is
+#: extrapolated, which leaves its square
+_LEVEL = 1e-7
+#: scaled steps of differences: of first derivatives for a normal form, of amplitudes, and of conditions
+_NORMAL_FORM, _AMPLITUDE, _STEP, _SMALL_STEP = 1e-4, 1e-5, 1e-7, 1e-2 * _LEVEL
+
+
+class Counts(NamedTuple):
+    """Orbits that meet at a border, and stable ones of them, at a smaller and a larger first number: (2,) each."""
+
+    orbits: tuple[int, int]
+    stable: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """A condition on y of a surface, with as many neutral multipliers as its orbits have.
+
+    step: of its differences; level: by which its zero is away from the border.
+    """
+
+    surface: Surface
+    neutral: int
+    kind: ClassVar[str]
+    step: ClassVar[float] = _STEP
+    level: ClassVar[float] = 0.0
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the function that vanishes; nan where it is none."""
+        raise NotImplementedError
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Condition:
+        """Return the condition with what it refers to taken from a point of the border."""
+        return self
+
+    def multipliers(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers that are not known to have modulus 1."""
+        return decided(eigvals(self.surface.derivative(passage)), self.neutral)
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return functions that vanish at points of codimension two, by their names: here of other multipliers."""
+        rest = indicators(self.multipliers(passage), 0)
+        values = {"fold": rest.unity, "flip": rest.doubling, "Neimark-Sacker": rest.torus}
+        return {f"{self.kind}-{name}": value for name, value in values.items()}
+
+    def inside(self, passage: Passage) -> int:
+        """Return 1 where all these multipliers lie inside the unit circle, else 0."""
+        return int(np.all(np.abs(self.multipliers(passage)) < 1.0))
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbits on both sides: here the orbit itself.
+
+        rate: of the condition along the branch per its first number; along: (k,) slope of the residual by that.
+        """
+        return Counts((1, 1), (self.inside(passage), self.inside(passage)))
+
+
+@dataclass(frozen=True, eq=False)
+class Singular(Condition):
+    """A multiplier of 1 or -1 of the surface's map, by kind; b, c: (k,) borders of the singular matrix."""
+
+    kind: str  # type: ignore[misc]
+    b: np.ndarray
+    c: np.ndarray
+
+    @classmethod
+    def of(cls, surface: Surface, kind: str, neutral: int, passage: Passage) -> Singular:
+        """Return the condition by the singular vectors at a passage."""
+        nothing = np.zeros(surface.size)
+        found = cls(surface, neutral, kind, nothing, nothing)
+        left, _, right = svd(found._matrix(passage))
+        return replace(found, b=left[:, -1], c=right[-1])
+
+    @property
+    def unit(self) -> float:
+        """The multiplier, of a pitchfork that of the mirrored half period."""
+        return 1.0 if self.kind == "fold" else -1.0
+
+    def _matrix(self, passage: Passage) -> np.ndarray:
+        if self.unit > 0:
+            return self.surface.deflated(passage)
+        return self.surface.derivative(passage) + np.eye(self.surface.size)
+
+    def _solved(self, passage: Passage) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return right and left null vectors (k,) and what is left of them."""
+        size = self.surface.size
+        matrix = np.zeros((size + 1, size + 1))
+        matrix[:-1, :-1], matrix[:-1, -1], matrix[-1, :-1] = self._matrix(passage), self.b, self.c
+        right = solve(matrix, np.eye(size + 1)[-1])
+        left = solve(matrix.T, np.eye(size + 1)[-1])
+        return right[:-1], left[:-1], float(right[-1])
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the last unknown of the bordered system."""
+        return self._solved(passage)[2]
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Singular:
+        """Return the condition with the null vectors of a passage as borders."""
+        right, left, _ = self._solved(passage)
+        return replace(self, b=left / np.linalg.norm(left), c=right / np.linalg.norm(right))
+
+    def _normal_form(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the coefficient of the normal form, times the product of the null vectors; nan where it is unknown.
+
+        Of a fold, of second order: zero at a cusp. Of the others, of third order: above zero, the orbits that bifurcate
+        are as stable as the others were.
+        """
+        right, left, _ = self._solved(passage)
+        step = _NORMAL_FORM * np.append(right, (0.0, 0.0))
+        above, below = (self.surface.passage(y + way * step) for way in (1, -1))
+        if above is None or below is None or not above.sequence == below.sequence == passage.sequence:
+            return np.nan
+        M, up, down = (self.surface.derivative(each) for each in (passage, above, below))
+        second = (up - down) / (2 * _NORMAL_FORM)
+        if self.unit > 0:
+            return float(left @ second @ right / 2)
+        third = (up + down - 2 * M) / _NORMAL_FORM**2
+        bent = solve(np.eye(len(M)) - M, second @ right)
+        return float(left @ third @ right / 6 + left @ second @ bent / 2)
+
+    def multipliers(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers but those that are known to have modulus 1."""
+        values = super().multipliers(passage)
+        return np.delete(values, np.argmin(np.abs(values - self.unit)))
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return the product of the null vectors, the coefficient of the normal form, other multipliers."""
+        right, left, _ = self._solved(passage)
+        rest = indicators(self.multipliers(passage), 0)
+        product, form = float(left @ right), self._normal_form(y, passage)
+        if self.unit > 0:
+            flip = "fold-pitchfork" if self.surface.mirrored else "fold-flip"
+            found = {"cusp": form, "1:1 resonance": product, flip: rest.doubling}
+        elif self.surface.mirrored:
+            found = {"generalised pitchfork": form / product, "1:1 resonance": product, "fold-pitchfork": rest.unity}
+        else:
+            found = {"generalised doubling": form / product, "1:2 resonance": product, "fold-flip": rest.unity}
+        return found | {f"{self.kind}-Neimark-Sacker": rest.torus}
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return two orbits on one side of a fold; of the others those that bifurcate, too."""
+        right, left, _ = self._solved(passage)
+        form, product = self._normal_form(y, passage), float(left @ right)
+        inside = self.inside(passage)
+        if self.unit > 0:
+            larger = form * float(left @ along) < 0.0
+            return Counts((0, 2), (0, inside)) if larger else Counts((2, 0), (inside, 0))
+        inward, supercritical = -rate / product > 0.0, form / product > 0.0  # multiplier, by the first number
+        new = 2 if self.surface.mirrored else 1
+        own = (0, 1) if inward else (1, 0)
+        # they are on the side where the others are unstable, if stable ones go out
+        beside = own[::-1] if supercritical else own
+        orbits = 1 + new * beside[0], 1 + new * beside[1]
+        stable = [inside * (one + new * supercritical * there) for one, there in zip(own, beside, strict=True)]
+        return Counts(orbits, (stable[0], stable[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Pair(Condition):
+    """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near the border."""
+
+    kind = "neimark-sacker"
+    total: float
+
+    def _pair(self, passage: Passage) -> tuple[complex, complex, np.ndarray]:
+        """Return product and sum of the pair, and the other multipliers."""
+        values = super().multipliers(passage)
+        pairs = list(itertools.combinations(range(len(values)), 2))
+        ends = [(values[i] * values[j], values[i] + values[j]) for i, j in pairs]
+        best = min(range(len(pairs)), key=lambda n: abs(ends[n][0] - 1.0) + abs(ends[n][1] - self.total))
+        return (*ends[best], np.delete(values, pairs[best]))
+
+    def multipliers(self, passage: Passage) -> np.ndarray:
+        """Return the multipliers without the pair."""
+        return self._pair(passage)[2]
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the product of the pair, less one."""
+        return float(self._pair(passage)[0].real) - 1.0
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Pair:
+        """Return the condition on the pair of a passage."""
+        return replace(self, total=float(self._pair(passage)[1].real))
+
+    def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
+        """Return the distance of the pair's angle from small fractions of a turn, and other multipliers."""
+        total, rest = self._pair(passage)[1], indicators(self.multipliers(passage), 0)
+        strong = {f"1:{n} resonance": total.real - at for n, at in ((1, 2.0), (2, -2.0), (3, -1.0), (4, 0.0))}
+        return strong | {"fold-Neimark-Sacker": rest.unity, "flip-Neimark-Sacker": rest.doubling}
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbit itself, stable on one side; the torus is not counted."""
+        inside = self.inside(passage)
+        return Counts((1, 1), (0, inside) if rate < 0.0 else (inside, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance(Condition):
+    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level."""
+
+    kind = "grazing"
+    step = _SMALL_STEP
+    level = _LEVEL
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the smallest clearance, less the level."""
+        least = passage.clearance[0]
+        return least - self.level if np.isfinite(least) else np.nan
+
+    def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
+        """Return the orbit without the event, on one side; those with it are not counted."""
+        inside = self.inside(passage)
+        return Counts((0, 1), (0, inside)) if rate > 0.0 else Counts((1, 0), (inside, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Peak(Condition):
+    """A largest amplitude along a branch over the first number; way: (k + 1,) direction of that branch."""
+
+    kind = "peak"
+    step = 10 * _AMPLITUDE
+    way: np.ndarray
+
+    def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray | None:
+        """Return the unit tangent (k + 1,) of the branch; None where it is unknown."""
+        column = self.surface.columns(y, 1)
+        if column is None:
+            return None
+        tangent = svd(np.hstack([self.surface.deflated(passage), column]))[2][-1]
+        return np.asarray(tangent if tangent @ self.way > 0.0 else -tangent)
+
+    def value(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the slope of the logarithm of the amplitude along the branch."""
+
+        def amplitude(at: np.ndarray) -> float | None:
+            other = self.surface.passage(at, False)
+            return float(other.peaks.mean()) if other is not None and other.sequence == passage.sequence else None
+
+        mean, tangent = float(passage.peaks.mean()), self._tangent(y, passage)
+        if tangent is None:
+            return np.nan
+        slope = difference(amplitude, y, np.append(tangent, 0.0), _AMPLITUDE, mean)
+        return np.nan if slope is None or mean == 0.0 else slope / mean
+
+    def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
+        """Return the condition with the branch at a passage."""
+        way = self._tangent(y, passage)
+        return self if way is None else replace(self, way=way)
