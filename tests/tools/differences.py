@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import reduce
 from typing import NamedTuple
 
@@ -31,6 +32,8 @@ STEPS, ENOUGH = (1e-3, 1e-4, 1e-2, 1e-5, 1e-6), 1e-10
 SURE = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: round-off of a run's results relative to their sizes, apart from what its derivatives multiply
 _ROUND_OFF = 3e-15
+#: amplitude, relative to the size of the first coordinate, of a motion that is none
+STILL = 1e-6
 #: events per period after which a run is given up
 MOST_EVENTS = 200
 FIGURES = (
@@ -96,7 +99,7 @@ def observed(scene: Scene, known: Coordinates, start: RestartState | None) -> Ob
         **{name: _one(getattr(response, name)) for name in FIGURES},
         **{f"energy.{name}": energies[[k]] for k, name in enumerate(ENERGIES)},
     }  # fmt: skip
-    motion = np.array([max(float(response.amplitude_max), 1e-300)])
+    motion = np.array([max(float(response.amplitude_max), STILL * float(known.scale[0]))])
     fastest = np.array([np.abs(hits[:, 1]).max(initial=0.0) or 1.0])
     sizes = {"state": known.scale, "impact_time": np.array([1.0 / scene.frequency]), "impact_speed": fastest}
     sizes |= dict.fromkeys(("peak", *FIGURES[:4]), motion) | dict.fromkeys(FIGURES[4:], np.ones(1))
@@ -206,8 +209,11 @@ def by_numbers(
     def observe(change: float) -> Observed | None:
         try:
             moved = short.replace({path: value + change * size for path, (value, size) in moves.items()})
-            start = None if state is None or way is None else walked.restart_of(state + way * change)
-            return observed(moved, known, start)
+            if state is None or way is None:
+                return observed(moved, known, None)
+            # of the scene as it is now: a body in touch with a wall would follow it from another gap
+            there = replace(walked, scene=moved, _earlier=[])
+            return observed(moved, known, there.restart_of(state + way * change))
         except InputError:
             return None
 

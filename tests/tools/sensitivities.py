@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -82,7 +83,11 @@ def check(seed: int, folder: Path) -> list[Checked]:
         kind, scene = scene_of(seed, folder)
     except InputError:
         return []
-    return [each for each in (_of_run(kind, scene), _of_orbit(kind, scene)) if each is not None]
+    found = []
+    for of_subject in (_of_run, _of_orbit):
+        with suppress(InputError):  # a number without neighbours, or an orbit's table
+            found.append(of_subject(kind, scene))
+    return [each for each in found if each is not None]
 
 
 def _of_run(kind: str, scene: Scene) -> Checked | None:
@@ -181,6 +186,8 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
     theirs = _by_instant(base["impact_time"], base["impact_speed"])
     for name, claim in claimed(found, weights).items():
         exact = reference.derivative[name]
+        if found.note and name in ("peak", "amplitude_mean", "amplitude_max"):
+            continue  # two summits of one height: on one side
         if name.startswith("impact"):
             if not len(ours):  # compliant contacts have none
                 continue

@@ -8,16 +8,18 @@ import pytest
 from tests.tools.sensitive_scenes import KINDS
 from tests.tools.sensitivities import check
 
+#: seeds of which a run or an orbit takes about a second, of every kind
+SEEDS = (0, 20, 439, 22, 4, 24, 424, 444, 8, 47, 428, 68, 430, 70, 432, 34, 111, 113)
 
-@pytest.mark.parametrize("kind", range(len(KINDS)), ids=[kind.replace(" ", "-") for kind in KINDS])
-def test_no_derivative_is_off(kind, tmp_path):
-    found = [each for seed in (kind, kind + len(KINDS)) for each in check(seed, tmp_path)]
-    assert found
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_derivative_is_off(seed, tmp_path):
+    found = check(seed, tmp_path)
+    assert any(each.compared for each in found)
     for each in found:
         assert not [error for error in each.errors if error.off], (each.kind, each.subject)
 
 
-def test_the_kinds_have_runs_and_orbits(tmp_path):
-    """Seeds of the plainest kinds, by name: a derivative by all numbers was compared of each."""
-    found = [each for kind in ("slider", "prescribed", "viscoelastic") for each in check(KINDS.index(kind), tmp_path)]
-    assert {each.subject for each in found if each.compared > 10} == {"run", "orbit"}
+def test_the_seeds_are_of_every_kind():
+    """But for Jenkins elements beside blocks, of which most runs are long."""
+    assert {KINDS[seed % len(KINDS)] for seed in SEEDS} == {*KINDS} - {"crowd jenkins"}
