@@ -94,13 +94,14 @@ def begins(segment: Segment) -> bool:
 class Derivative:
     """The derivative M (2N, k + P) of u by the state at the start, in units of its sizes `scale` (k,), and by numbers.
 
-    status: its defect so far, if any; shift: (k + P,) of the last event in time, s.
+    status: its defect so far, if any; completed: whether a chatter was, which the engine ends at the last flights of a
+    millionth of a period: what these do is left out; shift: (k + P,) of the last event in time, s.
     """
 
     def __init__(self, dynamics: Dynamics, start: Start, numbers: Numbers | None = None) -> None:
         self.dynamics, self.system, self._start, self._scale = dynamics, dynamics.system, start, dynamics.scale
         self.numbers, self._constraints = numbers, Constraints(dynamics, numbers)
-        self.status, self._to_sizes = PassageStatus.OK, np.abs(dynamics.from_state)
+        self.status, self.completed, self._to_sizes = PassageStatus.OK, False, np.abs(dynamics.from_state)
         #: size of each coordinate so far, at least that by which it is compared, and largest derivatives of each: by
         #: the start, and by each number
         self._size = _LEAST * self._to_sizes @ self._scale
@@ -234,6 +235,7 @@ class Derivative:
         known = len(np.unique(event.struck)) == len(event.struck)
         known = known and self._agrees(at(follow.matrix @ w), at(left))
         if np.any(np.abs(self.dynamics.rows @ (left - u[rates])) > _CAUGHT * new.speed):  # a chatter has been completed
+            self.completed = True
             still = self._start.closed(new), np.abs(system.J @ new.v).reshape(2, -1) <= _ROUND_OFF * new.speed
             stuck = still[0] & still[1][1] & (system.friction > 0.0)
             held = self._constraints.held(still[0] & still[1][0], stuck, z).part(rates)

@@ -39,17 +39,18 @@ class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
     turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
-    a search for the clearance; given: as in Start; half_way: state (k,) and derivatives (k, k) and (k, P) half a period
-    after the start, of a passage without its derivative only the state; None if the engine has not come so far.
+    a search for the clearance; given: as in Start; half_way: if `halves`, state (k,) and derivatives (k, k) and (k, P)
+    half a period after the start, of a passage without its derivative only the state; else, or if the engine has not
+    come so far, None.
     """
 
     def __init__(
         self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
         numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
-        given: bool = False,
+        given: bool = False, halves: bool = False,
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole = dynamics, names, derivative
-        self._frame, self._numbers, self._watch = dynamics.frame, numbers, watch
+        self._frame, self._numbers, self._watch, self._halves = dynamics.frame, numbers, watch, halves
         self._start = Start(dynamics, state, numbers, turns, given)
         self.derivative = Derivative(dynamics, self._start, numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
@@ -85,7 +86,7 @@ class PassageWalk:
             flow, u = dynamics.flow(segment.state, segment.open_force), dynamics.state(segment)
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
-            if segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
+            if self._halves and segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
                 middle = self._followed(Before(segment, segment.event, flow, z, M), half - segment.time, None)
                 self.half_way = dynamics.to_state @ middle.u, *self.derivative.reached(middle, 0.5)
             if not self._whole:

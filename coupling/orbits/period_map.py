@@ -81,10 +81,10 @@ class PeriodMap:
         """
         if not np.all(np.isfinite(state)):
             return Passage.stopped(state, self.periods, len(self.numbers))
-        return self._walk(state, self.periods, derivative)[0]
+        return self._walk(state, self.periods, derivative, False)[0]
 
     def _walk(
-        self, state: np.ndarray, periods: int, derivative: bool
+        self, state: np.ndarray, periods: int, derivative: bool, halves: bool = True
     ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
         """Return a passage from a state (k,), and state and derivatives half a period after the start."""
         system = self._frame.system
@@ -94,7 +94,7 @@ class PeriodMap:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
         numbers = self._numbers if derivative else None
-        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers)
+        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers, halves=halves)
         return walk.passage(run, periods), walk.half_way
 
     def at(self, value: float) -> PeriodMap:

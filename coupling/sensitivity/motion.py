@@ -28,6 +28,12 @@ _EVENTS_PER_PERIOD = 2000
 #: growth of neighbouring motions beyond which derivatives of a run say nothing
 _PARTED = 1e6
 
+#: what is to be known of derivatives that there are: of a kink of amplitudes, of a chatter that the engine completes
+_NOTES = (
+    "summits of one height part: derivatives of amplitudes hold on one side",
+    "a chatter ends in the motion: derivatives hold to some 1e-6, as far as the engine follows it",
+)
+
 MEANING = {
     PassageStatus.OK: (SensitivityStatus.OK, ""),
     PassageStatus.GRAZING: (SensitivityStatus.GRAZING, "an event is tangential, or the motion begins with one"),
@@ -61,6 +67,7 @@ class Motion:
         if scale is None:
             scale = self._sizes(None if begins is None else begins(scene, self.frame))
         self.dynamics = Dynamics(self.frame, scale)
+        self.completed = False
         self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, speed, begins, derived)
 
     def _sizes(self, start: np.ndarray | None) -> np.ndarray:
@@ -80,7 +87,9 @@ class Motion:
         run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
         names, turned = EventNames(self.scene, system), turns * self.numbers.size
         walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given)
-        return walk.passage(run, periods)
+        passage = walk.passage(run, periods)
+        self.completed = walk.derivative.completed
+        return passage
 
     def grown(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of a passage in units of the coordinates' sizes."""
@@ -110,7 +119,7 @@ def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, 
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
     return Sensitivity(
         paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
-        note="summits of one height part: derivatives of amplitudes hold on one side" if kinks else "",
+        note="; ".join(note for note, said in zip(_NOTES, (kinks, motion.completed), strict=True) if said),
         values={name: float(np.real(each.value)) for name, each in figures.items()},
         derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
         state=frozen(state), state_derivative=frozen(turns),

@@ -39,7 +39,7 @@ order = np.argsort(np.abs(relative))
 figure, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
 axes.barh(np.array(list(numbers.values()))[order], relative[order])
 axes.axvline(0.0, color="0.3", linewidth=0.8)
-axes.set(xlabel="change of the mean amplitude (%) per change of the number (%)")
+axes.set(xlabel="change of the mean amplitude (%) per change of the number (%)", ylabel="number (-)")
 
 # %%
 # The derivative is the tangent of what runs find.
