@@ -40,8 +40,8 @@ NUMBERS = {
 #: with friction that holds the body at the lowest level, whatever it is
 HELD = NUMBERS | {"damper.0.friction": Number(0.1, 0.8, 0.45)}
 TRUTH = np.array([0.25, 0.6, 1e-3, 0.01])
-#: force (N) and frequencies (Hz): the body slides without impacts, and strikes both walls once per period
-LEVELS = {0.1: (15.5, 15.65, 15.8, 15.95), 0.5: (15.2, 15.35, 16.0, 16.2)}
+#: force (N) and frequencies (Hz), chosen for what they tell: the body slides without impacts, and strikes both walls
+LEVELS = {0.1: (15.45, 15.55, 15.6, 15.65, 15.85, 15.9), 0.5: (15.15, 15.2, 16.05, 16.25)}
 #: force at which friction holds the body
 STUCK = {0.02: (15.2, 15.35, 15.5, 15.6, 15.75, 15.85, 16.0, 16.2)}
 #: times of the first half cycles, s: later ones depend on the numbers roughly, after many impacts
