@@ -124,7 +124,9 @@ def _newton(
         stalls = length <= _STALLED * size_of and np.linalg.norm(residual) >= 0.1 * np.linalg.norm(before)
         if iteration > 1 and known and (length <= _SMALL * size_of or stalls):
             return y, passage, iteration
-        left = (residual - before - B @ moved)[:, None] * moved / max(float(moved @ moved), np.finfo(float).tiny)
+        if length <= _ROUND_OFF * size_of:
+            continue  # what a step by round-off changes says nothing of the slopes
+        left = (residual - before - B @ moved)[:, None] * moved / float(moved @ moved)
         B[:size, size:] += left[:size, size:]
         B[size] += left[size]
     return None

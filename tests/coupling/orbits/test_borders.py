@@ -163,7 +163,8 @@ def test_impact_oscillator_grazes_where_its_linear_response_reaches_the_stop(sec
     track = {"parameter": second, "to": 0.9 * own, "from": 1.1 * own, "kinds": ["grazing"], "within": (0.3, 0.6)}
     (border,) = orbits(stopped(0.4, to=0.5, start="linear", min_step=0.01, max_points=20, track=track)).borders
     reached = abs(1 - 1.2**2 + 0.12j)
-    assert border.parameter == pytest.approx(reached * (border.second if "gap" in second else 1.0), rel=1e-10)
+    # the orbit is followed at a clearance of 1e-7, with the round-off of that
+    assert border.parameter == pytest.approx(reached * (border.second if "gap" in second else 1.0), rel=1e-8)
     assert sorted(border.second[[0, -1]]) == pytest.approx([0.9 * own, 1.1 * own])
     assert (border.orbits == [1, 0]).all() and (border.stable_orbits == [1, 0]).all()
 
