@@ -19,11 +19,15 @@ from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.system.restitution import restitutions_at
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 #: tables whose numbers do not enter the equations of motion
 _NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down")
 
+#: speeds at which laws of restitution are compared, m/s
+_SPEEDS = (1e-4, 1e-2, 1.0)
 #: state (k,) with which the motion of a scene with the numbers begins, in a frame
 StartOf = Callable[[Scene, Frame], np.ndarray]
 
@@ -140,6 +144,8 @@ def numbers_of(
             flat = Parts.of(made, start(other, frame)).flat()
             if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:
                 raise NotSmooth
+            if not _same_law(made.system, dynamics.system):
+                raise NotSmooth
             return flat / scale
 
         values.append(value)
@@ -162,6 +168,16 @@ def _number(data: dict[str, object], path: str) -> float:
         return number_at(data, path)
     except InputError as error:
         raise InputError(f"numbers: {str(error).removeprefix('scene: ')}") from None
+
+
+def _same_law(one: System, other: System) -> bool:
+    """Return whether two systems take restitutions from coefficients alike: what else changes a law is not followed."""
+    if not (one.restitution_at or other.restitution_at):
+        return True
+    units = np.flatnonzero(np.isinf(other.spring))[:1]
+    alike = one._replace(restitution=other.restitution)
+    laws = ([restitutions_at(each, units, np.full(len(units), v)) for v in _SPEEDS] for each in (alike, other))
+    return bool(np.array_equal(*laws))
 
 
 def _scales(parts: Parts, dynamics: Dynamics) -> np.ndarray:
