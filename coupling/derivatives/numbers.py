@@ -176,8 +176,8 @@ def _same_law(one: System, other: System) -> bool:
         return True
     units = np.flatnonzero(np.isinf(other.spring))[:1]
     alike = one._replace(restitution=other.restitution)
-    laws = ([restitutions_at(each, units, np.full(len(units), v)) for v in _SPEEDS] for each in (alike, other))
-    return bool(np.array_equal(*laws))
+    own, others = ([restitutions_at(each, units, np.full(len(units), v)) for v in _SPEEDS] for each in (alike, other))
+    return bool(np.array_equal(own, others))
 
 
 def _scales(parts: Parts, dynamics: Dynamics) -> np.ndarray:
