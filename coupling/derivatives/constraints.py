@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
+from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics, ways
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.numerics import codes
 
@@ -62,9 +62,8 @@ class Constraints:
             return Affine(matrix, self._nothing)
         d, of, own, n = self.dynamics, self.numbers.parts, self._nothing.copy(), len(self.dynamics.root)
         of_jenkins = state[d.jenkins]
-        way = (of_jenkins == codes.SLIP_RIGHT).astype(float) - (of_jenkins == codes.SLIP_LEFT)
         slips = of_jenkins != codes.STICK
-        places = of.follows[:, :, :n] @ z[d.places] - way * of.bound
+        places = of.follows[:, :, :n] @ z[d.places] - ways(of_jenkins) * of.bound
         own[d.sliders[slips]] = places[:, slips].T
         own[n + d.sliders[slips]] = (of.follows[:, :, n:] @ z[d.rates])[:, slips].T
         return Affine(matrix, own)

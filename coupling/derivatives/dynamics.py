@@ -39,6 +39,11 @@ def presses(state: np.ndarray) -> np.ndarray:
     return (state < codes.OPEN) | (state == codes.CLOSED)
 
 
+def ways(state: np.ndarray) -> np.ndarray:
+    """Return the directions (u,) in which units in states (u,) slip, or 0."""
+    return np.asarray((state == codes.SLIP_RIGHT).astype(float) - (state == codes.SLIP_LEFT))
+
+
 class Dynamics:
     """Flows of a system with N coordinates by the states of its u units; K = 2N + 1 + 2e entries of z.
 
@@ -183,7 +188,7 @@ class Flow:
         u, size = len(state), len(dynamics.root)
         contact, rigid = np.arange(u) < system.contacts, np.isinf(system.spring)
         self.rubs = ~contact | (system.friction > 0.0)
-        self.way = (state == codes.SLIP_RIGHT).astype(float) - (state == codes.SLIP_LEFT)
+        self.way = ways(state)
         closed = np.flatnonzero(contact & presses(state) & rigid)
         springs = np.flatnonzero(contact & presses(state) & ~rigid)
         self.stuck = (state == codes.STICK) & self.rubs

@@ -27,10 +27,7 @@ class FlowDerivative:
         drag, turned = (way * system.friction)[:, None], (way * of.friction)[:, :, None]
         n, m = s.springs, s.closed
         self.forces = np.zeros((len(numbers), *flow.forces.shape))
-        self.forces[:, n] = -(
-            of.spring[:, n, None] * dynamics.gap[n] + system.spring[n, None] * of.gap[:, n]
-            + of.dashpot[:, n, None] * dynamics.speed[n] + system.dashpot[n, None] * of.speed[:, n]
-        )  # fmt: skip
+        self.forces[:, n] = -self._pushes(n)
         self.forces[:, u + n] = -turned[:, n] * flow.forces[n] - drag[n] * self.forces[:, n]
         self.forces[:, u + s.slides, one] = -(way * of.limit)[:, s.slides] / dynamics.size
         # forces known before those that hold: what these add is found below
@@ -67,6 +64,13 @@ class FlowDerivative:
         follows = of.follows[:, slips, rates]
         self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ s.free)
 
+    def _pushes(self, n: np.ndarray) -> np.ndarray:
+        """Return the derivatives (P, m, K) of the pressures of springs and dashpots of contacts (m,)."""
+        dynamics, of, system = self.flow.dynamics, self.numbers.parts, self.flow.dynamics.system
+        springs = of.spring[:, n, None] * dynamics.gap[n] + system.spring[n, None] * of.gap[:, n]
+        dashpots = of.dashpot[:, n, None] * dynamics.speed[n] + system.dashpot[n, None] * of.speed[:, n]
+        return np.asarray(springs + dashpots)
+
     @cached_property
     def series(self) -> Series:
         """The motions of the flow with their derivatives."""
@@ -79,8 +83,7 @@ class FlowDerivative:
         if what in (codes.CLOSES, codes.OPENS):
             return of.gap[:, r] * (1.0 if what == codes.CLOSES else -1.0)
         if what == codes.RECLOSES:
-            pushes = of.spring[:, r, None] * dynamics.gap[r] + system.spring[r] * of.gap[:, r]
-            return pushes + of.dashpot[:, r, None] * dynamics.speed[r] + system.dashpot[r] * of.speed[:, r]
+            return self._pushes(np.array([r]))[:, 0]
         if what == codes.STOPS:
             return self.flow.way[r] * of.speed[:, u + r]
         if what == codes.PARTS:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine
+from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.response.segment import Event
@@ -28,8 +29,6 @@ _GAIN = 1e-12
 _EDGE, _ROUND_OFF = 1e-9, 1e-13
 #: slips that count as none, as a fraction of the fastest speed
 _SLOW = 1e-11
-#: steps of the differences that find the slope of a restitution, as fractions of the speed, and how well they agree
-_STEPS, _SMOOTH = (1e-2, 5e-3), 1e-8
 
 
 class Untrusted(ArithmeticError):
@@ -222,7 +221,7 @@ def _blow(laws: _Laws, begun: Jump, roles: _Roles, target: np.ndarray, steep: np
 def _restitution(system: System, units: np.ndarray, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the restitutions (m,) of units at speeds of approach (m,), their derivatives by these and by coefficients.
 
-    By differences of sixth order. Raises Untrusted where the law has a kink near by.
+    Raises Untrusted where the law has a kink near by.
     """
     now = restitutions_at(system, units, approach)
     if system.restitution_at == 0:
@@ -232,23 +231,20 @@ def _restitution(system: System, units: np.ndarray, approach: np.ndarray) -> tup
     def of_coefficient(factor: float) -> np.ndarray:
         return restitutions_at(system._replace(restitution=coefficient * factor), units, approach)
 
-    by_speed = _relative_slope(lambda factor: restitutions_at(system, units, approach * factor))
-    by_coefficient = _relative_slope(of_coefficient)
+    by_speed = _relative_slope(lambda factor: restitutions_at(system, units, approach * factor), now)
+    by_coefficient = _relative_slope(of_coefficient, now)
     return (
         now, by_speed / np.where(approach == 0.0, 1.0, approach),
         by_coefficient / np.where(coefficient[units] == 0.0, 1.0, coefficient[units]),
     )  # fmt: skip
 
 
-def _relative_slope(function: Callable[[float], np.ndarray]) -> np.ndarray:
-    """Return the derivative (m,) of a function of a factor at 1. Raises Untrusted where it has a kink near by."""
-    slopes = []
-    for step in _STEPS:
-        parts = enumerate((3 / 4, -3 / 20, 1 / 60), start=1)
-        slopes.append(sum(w * (function(1 + j * step) - function(1 - j * step)) for j, w in parts) / step)
-    if np.any(np.abs(slopes[0] - slopes[1]) > _SMOOTH):
-        raise Untrusted
-    return np.asarray(slopes[1])
+def _relative_slope(function: Callable[[float], np.ndarray], here: np.ndarray) -> np.ndarray:
+    """Return the derivative (m,) of a function of a factor at 1, where it is `here`. Raises Untrusted near a kink."""
+    try:
+        return derivative(function, 1.0, 1.0, here)
+    except NotSmooth:
+        raise Untrusted from None
 
 
 def scaled(dynamics: Dynamics, jump: Jump, w: np.ndarray, numbers: Numbers | None) -> Affine:

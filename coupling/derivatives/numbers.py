@@ -17,6 +17,7 @@ from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.scene.paths import number_at
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.system.restitution import restitutions_at
@@ -91,12 +92,11 @@ class Parts(NamedTuple):
 class Numbers:
     """Numbers of a scene, P of them: their derivatives are by `size` (P,) of each.
 
-    parts: derivatives of the parts of the equations, times the sizes; paths, values (P,); frequency: (e,) of the
-    harmonics, rad/s.
+    parts: derivatives of the parts of the equations, times the sizes; paths (P,); frequency: (e,) of the harmonics,
+    rad/s.
     """
 
     paths: tuple[str, ...]
-    values: np.ndarray
     size: np.ndarray
     parts: Parts
     frequency: np.ndarray
@@ -126,15 +126,15 @@ def numbers_of(
     derived: the scene that moves, from the one that has the numbers. Raises InputError for a path that names no number
     of the equations, and NotSmooth where the equations have a kink.
     """
-    data, start = scene.to_dict(), begins or (lambda _, frame: np.zeros(len(frame.to_state)))
+    start = begins or (lambda _, frame: np.zeros(len(frame.to_state)))
     parts = Parts.of(dynamics, start(scene, dynamics.frame))
-    here, values, sizes, found = parts.flat(), [], [], []
+    here, sizes, found = parts.flat(), [], []
     scale = _scales(parts, dynamics)
     for path in paths:
         if isinstance(path, MatrixDirection):
             name, value, size = path.name, 0.0, path.size(scene)
         else:
-            name, value = path, _number(data, path)
+            name, value = path, number_of_motion(scene, path, "numbers")
             size = abs(value) or _size(path, dynamics)
 
         def moved(number: float, path: str | MatrixDirection = path) -> np.ndarray:
@@ -148,7 +148,6 @@ def numbers_of(
                 raise NotSmooth
             return flat / scale
 
-        values.append(value)
         sizes.append(size)
         try:
             found.append(derivative(moved, value, size, here / scale) * scale * size)
@@ -156,18 +155,20 @@ def numbers_of(
             raise NotSmooth(f"{name} = {value:g}: the equations of motion have a kink there") from None
     stacked = np.reshape(found, (len(paths), len(here)))
     names = tuple(path if isinstance(path, str) else path.name for path in paths)
-    return Numbers(names, np.array(values), np.array(sizes), parts.like(stacked), dynamics.system.frequency)
+    return Numbers(names, np.array(sizes), parts.like(stacked), dynamics.system.frequency)
 
 
-def _number(data: dict[str, object], path: str) -> float:
-    if path.split(".")[0] in _NO_NUMBERS:
-        raise InputError(
-            f"numbers: {path} is no number of the motion's equations; take one such as excitation.frequency"
-        )
+def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = ()) -> float:
+    """Return a number of a scene that enters its motion. Raises InputError for another one.
+
+    key: that names it; others: tables whose numbers do not count either.
+    """
+    if path.split(".")[0] in (*_NO_NUMBERS, *others):
+        raise InputError(f"{key}: {path} is no number of the motion's equations; take one such as {FREQUENCY}")
     try:
-        return number_at(data, path)
+        return number_at(scene.to_dict(), path)
     except InputError as error:
-        raise InputError(f"numbers: {str(error).removeprefix('scene: ')}") from None
+        raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
 
 
 def _same_law(one: System, other: System) -> bool:

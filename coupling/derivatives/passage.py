@@ -63,6 +63,16 @@ class Passage(NamedTuple):
     peaks: np.ndarray
     by_number: np.ndarray
 
+    def serves(self, derivative: bool) -> bool:
+        """Return whether it has come to its end, and has a derivative if that is wanted."""
+        if self.status in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED) or not np.isfinite(self.state).all():
+            return False
+        return not derivative or bool(np.isfinite(self.derivative).all())
+
+    def scaled(self, scale: np.ndarray) -> np.ndarray:
+        """Return the derivative (k, k) of states in units of their sizes (k,)."""
+        return np.asarray(self.derivative * (scale / scale[:, None]))
+
     @property
     def sequence(self) -> tuple[str, ...]:
         """Names of the events in order."""

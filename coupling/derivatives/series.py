@@ -5,6 +5,7 @@ z' = X z, and by P numbers of X: Z' = X Z + D z. The series end at round-off, so
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,11 @@ class Series:
         number, at, of = np.nonzero(D)
         self._X = rows, columns, X[rows, columns]
         self._D = number, at, of, D[number, at, of]
+
+    @cached_property
+    def alone(self) -> Series:
+        """The series without derivatives."""
+        return Series(self.X, np.zeros((0, *self.X.shape)))
 
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
         """Return the motion from z (K,), Z (K, P) over a duration, s; at nodes, or without any."""

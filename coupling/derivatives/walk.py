@@ -10,13 +10,27 @@ from vanedamp.coupling.derivatives.derivative import Before, Derivative, Guard, 
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
+from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.jump import Untrusted
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
+from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import fitted
 from vanedamp.coupling.response.segment import EventRun, Segment, Walk
+
+#: events per period after which a walk gives up: each is a step of Python
+EVENTS_PER_PERIOD = 2000
+
+
+def run_from(frame: Frame, state: np.ndarray, periods: int) -> EventRun:
+    """Return the engine's run over periods that begins with a state (k,)."""
+    system = frame.system
+    start, records = fitted(system, frame.restart_of(state)), new_records(system, periods, 0)
+    return engine_run(system, start, records, True, EVENTS_PER_PERIOD * periods)
 
 
 class Watch(Protocol):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -55,9 +56,9 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
     """
     if response.final is None:
         raise InputError(f"orbit.start: the run of the scene ends early ({response.status}); change the scene")
-    kind = response.classification
-    own = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
-    repeats = kind != "non-periodic" and (periods or own) % own == 0
+    kind, found = response.classification, periods_of(response.classification)
+    own = found or 1
+    repeats = found is not None and (periods or own) % own == 0
     first = [Start(period_map.state_of(response.final), periods or own)] if repeats else []
     states, sections = period_map.strobed(response.final, _WINDOW)
     orders = [periods] if periods else sorted({own, *_ORDERS})
@@ -72,7 +73,7 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
         returns += [Start(states[place], order) for place in places]
     if repeats:
         return Starts(first + returns, f"the run of the scene is {kind} {_FIGURE}; try another `from` or other periods")
-    asked = f", not repeating after {periods}" if kind != "non-periodic" else ""
+    asked = "" if found is None else f", not repeating after {periods}"
     return Starts(
         returns,
         f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of "

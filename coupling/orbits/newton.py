@@ -73,7 +73,7 @@ class Orbit:
     @cached_property
     def derivative(self) -> np.ndarray:
         """The derivative (k, k) of the period map in scaled coordinates."""
-        return np.asarray(self.passage.derivative * (self.scale / self.scale[:, None]))
+        return self.passage.scaled(self.scale)
 
     @cached_property
     def _multipliers(self) -> tuple[np.ndarray, int]:
@@ -160,7 +160,7 @@ class Problem:
         if math.isnan(parameter):
             return self.map
         if parameter not in self._maps:
-            _keep(self._maps, parameter, self.map.at(parameter), _MAPS)
+            keep(self._maps, parameter, self.map.at(parameter), _MAPS)
         return self._maps[parameter]
 
     def parameter(self, y: np.ndarray) -> float:
@@ -183,7 +183,7 @@ class Problem:
     def _passage(self, state: np.ndarray, parameter: float, derivative: bool = True) -> Passage | None:
         key = np.append(state, (parameter, derivative)).tobytes()
         if key not in self._passages:
-            _keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
+            keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
         return self._passages[key]
 
     def _walked(self, state: np.ndarray, parameter: float, derivative: bool) -> Passage | None:
@@ -192,9 +192,7 @@ class Problem:
             passage = self.at(parameter)(state, derivative)
         except InputError:
             return None
-        known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
-        known = known and bool(np.isfinite(passage.state).all())
-        return passage if known and not (derivative and not np.isfinite(passage.derivative).all()) else None
+        return passage if passage.serves(derivative) else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -211,7 +209,7 @@ class Problem:
         return known if np.isfinite(known).all() else np.zeros(self.size)
 
 
-def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+def keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
     """Keep a value in place of the oldest of many."""
     kept[key] = value
     if len(kept) > most:
@@ -241,7 +239,7 @@ def solve(
         parameter, nothing = problem.parameter(start), Passage.stopped(np.full(problem.size, np.nan), periods)
         return Orbit(OrbitStatus.STOPPED, parameter, state, periods, problem.map.scale, nothing, math.nan, 0)
     residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
-    relative = problem.map.scale / problem.map.scale[:, None]
+    scale = problem.map.scale
     for count in range(1, iterations + 1):  # noqa: B007
         right = np.append(-residual, -row @ (y - start))
         step = least_squares(bordered(problem, passage, slope, row), right)
@@ -251,7 +249,7 @@ def solve(
         taken, changed = _taken(problem, y, step, passage, bound, halvings)
         if taken is None:
             # near a bifurcation a residual at round-off is an orbit, and the next step is noise
-            if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, relative, size):
+            if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, scale, size):
                 status = OrbitStatus.OK
             else:
                 status = OrbitStatus.FORBIDDEN if changed else status
@@ -261,10 +259,10 @@ def solve(
         # what an exact slope would have left is of second order (Broyden's update, of this column only)
         slope = slope + residual * (moved[-1] / max(float(moved @ moved), np.finfo(float).tiny))
         missed = float(np.abs(residual).max(initial=0.0))
-        if last and missed <= _RESIDUAL * _reach(passage, relative, size):
+        if last and missed <= _RESIDUAL * _reach(passage, scale, size):
             status = OrbitStatus.OK
             break
-    missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
+    missed = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size)
     return Orbit(
         status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count,
         map=problem.at(problem.parameter(y)),
@@ -297,9 +295,9 @@ def at_parameter(problem: Problem, y: np.ndarray, slope: np.ndarray) -> Orbit | 
     return orbit if orbit.status is OrbitStatus.OK else None
 
 
-def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:
+def _reach(passage: Passage, scale: np.ndarray, size: float) -> float:
     """Return the size of a passage's sums: scaled states times its derivative."""
-    return size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0)))
+    return size * (1.0 + float(np.abs(passage.scaled(scale)).max(initial=0.0)))
 
 
 def _taken(
@@ -324,9 +322,8 @@ def _taken(
 
 def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Return the derivative of the residual by y, and a row below it (k + 1, k + 1)."""
-    scale = problem.map.scale
     matrix = np.empty((problem.size + 1, problem.size + 1))
-    matrix[:-1, :-1] = passage.derivative * (scale / scale[:, None]) - np.eye(problem.size)
+    matrix[:-1, :-1] = passage.scaled(problem.map.scale) - np.eye(problem.size)
     matrix[:-1, -1], matrix[-1] = slope, row
     return matrix
 

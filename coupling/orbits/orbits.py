@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from vanedamp.coupling.derivatives.numbers import number_of_motion
 from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
@@ -19,18 +20,18 @@ from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
+from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
-from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.rotation import FREQUENCY, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-#: tables whose numbers do not enter the equations of motion
-_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down", "initial")
+#: tables whose numbers move no orbit, though they move a run
+_STARTS = ("initial",)
 
 
 def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
@@ -54,10 +55,9 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
 def settled_orbit(scene: Scene) -> Orbit | None:
     """Return the orbit on which the run of a scene settles; None if it does not."""
     response = simulate(scene)
-    kind = response.classification
-    if response.final is None or kind == "non-periodic":
+    periods = periods_of(response.classification)
+    if response.final is None or periods is None:
         return None
-    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
     turns = scene.rotation if scene.excitation.engine_order is not None else None
     parameter = FREQUENCY if turns is None else f"rotation.{'speed' if turns.rpm is None else 'rpm'}"
     orbit = find_orbit(replace(scene, orbit=Table(parameter=parameter, periods=periods)), response.final)
@@ -137,10 +137,10 @@ class _Search:
         """Raise InputError for a parameter that is no number of the motion's equations, or bad at an end."""
         self.scene, self.table = scene, scene.orbit or Table()
         path, self.to, track = self.table.parameter, self.table.to, self.table.track
-        given = _number(scene, path, "orbit.parameter")
+        given = number_of_motion(scene, path, "orbit.parameter", _STARTS)
         self.low = given if self.table.from_ is None else self.table.from_
         if track is not None:
-            self.second = _number(scene, track.parameter, "orbit.track.parameter")
+            self.second = number_of_motion(scene, track.parameter, "orbit.track.parameter", _STARTS)
             self.first_second = self.second if track.from_ is None else track.from_
             if track.to == self.first_second or not 0.0 <= self._share(self.second) <= 1.0:
                 raise InputError(
@@ -185,16 +185,6 @@ class _Search:
         if self.table.start == "linear":
             return of_linear_motion(self.map, self.first, self.table.periods)
         return of_run(self.map, simulate(self.first), self.table.periods)
-
-
-def _number(scene: Scene, path: str, key: str) -> float:
-    """Return a number of the motion's equations. Raises InputError for another one; key: that names it."""
-    if path.split(".")[0] in _NO_PARAMETERS:
-        raise InputError(f"{key}: {path} is no number of the motion's equations; take one such as {FREQUENCY}")
-    try:
-        return number_at(scene.to_dict(), path)
-    except InputError as error:
-        raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
 
 
 def _at(scene: Scene, values: Mapping[str, float]) -> Scene:

@@ -16,7 +16,7 @@ from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
-from vanedamp.coupling.derivatives.walk import PassageWalk
+from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import choose
@@ -29,9 +29,6 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
-
-#: events per period after which a passage gives up: each is a step of Python
-_EVENTS_PER_PERIOD = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +84,7 @@ class PeriodMap:
         self, state: np.ndarray, periods: int, derivative: bool, halves: bool = True
     ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
         """Return a passage from a state (k,), and state and derivatives half a period after the start."""
-        system = self._frame.system
-        start, records = fitted(system, self._frame.restart_of(state)), new_records(system, periods, 0)
-        run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
+        run = run_from(self._frame, state, periods)
         for earlier in self._earlier:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
@@ -126,7 +121,7 @@ class PeriodMap:
         system = self._frame.system
         records = new_records(system, periods, 0)
         begun = fitted(system, at_speed_of(self.scene, start))
-        run = engine_run(system, begun, records, False, _EVENTS_PER_PERIOD * periods)
+        run = engine_run(system, begun, records, False, EVENTS_PER_PERIOD * periods)
         states = [self.state_of(begun)]
         while len(states) <= periods and run.advance_to(len(states)) is Status.OK:
             if (state := run.final()) is None:

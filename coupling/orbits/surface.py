@@ -15,15 +15,16 @@ import numpy as np
 from scipy.linalg import svd
 
 from vanedamp.coupling.derivatives.differences import NotSmooth
-from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
+from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import NULL
+from vanedamp.coupling.orbits.newton import keep
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
 #: by which steps of differences are shortened where another motion lies within them
 _SHRINKS = (1.0, 1e-2, 1e-4)
-#: passages that are kept for the next step, which often wants them again
-_PASSAGES = 64
+#: scenes and passages that are kept for the next step, which often wants them again
+_MAPS, _PASSAGES = 3, 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,18 +72,14 @@ class Surface:
         """Return the map at the numbers of y. Raises InputError for numbers that make no scene."""
         numbers = tuple(self.numbers(y).tolist())
         if numbers not in self._maps:
-            if len(self._maps) > 2:
-                self._maps.clear()
-            self._maps[numbers] = self.map.with_numbers(dict(zip(self.paths, numbers, strict=True)))
+            keep(self._maps, numbers, self.map.with_numbers(dict(zip(self.paths, numbers, strict=True))), _MAPS)
         return self._maps[numbers]
 
     def passage(self, y: np.ndarray, derivative: bool = True) -> Passage | None:
         """Return the passage of y; None if its numbers make no scene, or it has no end or no derivative."""
         key = np.append(y, derivative).tobytes()
         if key not in self._passages:
-            if len(self._passages) >= _PASSAGES:
-                del self._passages[next(iter(self._passages))]
-            self._passages[key] = self._walked(y, derivative)
+            keep(self._passages, key, self._walked(y, derivative), _PASSAGES)
         return self._passages[key]
 
     def _walked(self, y: np.ndarray, derivative: bool) -> Passage | None:
@@ -91,10 +88,7 @@ class Surface:
         except InputError:
             return None
         passage = (along.half if self.mirrored else along)(self.state(y), derivative)
-        if passage.status in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED):
-            return None
-        known = np.isfinite(passage.state).all() and (not derivative or np.isfinite(passage.derivative).all())
-        return passage if known else None
+        return passage if passage.serves(derivative) else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -102,8 +96,7 @@ class Surface:
 
     def derivative(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of the map in scaled coordinates."""
-        scale = self.map.scale
-        return np.asarray(passage.derivative * (scale / scale[:, None]))
+        return passage.scaled(self.map.scale)
 
     def deflated(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of the residual by the state, made regular.

@@ -229,6 +229,13 @@ def exchanged_energy(system: System, collided: np.ndarray) -> float:
     return max(float(collided.max()), float(lent))
 
 
+def periods_of(classification: str) -> int | None:
+    """Return after how many excitation periods a motion of a class repeats; None if it does not."""
+    if classification == "non-periodic":
+        return None
+    return int(classification.removeprefix("periodic-")) if classification.startswith("periodic-") else 1
+
+
 def class_name(kind: int) -> str:
     """Return "periodic-k", "non-periodic", "no-contact" or "stuck" (figures.repetition)."""
     return {NON_PERIODIC: "non-periodic", NO_CONTACT: "no-contact", STUCK: "stuck"}.get(kind, f"periodic-{kind}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -24,8 +25,7 @@ class Measures:
     """Takes what passes (derivatives.walk.Watch) from a period `first` on, and all peaks, impacts and samples.
 
     orders: of the harmonics; times: of samples, s since the start, rising; sampled: what they are of, in place of the
-    response. Derivatives are by sizes of numbers until
-    `figures` divides by them.
+    response. Derivatives are by the sizes of the numbers.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Measures:
             x, of_x = self._response.of(z[None], at[None])
             rate = float(self._response.rows[0] @ begun.flow.X @ z)
             peak.add(float(x[0, 0]), of_x[0, 0] + rate * moves)
-        self._sample(begun, series, Z)
+        self._sample(begun, Z)
         if segment.period >= self.first:
             self._integrate(begun, Z, course, end, shift)
 
@@ -180,7 +180,7 @@ class Measures:
             self._sums.value[row] += way * 0.5 * spring * gap**2
             self._sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
 
-    def _sample(self, begun: Before, series: object, Z: np.ndarray) -> None:
+    def _sample(self, begun: Before, Z: np.ndarray) -> None:
         """Take displacement, velocity and acceleration at the times within a segment."""
         start = begun.segment.start
         while self._times and self._times[0] <= start + begun.segment.duration:
@@ -198,6 +198,17 @@ class Measures:
 
     # --- results
 
+    @cached_property
+    def heights(self) -> Dual:
+        """The largest displacements of all periods (n,), m."""
+        turns = [peak.derivatives(self._P)[0] for peak in self.peaks]
+        return Dual(np.array([peak.value for peak in self.peaks]), np.reshape(turns, (-1, self._P)))
+
+    @property
+    def kinks(self) -> bool:
+        """Whether those of the periods that count hold on one side only."""
+        return any(peak.derivatives(self._P)[1] for peak in self.peaks[self.first :])
+
     def energies(self) -> dict[str, Dual]:
         """Return the work of the excitation and the losses over the periods that count, J."""
         return {name: self._sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
@@ -207,11 +218,7 @@ class Measures:
         system, of = self.dynamics.system, self.numbers.parts
         count = max(periods - self.first, 1)
         span = Dual(np.array([count * system.period]), count * of.period[None])
-        peaks = self.peaks[self.first :]
-        heights = Dual(
-            np.array([peak.value for peak in peaks]),
-            np.array([peak.derivatives(self._P)[0] for peak in peaks]).reshape(-1, self._P),
-        )
+        heights = self.heights[self.first :]
         top = int(np.argmax(heights.value))
         found = {
             "amplitude_mean": Dual(heights.value.mean(), heights.turns.mean(axis=0)),

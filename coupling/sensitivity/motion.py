@@ -13,18 +13,13 @@ from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
-from vanedamp.coupling.derivatives.walk import PassageWalk
-from vanedamp.coupling.engine.backends import engine_run
-from vanedamp.coupling.response.records import new_records
-from vanedamp.coupling.response.restart import fitted
+from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
 
 Paths = tuple[str | MatrixDirection, ...]
-#: events per period after which a motion gives up
-_EVENTS_PER_PERIOD = 2000
 #: growth of neighbouring motions beyond which derivatives of a run say nothing
 _PARTED = 1e6
 
@@ -82,19 +77,15 @@ class Motion:
         self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None, given: bool
     ) -> Passage:
         """Return the passage from a state (k,) that numbers turn by (k, P); given: as in derivatives.start.Start."""
-        system = self.frame.system
-        start, records = fitted(system, self.frame.restart_of(state)), new_records(system, periods, 0)
-        run = engine_run(system, start, records, True, _EVENTS_PER_PERIOD * periods)
-        names, turned = EventNames(self.scene, system), turns * self.numbers.size
+        names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
         walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given)
-        passage = walk.passage(run, periods)
+        passage = walk.passage(run_from(self.frame, state, periods), periods)
         self.completed = walk.derivative.completed
         return passage
 
     def grown(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of a passage in units of the coordinates' sizes."""
-        scale = self.dynamics.scale
-        return np.asarray(passage.derivative * (scale / scale[:, None]))
+        return passage.scaled(self.dynamics.scale)
 
 
 def check(status: PassageStatus, when: str = "") -> None:
@@ -114,17 +105,15 @@ def check_together(growth: np.ndarray) -> None:
 def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
     """Return the record of a motion with derivatives. turns: (k, P) of the state."""
     size, number = motion.numbers.size, len(motion.numbers)
-    figures, peaks = measures.figures(periods), measures.peaks
-    kinks = any(peak.derivatives(number)[1] for peak in peaks[measures.first :])
+    figures, heights = measures.figures(periods), measures.heights
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
     return Sensitivity(
         paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
-        note="; ".join(note for note, said in zip(_NOTES, (kinks, motion.completed), strict=True) if said),
+        note="; ".join(note for note, said in zip(_NOTES, (measures.kinks, motion.completed), strict=True) if said),
         values={name: float(np.real(each.value)) for name, each in figures.items()},
         derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
         state=frozen(state), state_derivative=frozen(turns),
-        peak=frozen([peak.value for peak in peaks]),
-        peak_derivative=rows([peak.derivatives(number)[0] for peak in peaks]),
+        peak=frozen(heights.value), peak_derivative=rows(heights.turns),
         **_series(measures, rows),
     )  # fmt: skip
 

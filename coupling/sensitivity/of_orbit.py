@@ -41,7 +41,7 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
 def _moved(orbit: Orbit, passage: Passage, numbers: Numbers) -> np.ndarray:
     """Return how numbers move an orbit (k, P). Raises NoDerivative where it does not depend smoothly on them."""
     scale = orbit.scale
-    matrix = np.eye(len(scale)) - passage.derivative * (scale / scale[:, None])
+    matrix = np.eye(len(scale)) - passage.scaled(scale)
     right = passage.by_number * numbers.size / scale[:, None]
     left, sizes, rows = svd(matrix)
     reach = max(1.0, float(sizes.max(initial=0.0)))

@@ -15,7 +15,6 @@ from vanedamp.coupling.orbits.orbits import settled_orbit
 from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.ramp import Ramp as RampTable
-from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.integrands import Functionals
 from vanedamp.coupling.sensitivity.measures import Measures
@@ -37,8 +36,7 @@ def of_run(scene: Scene, paths: Paths, start: RestartState | None, **options: An
     scene = _alone(scene)
 
     def begins(other: Scene, frame: Frame) -> np.ndarray:
-        given = start_of(other, frame.system) if start is None else at_speed_of(other, start)
-        return frame.state_of(given)
+        return _own_start(other, frame) if start is None else frame.state_of(at_speed_of(other, start))
 
     motion = Motion(scene, paths, begins=begins)
     periods, numbers = scene.time.simulated, motion.numbers
@@ -57,7 +55,7 @@ def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Se
     def begins(other: Scene, frame: Frame) -> np.ndarray:
         return frame.state_of(blown_or_pulled(other, table)) if state is None else state
 
-    motion = Motion(scene, paths, partial(_freed, table=table), begins)
+    motion = Motion(scene, paths, partial(free_scene, table=table), begins)
     numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode
     row, own = np.zeros((1, len(response))), np.zeros((len(numbers), 1, len(response)))
     row[0, mode], own[:, 0, mode] = response[mode], numbers.parts.response[:, mode]
@@ -77,9 +75,9 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
     course, peaks, turned = courses(ramp.scene)[0], list[float](), list[np.ndarray]()
     for period, value in enumerate(course.value[: len(ramp.runs[0].time)].tolist()):
         at = partial(_ramped, table=table, value=value)
-        motion = Motion(scene, paths, at, _at_rest, speed=float(course.speed[0]))
+        motion = Motion(scene, paths, at, _own_start, speed=float(course.speed[0]))
         if period == 0:
-            state, turns = _at_rest(scene, motion.frame), motion.numbers.parts.start.T / motion.numbers.size
+            state, turns = _own_start(scene, motion.frame), motion.numbers.parts.start.T / motion.numbers.size
             if table.start == "steady":
                 state, turns = _steady(motion.scene, paths)
             growth = np.eye(len(state))
@@ -88,8 +86,8 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
         check(passage.status, f"period {period}: ")
         growth = motion.grown(passage) @ growth
         state, turns = passage.state, passage.by_number
-        peaks.append(measures.peaks[0].value)
-        turned.append(measures.peaks[0].derivatives(len(paths))[0] / motion.numbers.size)
+        peaks.append(float(measures.heights.value[0]))
+        turned.append(measures.heights.turns[0] / motion.numbers.size)
     check_together(growth)
     top = int(np.argmax(peaks))
     return replace(
@@ -110,15 +108,11 @@ def _alone(scene: Scene) -> Scene:
     return replace(choose(scene).scene, sweep={}, orbit=None)
 
 
-def _freed(scene: Scene, table: RingDownTable) -> Scene:
-    return free_scene(scene, table)
-
-
 def _ramped(scene: Scene, table: RampTable, value: float) -> Scene:
     return scene_at(ramped(scene), table, value)
 
 
-def _at_rest(scene: Scene, frame: Frame) -> np.ndarray:
+def _own_start(scene: Scene, frame: Frame) -> np.ndarray:
     """Return the state with which the run of a scene begins."""
     return frame.state_of(start_of(frame.scene, frame.system))
 

@@ -60,7 +60,7 @@ def _summit(row: np.ndarray, series: Series, course: Course, node: int, duration
     """Return the time of the summit near a node by Newton's method, s; None if it lies beyond the segment."""
     at, z = float(course.time[node]), course.z[node]
     slope, bend = row @ series.X, row @ series.X @ series.X
-    alone, nothing = Series(series.X, np.zeros((0, *series.X.shape))), np.zeros((len(z), 0))
+    nothing = np.zeros((len(z), 0))
     for _ in range(_STEPS):
         curve = float(bend @ z)
         if curve == 0.0:
@@ -68,7 +68,7 @@ def _summit(row: np.ndarray, series: Series, course: Course, node: int, duration
         step = -float(slope @ z) / curve
         if not 0.0 <= at + step <= duration:
             return None
-        z, at = alone.course(z, nothing, step, False).last, at + step
+        z, at = series.alone.course(z, nothing, step, False).last, at + step
         if abs(step) <= _SMALL * duration:
             break
     return at if float(row @ z) * float(bend @ z) < 0.0 else None

@@ -11,7 +11,7 @@ import numpy as np
 
 
 class SensitivityStatus(StrEnum):
-    """Whether derivatives exist and mean something. Unless `ok`, they are nan."""
+    """Whether derivatives exist and mean something. Unless `ok`, there are none, nor figures."""
 
     OK = "ok"
     GRAZING = "grazing"

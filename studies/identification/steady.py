@@ -11,6 +11,7 @@ import numpy as np
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.orbits import map_along
+from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -96,10 +97,9 @@ def run(scene: Scene, start: RestartState | None, count: Counter[str]) -> Steady
 def settled(steady: Steady | None, count: Counter[str]) -> Steady | None:
     """Return the orbit in which a run has ended; the run itself if its motion does not repeat."""
     response = None if steady is None else steady.response
-    if steady is None or response is None or response.final is None or response.classification == "non-periodic":
+    periods = None if response is None else periods_of(response.classification)
+    if steady is None or response is None or response.final is None or periods is None:
         return steady
-    kind = response.classification
-    periods = int(kind.removeprefix("periodic-")) if kind.startswith("periodic-") else 1
     return _orbit(steady.scene, periods, response.final, count) or steady
 
 
