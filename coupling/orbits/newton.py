@@ -126,24 +126,10 @@ class Point(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """Orbits of a period map over a range of its parameter, scaled.
-
-    origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
-    passages so far.
-    """
+class Scaled:
+    """Orbits of a period map in scaled coordinates."""
 
     map: PeriodMap
-    origin: float = math.nan
-    span: float = 1.0
-    count: Counter[str] = field(default_factory=Counter)
-    _maps: dict[float, PeriodMap] = field(default_factory=dict)
-    _passages: dict[bytes, Passage | None] = field(default_factory=dict)
-
-    @cached_property
-    def along_parameter(self) -> np.ndarray:
-        """The unit row (k + 1,) of the parameter: orbits in a plane normal to it have one value of that."""
-        return np.append(np.zeros(self.size), 1.0)
 
     @property
     def size(self) -> int:
@@ -154,6 +140,26 @@ class Problem:
     def weight(self) -> np.ndarray:
         """Sizes (k,) by which states are divided: the mean square of a scaled state counts."""
         return np.asarray(self.map.scale * math.sqrt(self.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Scaled):
+    """Orbits of a period map over a range of its parameter, scaled.
+
+    origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
+    passages so far.
+    """
+
+    origin: float = math.nan
+    span: float = 1.0
+    count: Counter[str] = field(default_factory=Counter)
+    _maps: dict[float, PeriodMap] = field(default_factory=dict)
+    _passages: dict[bytes, Passage | None] = field(default_factory=dict)
+
+    @cached_property
+    def along_parameter(self) -> np.ndarray:
+        """The unit row (k + 1,) of the parameter: orbits in a plane normal to it have one value of that."""
+        return np.append(np.zeros(self.size), 1.0)
 
     def at(self, parameter: float) -> PeriodMap:
         """Return the map at a value of the parameter. Raises InputError for one that is no scene."""

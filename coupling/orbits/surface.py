@@ -6,10 +6,8 @@ by their ranges. Scalar conditions on it are borders (orbits.conditions), follow
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import svd
@@ -17,7 +15,7 @@ from scipy.linalg import svd
 from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import NULL
-from vanedamp.coupling.orbits.newton import keep
+from vanedamp.coupling.orbits.newton import Scaled, keep
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
@@ -28,7 +26,7 @@ _MAPS, _PASSAGES = 3, 64
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Scaled):
     """Orbits of a period map over two numbers of its scene.
 
     paths: of the numbers; origin, span: (2,) values at which the scaled ones are 0, and their ranges; mirrored: whether
@@ -36,7 +34,6 @@ class Surface:
     those are told apart in which any orbit may be moved (`deflated`).
     """
 
-    map: PeriodMap
     paths: tuple[str, str]
     origin: np.ndarray
     span: np.ndarray
@@ -45,16 +42,6 @@ class Surface:
     right: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _passages: dict[bytes, Passage | None] = field(default_factory=dict)
     _maps: dict[tuple[float, ...], PeriodMap] = field(default_factory=dict)
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates of a state."""
-        return len(self.map.scale)
-
-    @cached_property
-    def weight(self) -> np.ndarray:
-        """Sizes (k,) by which states are divided: the mean square of a scaled state counts."""
-        return np.asarray(self.map.scale * math.sqrt(self.size))
 
     def pack(self, state: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """Return y (k + 2,) of a state (k,) and the numbers (2,)."""
