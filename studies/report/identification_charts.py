@@ -10,11 +10,11 @@ from plotly.subplots import make_subplots
 
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.identification.record import Identification, Proposal
-from vanedamp.studies.report.charts import COLOURS
+from vanedamp.studies.report.charts import COLOURS, axis_title
 
 _DARK, _PALE, _BAND = "#0f172a", "#94a3b8", "rgba(29, 79, 145, 0.18)"
-#: panels side by side
-_COLUMNS = 3
+#: panels side by side, and how far apart, as a fraction of the width: the titles of their axes lie between
+_COLUMNS, _APART = 3, 0.13
 #: rise of the misfit beyond which a profile is not drawn, over the threshold
 _HIGH = 3.0
 
@@ -24,7 +24,10 @@ def data_figure(record: Identification) -> go.Figure:
     count = len(record.channels)
     columns = min(count, _COLUMNS)
     titles = [f"{channel['measurement']}, {channel['quantity']}" for channel in record.channels]
-    figure = make_subplots(rows=math.ceil(count / columns), cols=columns, subplot_titles=titles, vertical_spacing=0.18)
+    figure = make_subplots(
+        rows=math.ceil(count / columns), cols=columns, subplot_titles=titles, vertical_spacing=0.18,
+        horizontal_spacing=_APART,
+    )  # fmt: skip
     for number, channel in enumerate(record.channels):
         place = {"row": number // columns + 1, "col": number % columns + 1}
         own = record.data_channel == number
@@ -57,7 +60,9 @@ def profile_figure(record: Identification) -> go.Figure:
     """Draw the rise of the misfit along every number, the others at their best, and where its interval ends."""
     count = len(record.paths)
     columns = min(count, _COLUMNS)
-    figure = make_subplots(rows=math.ceil(count / columns), cols=columns, vertical_spacing=0.2)
+    figure = make_subplots(
+        rows=math.ceil(count / columns), cols=columns, vertical_spacing=0.2, horizontal_spacing=_APART
+    )  # fmt: skip
     for number, path in enumerate(record.paths):
         place = {"row": number // columns + 1, "col": number % columns + 1}
         own = record.profile_number == number
@@ -70,8 +75,7 @@ def profile_figure(record: Identification) -> go.Figure:
         for end, is_open in zip(record.interval[number], record.open[number], strict=True):
             if not is_open:
                 figure.add_vline(x=end, line={"color": _PALE, "dash": "dot"}, **place)
-        unit = unit_of(path)
-        figure.update_xaxes(title=path if unit == "1" else f"{path}, {unit}", **place)
+        figure.update_xaxes(title=axis_title(path, unit_of(path)), **place)
         figure.update_yaxes(title="rise of the misfit", range=[0.0, _HIGH * record.threshold], **place)
     return figure
 
@@ -106,6 +110,6 @@ def proposal_figure(record: Identification, proposal: Proposal) -> go.Figure:
             x=proposal.points[own, last], y=proposal.shrink[own, proposal.worst], mode="lines+markers",
             line={"color": COLOURS[number % len(COLOURS)]}, name=name or "measurement",
         )  # fmt: skip
-    figure.update_xaxes(title=proposal.axes[last])
+    figure.update_xaxes(title=axis_title(proposal.axes[last], unit_of(proposal.axes[last])))
     figure.update_yaxes(title=f"uncertainty left of {record.paths[proposal.worst]}", rangemode="tozero")
     return figure
