@@ -409,6 +409,11 @@ class Case:
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
 
+    def fatigue_data(self, volume: str) -> dict[str, float]:
+        """Return the fatigue data of a volume group's material, by name; empty without any."""
+        strength = self.strengths([volume]).get(volume)
+        return {} if strength is None else {"strength": strength}
+
     @property
     def response_label(self) -> str | None:
         """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.

@@ -1,0 +1,1 @@
+"""Strength: stress at the hot spots of reduced models."""
