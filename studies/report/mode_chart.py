@@ -125,18 +125,56 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
-    eye = dict(zip("xyz", (_DISTANCE * viewpoint(points, shapes[list(chosen).index(mode)])).tolist(), strict=True))
-    axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
+    _dressed(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
     figure.update_layout(
-        height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
-        legend={"x": 0.0, "y": 0.0}, uirevision="kept", meta=points.T.astype(np.float32).round(4).tolist(),
+        meta=points.T.astype(np.float32).round(4).tolist(),
         updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
+    )
+    return figure
+
+
+def _dressed(figure: go.Figure, view: np.ndarray) -> go.Figure:
+    """Return a figure of a structure in mm with axes, seen from a direction (3,)."""
+    eye = dict(zip("xyz", (_DISTANCE * view).tolist(), strict=True))
+    axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
+    return figure.update_layout(
+        height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
+        legend={"x": 0.0, "y": 0.0}, uirevision="kept",
         scene={
             "aspectmode": "data", "xaxis": axis | {"title": "x, mm"}, "yaxis": axis | {"title": "y, mm"},
             "zaxis": axis | {"title": "z, mm"}, "camera": {"eye": eye},
         },
     )  # fmt: skip
-    return figure
+
+
+def stress_figure(
+    values: Mapping[str, np.ndarray], of: Surface, mode: int, spots: Mapping[str, Mapping[str, Any]]
+) -> go.Figure:
+    """Draw the structure at rest, in mm, coloured by the mode's von Mises stress, and hot spots on it.
+
+    values: of a record of `vanedamp modal` with "von_mises"; spots: by name (rom.recovery.hot_spots).
+    """
+    points, stress = 1e3 * values["coordinates"][of.nodes], 1e-12 * values["von_mises"][of.nodes]
+    (x, y, z), (i, j, k) = points.astype(np.float32).T, of.triangles.astype(np.int32).T
+    figure = go.Figure(go.Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, intensity=stress.astype(np.float32), colorscale="Viridis", flatshading=False,
+        colorbar={"title": {"text": "von Mises stress,<br>MPa per µm"}, "len": 0.7, "thickness": 16}, name="stress",
+        hovertemplate="%{intensity:.4g} MPa per µm<extra></extra>",
+        lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
+    ))  # fmt: skip
+    places = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
+    figure.add_scatter3d(
+        x=places[:, 0], y=places[:, 1], z=places[:, 2], mode="markers+text", text=list(spots), name="hot spots",
+        marker={"size": 6, "color": "#dc2626", "line": {"color": "#fff", "width": 1}}, textposition="top center",
+        hovertemplate="%{text}: %{x:.2f}, %{y:.2f}, %{z:.2f} mm<extra></extra>",
+    )  # fmt: skip
+    shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
+    return _dressed(figure, viewpoint(points, shape))
+
+
+def stress_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
+    """Yield x, y, z (m) and von Mises stress per displacement (Pa/m) at the nodes of the surface."""
+    yield from np.column_stack([values["coordinates"][of.nodes], values["von_mises"][of.nodes]]).tolist()
 
 
 def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
