@@ -1,0 +1,164 @@
+"""Wear of the contacts of a run: volumes, depths, work rates, and how the cavities open by them.
+
+Sliding wears by Archard's law (J. F. Archard, J. Appl. Phys. 24, 981, 1953): the volume is K/H times the integral of normal
+force times slip speed, which the engines accumulate exactly. Impacts add `impact_rate` times the sum of their energies,
+each to the power n. Both partners lose their share of the volume.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.response.response import ContactWork
+from vanedamp.coupling.scene.bodies import Damper
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.wear import Wear, WearRates
+
+_HOUR = 3600.0
+#: largest difference of wear and friction work in the energy balance, relative to the latter
+_SAME = 1e-9
+#: surfaces whose wear opens a cavity along and across
+ALONG, ACROSS = ("left", "right", "body"), ("floor", "ceiling")
+
+
+class ContactWear(NamedTuple):
+    """Wear of one contact, at the mean rates of the evaluated periods.
+
+    damper, side, corner: as of an Event. sliding: integral of normal force times slip speed, N m; friction: its
+    coefficient times that, J; impacts: sum of the impacts' energies to the power n, J^n; count: their number. work_rate:
+    sliding per time, W. volume_rate: m^3/h of both partners, of which the cavity (of neighbours the right body) loses
+    `share`; depth_rate: m/h, None where the patch is not known. *_confidence: half widths of 95 % confidence intervals,
+    None where there are too few periods.
+    """
+
+    damper: int
+    side: str
+    corner: int
+    sliding: float
+    friction: float
+    impacts: float
+    count: int
+    work_rate: float
+    volume_rate: float
+    volume_rate_confidence: float | None
+    depth_rate: float | None
+    share: float
+    area: float | None
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return f"{self.side} of {self.damper}" + (f", corner {self.corner}" if self.corner >= 0 else "")
+
+    def hours_to(self, depth: float) -> float | None:
+        """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
+        return depth / self.depth_rate if self.depth_rate else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return self._asdict()
+
+
+class Patch(NamedTuple):
+    """Rates of a contact, and its patch: sliding 1/Pa, impact m^3/J^n, share of the cavity, area m^2 (None: unknown)."""
+
+    sliding: float
+    impact: float
+    share: float
+    area: float | None
+
+
+def contact_wear(scene: Scene, work: Sequence[ContactWork], seconds: float) -> tuple[ContactWear, ...]:
+    """Return the wear of contacts whose work is that of some seconds. The scene has a [wear] table."""
+    return tuple(_wear(one, patch, seconds) for one, patch in zip(work, patches(scene, work), strict=True))
+
+
+def _wear(one: ContactWork, patch: Patch, seconds: float) -> ContactWear:
+    per_hour = _HOUR / seconds
+    volume = per_hour * (patch.sliding * one.sliding + patch.impact * one.impacts)
+    spread = [one.sliding_confidence, one.impacts_confidence]
+    confidence = None
+    if None not in spread:
+        # sliding and impacts of one motion vary together
+        confidence = per_hour * (patch.sliding * (spread[0] or 0.0) + patch.impact * (spread[1] or 0.0))
+    return ContactWear(
+        one.damper, one.side, one.corner, one.sliding, one.friction * one.sliding, one.impacts, one.count,
+        one.sliding / seconds, volume, confidence, None if patch.area is None else volume / patch.area, patch.share,
+        patch.area,
+    )  # fmt: skip
+
+
+def ledger_gap(scene: Scene, work: Sequence[ContactWork], friction: float) -> float:
+    """Return how far coefficient of friction times wear volume over K/H is from the ledger's friction work (J), relative.
+
+    Only contacts with a sliding rate have a volume; of the others the work itself counts.
+    """
+    total = sum(
+        one.friction * (patch.sliding * one.sliding / patch.sliding if patch.sliding else one.sliding)
+        for one, patch in zip(work, patches(scene, work), strict=True)
+    )
+    return abs(total - friction) / max(abs(friction), abs(total), np.finfo(float).tiny)
+
+
+def ledger_warning(scene: Scene, work: Sequence[ContactWork], friction: float) -> tuple[str, ...]:
+    """Return the warning that wear and the energy balance differ; empty if they agree to round-off."""
+    gap = ledger_gap(scene, work, friction)
+    if gap <= _SAME:
+        return ()
+    return (f"wear: friction work by wear volumes and by the energy balance differ by {gap:.1e} of it",)
+
+
+def patches(scene: Scene, work: Sequence[ContactWork]) -> list[Patch]:
+    """Return the rates and patch of every contact."""
+    assert scene.wear is not None
+    places = [(one.damper, one.side) for one in work]
+    return [_patch(scene, scene.wear, *place, places.count(place)) for place in places]
+
+
+def _patch(scene: Scene, wear: Wear, damper: int, side: str, corners: int) -> Patch:
+    tables: list[WearRates] = [
+        pair for pair in reversed(wear.pair) if pair.damper in (None, damper) and pair.side in (None, side)
+    ]
+    tables.append(wear)
+
+    def first(key: str, default: Any) -> Any:
+        return next((value for table in tables if (value := getattr(table, key)) is not None), default)
+
+    area, edge = first("area", None), first("edge", None)
+    if area is None and side in ALONG + ACROSS and wear.width is not None:
+        extent = _extent(wear, scene.damper[damper], side)
+        if edge is not None and corners > 1:
+            area = edge * wear.width
+        elif extent:
+            area = extent * wear.width / corners
+    return Patch(first("sliding_rate", 0.0), first("impact_rate", 0.0), first("share", 0.5), area)
+
+
+def _extent(wear: Wear, body: Damper, side: str) -> float | None:
+    """Return the extent of a body's face, m: of a disc, which has none, None."""
+    if body.form.rolls:
+        return None
+    length, height = (2.0 * half for half in body.half_extent)
+    return (height or wear.height) if side in ALONG else (length or wear.length)
+
+
+def opening(scene: Scene, places: Sequence[tuple[int, str]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return how depths of wear (c,), m, of both partners, open the cavities: matrices (cavities, c) of gap and play.
+
+    places: body and side of every contact. A face wears by the mean of its contacts, whatever the share of the cavity;
+    of the floors and ceilings of several bodies in a cavity the mean counts.
+    """
+    along, across = (np.zeros((len(scene.cavity), len(places))) for _ in range(2))
+    for contact, (damper, side) in enumerate(places):
+        if side in ALONG + ACROSS:
+            cavity = scene.cavity_of(scene.damper[damper])
+            same = 1.0 / places.count((damper, side))
+            if side in ALONG:
+                along[cavity, contact] = same
+            elif scene.damper[damper].form.extended:
+                bodies = [n for n in scene.bodies_in(scene.cavity[cavity]) if scene.damper[n].form.extended]
+                across[cavity, contact] = same / len(bodies)
+    return along, across
