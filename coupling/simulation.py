@@ -13,6 +13,7 @@ from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.strength.wear import with_wear
 
 
 def simulate(
@@ -34,6 +35,8 @@ def simulate(
     chosen = choose(scene)
     response = respond(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started
+    response = with_wear(chosen.scene, response)
     return replace(
-        response, estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene), wall_time_s=took
+        response, estimate=chosen.estimate, advice=chosen.advice,
+        warnings=warnings_of(chosen.scene) + response.warnings, wall_time_s=took,
     )  # fmt: skip

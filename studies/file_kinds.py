@@ -23,6 +23,7 @@ KINDS = {
             "vanedamp.studies.identification.tables:IdentificationFile",
             ("numbers", "forced", "decay", "impacts"),
         ),
+        FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
         FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),

@@ -51,6 +51,9 @@ from vanedamp.studies.identification.density import LogDensity as LogDensity
 from vanedamp.studies.identification.record import Identification as Identification
 from vanedamp.studies.identification.search import identify as identify
 from vanedamp.studies.identification.study import IdentificationStudy as IdentificationStudy
+from vanedamp.studies.life.life import life as life
+from vanedamp.studies.life.record import LifeRecord as LifeRecord
+from vanedamp.studies.life.study import LifeStudy as LifeStudy
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study
 from vanedamp.studies.parallel_sweep import sweep as sweep

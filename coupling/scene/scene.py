@@ -29,6 +29,7 @@ from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.coupling.scene.wear import Wear
 from vanedamp.files.display import Displayed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.open_record import OpenRecord
@@ -177,6 +178,8 @@ class Scene(OpenRecord, Displayed):
     """how the runs of a sweep begin"""
     sweep: Annotated[dict[str, Axis], Field(json_schema_extra=_describe_kept)] = field(default_factory=dict)
     """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
+    wear: Wear | None = None
+    """wear of the contacts"""
     orbit: Orbit | None = None
     """periodic motion that `vanedamp orbits` finds and follows"""
     ramp: Ramp | None = None

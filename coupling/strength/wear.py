@@ -1,18 +1,20 @@
 """Wear of the contacts of a run: volumes, depths, work rates, and how the cavities open by them.
 
-Sliding wears by Archard's law (J. F. Archard, J. Appl. Phys. 24, 981, 1953): the volume is K/H times the integral of normal
-force times slip speed, which the engines accumulate exactly. Impacts add `impact_rate` times the sum of their energies,
-each to the power n. Both partners lose their share of the volume.
+Sliding wears by Archard's law (J. F. Archard, J. Appl. Phys. 24, 981, 1953): the volume is K/H times the integral of
+normal force times slip speed, which the engines accumulate exactly. Impacts add `impact_rate` times the sum of their
+energies, each to the power n. Both partners lose their share of the volume.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.response.response import ContactWork
+from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
+from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.wear import Wear, WearRates
@@ -24,51 +26,27 @@ _SAME = 1e-9
 ALONG, ACROSS = ("left", "right", "body"), ("floor", "ceiling")
 
 
-class ContactWear(NamedTuple):
-    """Wear of one contact, at the mean rates of the evaluated periods.
-
-    damper, side, corner: as of an Event. sliding: integral of normal force times slip speed, N m; friction: its
-    coefficient times that, J; impacts: sum of the impacts' energies to the power n, J^n; count: their number. work_rate:
-    sliding per time, W. volume_rate: m^3/h of both partners, of which the cavity (of neighbours the right body) loses
-    `share`; depth_rate: m/h, None where the patch is not known. *_confidence: half widths of 95 % confidence intervals,
-    None where there are too few periods.
-    """
-
-    damper: int
-    side: str
-    corner: int
-    sliding: float
-    friction: float
-    impacts: float
-    count: int
-    work_rate: float
-    volume_rate: float
-    volume_rate_confidence: float | None
-    depth_rate: float | None
-    share: float
-    area: float | None
-
-    @property
-    def name(self) -> str:
-        """Name for people."""
-        return f"{self.side} of {self.damper}" + (f", corner {self.corner}" if self.corner >= 0 else "")
-
-    def hours_to(self, depth: float) -> float | None:
-        """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
-        return depth / self.depth_rate if self.depth_rate else None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return self._asdict()
-
-
 class Patch(NamedTuple):
-    """Rates of a contact, and its patch: sliding 1/Pa, impact m^3/J^n, share of the cavity, area m^2 (None: unknown)."""
+    """Rates of a contact and its patch: sliding 1/Pa, impact m^3/J^n, share of the cavity, area m^2 (None: unknown)."""
 
     sliding: float
     impact: float
     share: float
     area: float | None
+
+
+def with_wear(scene: Scene, response: Response) -> Response:
+    """Return a response with the wear of its contacts, and a warning if it does not fit the energy balance.
+
+    As it is where the scene has no [wear], or the run ended within its first evaluated period.
+    """
+    work, periods = response.contact_work, response.periods - response.transient
+    if scene.wear is None or work is None or periods < 1:
+        return response
+    wear = contact_wear(scene, work, periods / response.frequency)
+    return replace(
+        response, wear=wear, warnings=response.warnings + ledger_warning(scene, work, response.energy["friction"])
+    )
 
 
 def contact_wear(scene: Scene, work: Sequence[ContactWork], seconds: float) -> tuple[ContactWear, ...]:
@@ -92,7 +70,7 @@ def _wear(one: ContactWork, patch: Patch, seconds: float) -> ContactWear:
 
 
 def ledger_gap(scene: Scene, work: Sequence[ContactWork], friction: float) -> float:
-    """Return how far coefficient of friction times wear volume over K/H is from the ledger's friction work (J), relative.
+    """Return by how much coefficient of friction times wear volume over K/H misses the friction work (J), relative.
 
     Only contacts with a sliding rate have a volume; of the others the work itself counts.
     """
@@ -100,7 +78,7 @@ def ledger_gap(scene: Scene, work: Sequence[ContactWork], friction: float) -> fl
         one.friction * (patch.sliding * one.sliding / patch.sliding if patch.sliding else one.sliding)
         for one, patch in zip(work, patches(scene, work), strict=True)
     )
-    return abs(total - friction) / max(abs(friction), abs(total), np.finfo(float).tiny)
+    return abs(total - friction) / max(abs(friction), abs(total), 1e-300)
 
 
 def ledger_warning(scene: Scene, work: Sequence[ContactWork], friction: float) -> tuple[str, ...]:
@@ -162,3 +140,21 @@ def opening(scene: Scene, places: Sequence[tuple[int, str]]) -> tuple[np.ndarray
                 bodies = [n for n in scene.bodies_in(scene.cavity[cavity]) if scene.damper[n].form.extended]
                 across[cavity, contact] = same / len(bodies)
     return along, across
+
+
+def body_shares(scene: Scene, contacts: Sequence[Any]) -> np.ndarray:
+    """Return the shares (bodies, c) of the volumes of contacts (with damper, side and share) that each body loses."""
+    shares = np.zeros((len(scene.damper), len(contacts)))
+    for contact, one in enumerate(contacts):
+        if one.side in ALONG + ACROSS:
+            shares[one.damper, contact] = 1.0 - one.share
+            if one.side == "body":
+                shares[one.damper + 1, contact] = one.share
+    return shares
+
+
+def body_volumes(scene: Scene) -> np.ndarray:
+    """Return the volumes of the bodies as rectangles, m^3; nan where an extent is not known."""
+    assert scene.wear is not None
+    extents = [(_extent(scene.wear, body, "floor"), _extent(scene.wear, body, "left")) for body in scene.damper]
+    return np.array([(a or np.nan) * (b or np.nan) * (scene.wear.width or np.nan) for a, b in extents])

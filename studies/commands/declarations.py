@@ -190,6 +190,11 @@ COMMANDS = (
         writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(
+        "life", "how long a damper damps: wear over hours, and the response with the gaps that it opens", 92,
+        (input_file("STUDY.toml"), output_file("LIFE.h5"), json_file, workers, resume),
+        writes={"output": _RECORD}, checkpoint=True,
+    ),
+    Command(
         "identify", "numbers of a scene from measurements, with what these tell of each", 95,
         (
             input_file("STUDY.toml"), output_file("IDENTIFICATION.h5"),

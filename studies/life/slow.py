@@ -15,6 +15,7 @@ import numpy as np
 
 #: stages, their weights, and the difference of both orders
 _STAGES = ((0.5,), (0.0, 0.75), (2 / 9, 1 / 3, 4 / 9))
+_WEIGHTS = np.array(_STAGES[-1])
 _ERROR = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
 #: growth of a step at most and at least, and by how much it stays below what its error allows
 _GROWTH, _SHRINK, _SAFETY = 3.0, 0.2, 0.85
@@ -119,6 +120,5 @@ def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float)
     excess = np.maximum(error - step * np.sqrt(_ERROR**2 @ scatter**2), 0.0)
     # what shifts the motion in time goes on with its rate, which solves the linearised equation
     kept = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
-    weights = np.array(_STAGES[-1])
-    band = np.sqrt((kept * now.band) ** 2 + step**2 * (weights**2 @ scatter[:-1] ** 2))
+    band = np.sqrt((kept * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
     return Moment(now.time + step, state, found[-1], band, np.abs(kept) * now.error + excess), excess
