@@ -34,7 +34,7 @@ class Life(Band):
     """hours of operation [h]"""
     dwell: Literal["uniform", "peak"] | tuple[NonNegative, ...] = "uniform"
     """time spent at the points of the band: "uniform"; "peak", all at the one with the largest amplitude; or a list of
-    weights"""
+    weights [-]"""
     threshold: _Ratio = 0.5
     """reduction of the amplitude without bodies below which the damper is lost [-]"""
     measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
