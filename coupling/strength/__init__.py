@@ -1,0 +1,1 @@
+"""What vibration does to the structure: fatigue data of materials, utilisation, life."""
