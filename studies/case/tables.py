@@ -176,11 +176,14 @@ class MaterialTable:
         if len(temperatures) == 1 or any(b <= a for a, b in pairwise(temperatures)):
             raise ValueError("young_at: expected [[temperature, modulus], ...], at least two, temperatures ascending")
 
-    @property
-    def strength_data(self) -> Fatigue | None:
-        """The fatigue data, complete; of a material with a fatigue strength only, that strength."""
-        fatigue = self.fatigue or (None if self.fatigue_strength is None else Fatigue())
-        return None if fatigue is None else fatigue.completed(self.fatigue_strength)
+    def fatigue_data(self, strength: float | None) -> Fatigue | None:
+        """Return the fatigue data, complete, or only the fatigue strength; None without either.
+
+        strength: the fatigue strength if the material has none, Pa. Raises ValueError for data without any.
+        """
+        strength = self.fatigue_strength or strength
+        fatigue = self.fatigue or (None if strength is None else Fatigue())
+        return None if fatigue is None else fatigue.completed(strength)
 
 
 #: keys by which a table below [material] is a material, or fatigue data
@@ -213,13 +216,19 @@ def _spread(materials: dict[str, MaterialTable | Fatigue]) -> dict[str, Material
                 raise ValueError(f"{group}: has fatigue data only; head them [material.{group}.fatigue]")
             continue
         spread[group] = replace(table, fatigue=table.fatigue or common)
-        try:
-            _ = spread[group].strength_data
-        except ValueError as error:
-            raise ValueError(f"{group}.fatigue.{error}") from None
     if not spread:
         raise ValueError("no material; add [material.default] with young, poisson and density")
+    least = _least_strength(spread)
+    for group, material in spread.items():
+        try:
+            material.fatigue_data(least)
+        except ValueError as error:
+            raise ValueError(f"{group}.fatigue.{error}") from None
     return spread
+
+
+def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
+    return min((t.fatigue_strength for t in materials.values() if t.fatigue_strength is not None), default=None)
 
 
 _Material = Annotated[
@@ -463,7 +472,7 @@ class Case:
     @property
     def fatigue_strength(self) -> float | None:
         """The least of the materials' fatigue strengths, Pa."""
-        return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
+        return _least_strength(self.material)
 
     def strengths(self, volumes: Iterable[str]) -> dict[str, float]:
         """Return the fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
@@ -474,9 +483,12 @@ class Case:
         return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
 
     def fatigue(self, volume: str) -> Fatigue | None:
-        """Return the complete fatigue data of a volume group's material; None without any."""
+        """Return the complete fatigue data of a volume group's material; None without any.
+
+        Without a fatigue strength of its own the material has the least of all (`strengths`).
+        """
         table = self.material.get(volume, self.material.get("default"))
-        return None if table is None else table.strength_data
+        return None if table is None else table.fatigue_data(self.fatigue_strength)
 
     @property
     def response_label(self) -> str | None:
