@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 class ContactWork(NamedTuple):
     """Work of a contact of a body, or of a friction damper, over the evaluated periods (p of them).
 
-    damper, side, corner: as of an Event; friction: coefficient; hits: impacts; course: (p, 2) integral of normal force times slip
-    speed (N m) and sum of the energies of impacts (J) to the power of [wear] impact_exponent, of each period
+    damper, side, corner: as of an Event; friction: coefficient; hits: impacts; course: (p, 2) of each period, integral
+    of normal force times slip speed (N m) and sum of the energies of impacts (J) to the power of [wear] impact_exponent
     """
 
     damper: int

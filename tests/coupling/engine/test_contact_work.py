@@ -60,5 +60,5 @@ def test_events_have_the_energies_of_impacts():
 
 
 def test_methods_with_time_steps_do_not_count_wear():
-    with pytest.raises(InputError, match="^wear: is for solver.method exact, not moreau"):
+    with pytest.raises(InputError, match=r"^wear: is for solver\.method exact, not moreau"):
         _run(damper=[_BODY], solver={"method": "moreau"})
