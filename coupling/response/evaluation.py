@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.contact_work import contact_work
 from vanedamp.coupling.response.event_log import Rows, events_of
 from vanedamp.coupling.response.figures import (
     FIGURES,
@@ -166,6 +167,8 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         status = Status.TILTED if tilted and status in _USABLE else status
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
+    if scene.wear is not None:
+        extent["contact_work"] = contact_work(scene, run, first)
     return Response(
         status=status,
         frequency=scene.frequency,

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, dataset, save
@@ -216,6 +217,8 @@ class Response(Plotted):
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    contact_work: tuple[ContactWork, ...] | None = None
+    """work of friction and impacts of each contact; None without [wear]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
