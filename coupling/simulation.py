@@ -13,7 +13,6 @@ from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
-from vanedamp.coupling.strength.wear import with_wear
 
 
 def simulate(
@@ -35,7 +34,6 @@ def simulate(
     chosen = choose(scene)
     response = respond(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started
-    response = with_wear(chosen.scene, response)
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice,
         warnings=warnings_of(chosen.scene) + response.warnings, wall_time_s=took,

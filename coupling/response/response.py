@@ -218,9 +218,9 @@ class Response(Plotted):
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
     contact_work: tuple[ContactWork, ...] | None = None
-    """work of the contacts over the evaluated periods; None without [wear]"""
+    """work of friction and impacts of each contact; None without [wear]"""
     wear: tuple[ContactWear, ...] | None = None
-    """wear of the contacts, at the mean rates of the evaluated periods; None without [wear]"""
+    """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 

@@ -170,6 +170,8 @@ class Scene(OpenRecord, Displayed):
     """speed of the frame that everything turns with (default: standstill)"""
     contact: Contact = field(default_factory=Newton)
     """law of impacts and contacts at walls, stops and between bodies"""
+    wear: Wear | None = None
+    """wear of contacts (default: not counted)"""
     time: Time = field(default_factory=Time)
     """how long a run is, and what of it is evaluated"""
     solver: Solver = field(default_factory=partial(options_of, {}))
@@ -178,8 +180,6 @@ class Scene(OpenRecord, Displayed):
     """how the runs of a sweep begin"""
     sweep: Annotated[dict[str, Axis], Field(json_schema_extra=_describe_kept)] = field(default_factory=dict)
     """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
-    wear: Wear | None = None
-    """wear of the contacts"""
     orbit: Orbit | None = None
     """periodic motion that `vanedamp orbits` finds and follows"""
     ramp: Ramp | None = None

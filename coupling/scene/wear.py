@@ -67,7 +67,7 @@ class WearPair(WearRates):
 
 @dataclass(frozen=True, config=STRICT)
 class Wear(WearRates):
-    """Wear of all contacts, but for those of `pair`."""
+    """Wear of all contacts, but for those of `pair`; for solver.method exact."""
 
     impact_exponent: Annotated[Real, Field(gt=0, le=10)] = 1.0
     """exponent n of the energy of an impact in impact wear [-]"""

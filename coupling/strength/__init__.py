@@ -1,1 +1,1 @@
-"""Strength of a response: what its stresses, contacts and impacts do to the parts over time."""
+"""What vibration does to the structure: fatigue data of materials, utilisation, life."""

@@ -12,9 +12,9 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
-from vanedamp.coupling.strength.wear import ALONG, body_shares, body_volumes, opening
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.key_tables import documented

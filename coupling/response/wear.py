@@ -8,13 +8,12 @@ energies, each to the power n. Both partners lose their share of the volume.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
-from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.wear import Wear, WearRates
@@ -35,55 +34,32 @@ class Patch(NamedTuple):
     area: float | None
 
 
-def with_wear(scene: Scene, response: Response) -> Response:
-    """Return a response with the wear of its contacts, and a warning if it does not fit the energy balance.
-
-    As it is where the scene has no [wear], or the run ended within its first evaluated period.
-    """
-    work, periods = response.contact_work, response.periods - response.transient
-    if scene.wear is None or work is None or periods < 1:
-        return response
-    wear = contact_wear(scene, work, periods / response.frequency)
-    return replace(
-        response, wear=wear, warnings=response.warnings + ledger_warning(scene, work, response.energy["friction"])
-    )
+def contact_wear(scene: Scene, work: Sequence[ContactWork]) -> tuple[ContactWear, ...]:
+    """Return the wear of contacts by their work in at least one period. The scene has a [wear] table."""
+    per_hour = _HOUR * scene.frequency
+    return tuple(_wear(one, patch, per_hour) for one, patch in zip(work, patches(scene, work), strict=True))
 
 
-def contact_wear(scene: Scene, work: Sequence[ContactWork], seconds: float) -> tuple[ContactWear, ...]:
-    """Return the wear of contacts whose work is that of some seconds. The scene has a [wear] table."""
-    return tuple(_wear(one, patch, seconds) for one, patch in zip(work, patches(scene, work), strict=True))
-
-
-def _wear(one: ContactWork, patch: Patch, seconds: float) -> ContactWear:
-    per_hour = _HOUR / seconds
-    volume = per_hour * (patch.sliding * one.sliding + patch.impact * one.impacts)
-    spread = [one.sliding_confidence, one.impacts_confidence]
-    confidence = None
-    if None not in spread:
-        # sliding and impacts of one motion vary together
-        confidence = per_hour * (patch.sliding * (spread[0] or 0.0) + patch.impact * (spread[1] or 0.0))
+def _wear(one: ContactWork, patch: Patch, per_hour: float) -> ContactWear:
+    """Return the wear of a contact; per_hour: periods in an hour."""
+    volumes = one.course @ (patch.sliding, patch.impact)
+    volume, confidence = per_hour * float(volumes.mean()), mean_confidence(volumes)
     return ContactWear(
-        one.damper, one.side, one.corner, one.sliding, one.friction * one.sliding, one.impacts, one.count,
-        one.sliding / seconds, volume, confidence, None if patch.area is None else volume / patch.area, patch.share,
-        patch.area,
+        one.damper, one.side, one.corner, one.sliding, one.friction * one.sliding, one.impacts, one.hits,
+        work_rate=one.sliding / len(volumes) * per_hour / _HOUR, volume_rate=volume,
+        volume_rate_confidence=None if confidence is None else per_hour * confidence,
+        depth_rate=None if patch.area is None else volume / patch.area, share=patch.share, area=patch.area,
     )  # fmt: skip
 
 
-def ledger_gap(scene: Scene, work: Sequence[ContactWork], friction: float) -> float:
-    """Return by how much coefficient of friction times wear volume over K/H misses the friction work (J), relative.
+def ledger_warning(work: Sequence[ContactWork], friction: float) -> tuple[str, ...]:
+    """Return the warning that wear and the friction work of the energy balance (J) differ; empty if they agree.
 
-    Only contacts with a sliding rate have a volume; of the others the work itself counts.
+    The volume by sliding over K/H is the integral of normal force times slip speed: coefficients times these are the
+    friction work.
     """
-    total = sum(
-        one.friction * (patch.sliding * one.sliding / patch.sliding if patch.sliding else one.sliding)
-        for one, patch in zip(work, patches(scene, work), strict=True)
-    )
-    return abs(total - friction) / max(abs(friction), abs(total), 1e-300)
-
-
-def ledger_warning(scene: Scene, work: Sequence[ContactWork], friction: float) -> tuple[str, ...]:
-    """Return the warning that wear and the energy balance differ; empty if they agree to round-off."""
-    gap = ledger_gap(scene, work, friction)
+    total = sum(one.friction * one.sliding for one in work)
+    gap = abs(total - friction) / max(abs(friction), abs(total), 1e-300)
     if gap <= _SAME:
         return ()
     return (f"wear: friction work by wear volumes and by the energy balance differ by {gap:.1e} of it",)
