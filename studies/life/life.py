@@ -57,15 +57,20 @@ class _Course:
         return self._runs.at(self.wearing.worn(volume))
 
     def scale(self, volume: np.ndarray) -> np.ndarray:
-        """Return the volumes (c,), m^3, that would open gap or play by as much as it is; inf for those that do not."""
-        with np.errstate(divide="ignore"):
-            gaps = [
-                (np.nan_to_num(travel, nan=1.0)[:, None] / matrix).min(axis=0)
-                for travel, matrix in (
-                    (self.wearing.gaps(volume), self.wearing.gap), (self.wearing.plays(volume), self.wearing.play)
-                )
-            ]  # fmt: skip
-        return np.minimum(*gaps)
+        """Return the volumes (c,), m^3, by which contacts together open gap or play by as much as it is.
+
+        inf for those that do not.
+        """
+        scale = np.full(len(volume), np.inf)
+        for travel, matrix in (
+            (self.wearing.gaps(volume), self.wearing.gap), (self.wearing.plays(volume), self.wearing.play)
+        ):  # fmt: skip
+            opens = matrix > 0.0
+            own = np.nan_to_num(travel, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
+            scale = np.minimum(
+                scale, np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0)
+            )
+        return scale
 
 
 def _moments(course: _Course, progress: Callable[[int, int], None] | None) -> Iterator[Moment[Found]]:
