@@ -38,6 +38,12 @@ class ContactWork(NamedTuple):
         return float(self.course[:, 1].sum())
 
 
+def contact_name(damper: int, side: str, corner: int) -> str:
+    """Return the name of a contact for people."""
+    what = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
+    return f"{what} {damper}" + (f", corner {corner}" if corner >= 0 else "")
+
+
 @dataclass(frozen=True)
 class ContactWear:
     """Wear of one contact, at the mean rates of the evaluated periods.
@@ -66,7 +72,7 @@ class ContactWear:
     @property
     def name(self) -> str:
         """Name for people."""
-        return f"{self.side} of {self.damper}" + (f", corner {self.corner}" if self.corner >= 0 else "")
+        return contact_name(self.damper, self.side, self.corner)
 
     def hours_to(self, depth: float) -> float | None:
         """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""

@@ -12,6 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
@@ -78,7 +79,7 @@ class Contact(NamedTuple):
     @property
     def name(self) -> str:
         """Name for people."""
-        return f"{self.side} of body {self.damper}" + (f", corner {self.corner}" if self.corner >= 0 else "")
+        return contact_name(self.damper, self.side, self.corner)
 
 
 class LifeStudy(NamedTuple):

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import tomli_w
+from scipy.integrate import solve_ivp
 
 from tests.studies.life.damper import GAP, HOURS, LOST, SCENE, Damper, gap_after
 from vanedamp.coupling.response.response import Status
@@ -221,3 +222,52 @@ def test_a_patch_that_is_not_known_is_asked_for(monkeypatch):
     monkeypatch.setattr(fast, "simulate", Bare())
     with pytest.raises(InputError, match=r"wear.width: the patch of damper 0 at left is not known; give wear.width"):
         life(LifeStudy.of(data))
+
+
+# the engine
+
+RESTITUTION, LIGHT = 0.7, 1e-7
+
+
+def impact_speed(gap, amplitude, omega):
+    """Relative speed of both impacts per period of a light body between walls that move by a sine (Theurich and Krack).
+
+    Its path is a triangle of the amplitude theta G, G half the gap: it meets walls at 4 omega theta G/(pi (1 + e)).
+    """
+    rho = 2 / np.pi * (1 - RESTITUTION) / (1 + RESTITUTION)
+    half = gap / 2
+    theta = (1 + np.sqrt((1 + rho**2) * (amplitude / half) ** 2 - rho**2)) / (1 + rho**2)
+    return 4 * omega * theta * half / (np.pi * (1 + RESTITUTION))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_a_gap_whose_impacts_follow_the_1_to_1_regime(exponent):
+    """Against its own equation: two impacts per period, whose speed is known as a function of the gap."""
+    amplitude, frequency, area, gap = 1e-5, 100.0, 1e-6, 3.2e-5
+    omega, hours = 2 * np.pi * frequency, 2000.0
+    hourly = 2 * frequency * 3600
+
+    def energies(gap):
+        return (0.5 * LIGHT * impact_speed(gap, amplitude, omega) ** 2) ** exponent
+
+    rate = 1e-8 * area / (hourly * energies(gap))  # as new, 10 nm/h
+    stiffness, ratio = 4 * omega**2, 0.05
+    force = amplitude * abs(stiffness - omega**2 + 2j * ratio * np.sqrt(stiffness) * omega)
+    case = LifeStudy.of({
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": stiffness, "damping_ratio": ratio},
+        "excitation": {"frequency": frequency, "force": float(force)}, "gravity": {"acceleration": 0.0},
+        "cavity": [{"name": "c", "gap": gap}],
+        "damper": [{"cavity": "c", "mass": LIGHT, "restitution": RESTITUTION, "velocity": 0.01}],
+        "wear": {"impact_rate": rate, "impact_exponent": exponent, "area": area},
+        "time": {"periods": 200, "transient": 160},
+        "life": {"band": [frequency], "hours": hours, "tolerance": 1e-3, "reach": 0.5},
+    })  # fmt: skip
+    record = life(case)
+    exact = solve_ivp(
+        lambda _, y: hourly * rate / area * energies(y), (0.0, hours), [gap], rtol=1e-10, atol=1e-16, t_eval=record.time
+    ).y[0]
+    assert record.gap[-1, 0] > 1.4 * gap
+    off = np.abs(record.gap[:, 0] - exact)
+    assert np.all(off <= record.gap_band[:, 0] + 1e-6 * exact)  # the light body moves the structure by 1e-7
+    assert record.gap_band[-1, 0] < 2e-3 * exact[-1]
+    assert record.hours[0] == 0.0  # so light a body damps nothing
