@@ -13,6 +13,8 @@ import numpy as np
 
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.spot_stress import SpotStress
+from vanedamp.coupling.response.spot_stress import variables as stress_variables
 from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, dataset, save
 
@@ -222,6 +224,8 @@ class Response(Plotted):
     """work of friction and impacts of each contact; None without [wear]"""
     wear: tuple[ContactWear, ...] | None = None
     """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
+    stress: tuple[SpotStress, ...] | None = None
+    """stress at the hot spots of a reduced model; None without any [Pa]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
@@ -249,6 +253,8 @@ class Response(Plotted):
             data["advice"] = self.advice
         if self.wear is not None:
             data["wear"] = [contact.to_json() for contact in self.wear]
+        if self.stress is not None:
+            data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
@@ -281,6 +287,8 @@ class Response(Plotted):
             variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
         if self.in_plane is not None:
             variables |= self.in_plane.variables()
+        if self.stress:
+            variables |= stress_variables(self.stress)
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}

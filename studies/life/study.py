@@ -191,6 +191,8 @@ def _check(scene: Scene) -> None:
         )
     if isinstance(scene.structure, Prescribed):
         raise InputError('structure: a prescribed motion is not damped; take model = "rigid" or "rom"')
+    for number in scene.ranges:
+        raise InputError(f"{number}: a range is for `vanedamp run` and `vanedamp sweep`; give one number")
     if leaves_open(scene):
         raise InputError('structure.modes, damper.shape: "auto" may change with the wear; name a number and a shape')
     if not scene.damper:

@@ -177,6 +177,8 @@ class Study(NamedTuple):
             )
         file = StudyFile.of(data, path)
         table, scene = file.optimise, scene_in(file)
+        for number in scene.ranges:
+            raise InputError(f"{path}: {number}: a range is for `vanedamp run` and `vanedamp sweep`; give [tolerances]")
         try:
             scene, band = placed(scene, table)
             _check(scene)
