@@ -26,7 +26,12 @@ KINDS = {
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
-        FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),
+        FileKind(
+            "scene",
+            "vanedamp.coupling.scene.scene:Scene",
+            ("structure", "excitation", "cavity", "damper"),
+            "vanedamp.coupling.scene.ranges:with_ranges",
+        ),
     )
 }
 

@@ -50,6 +50,7 @@ PARTS = (
     Part("vanedamp.coupling.scene.waveforms"),
     Part("vanedamp.coupling.response", ("response", "restart_state", "steady_state")),
     Part("vanedamp.coupling.sweep", ("sweep", "record", "steady_states")),
+    Part("vanedamp.coupling.ensembles", ("design", "record")),
     Part("vanedamp.coupling.orbits", ("orbits", "branch", "border", "multipliers", "bifurcations", "history")),
     Part("vanedamp.coupling.derivatives", ("matrix_direction", "passage")),
     Part("vanedamp.coupling.sensitivity", ("sensitivity", "sensitivity_record")),
