@@ -21,7 +21,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.further import exponent_width, put_exponents, put_sections, section_width
-from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointTable
+from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import StoreError
@@ -233,9 +233,7 @@ def _linear(scene: Scene) -> list[float]:
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 
-def tasks_of(
-    grid: Grid | PointList, finished: SweepTable, size: Callable[[], int]
-) -> Iterator[tuple[Task, Sequence[int]]]:
+def tasks_of(grid: PointSet, finished: SweepTable, size: Callable[[], int]) -> Iterator[tuple[Task, Sequence[int]]]:
     """Yield tasks that can run side by side, each with the rest of its chain; size: of the next task, in points.
 
     All tasks of chains that are not linked, and the first of those that are; of points that are not done.

@@ -13,6 +13,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run
+from vanedamp.studies.commands.support.ensembles import run_at_one_frequency
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
@@ -21,7 +22,10 @@ from vanedamp.studies.terminal import progress
 
 
 def run(arguments: Namespace, scene: Scene) -> None:
-    """Simulate the scene."""
+    """Simulate the scene, or all samples of its ranges."""
+    if scene.ranges:
+        run_at_one_frequency(arguments, scene)
+        return
     check_run(scene, arguments.samples)
 
     compile_engine([scene])

@@ -234,6 +234,8 @@ class Study(NamedTuple):
             )
         file = StudyFile.of(data, path)
         table, scene = file.optimise, Scene(**{item.name: getattr(file, item.name) for item in fields(Scene)})
+        for number in scene.ranges:
+            raise InputError(f"{path}: {number}: a range is for `vanedamp run` and `vanedamp sweep`; give [tolerances]")
         worst = table.over_band == "worst"
         try:
             band = table.frequencies(scene.excitation.engine_order)

@@ -49,7 +49,7 @@ def check_run(scene: Scene, samples: int = 0) -> None:
 
 def check_sweep(scene: Scene, workers: int) -> None:
     """Reject a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
-    points, seconds = scene.points, sweep_seconds(scene, workers)
+    points, seconds = points_of(scene), sweep_seconds(scene, workers)
     if points > MOST_POINTS:
         raise InputError(
             f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
@@ -93,9 +93,14 @@ def scenes_of(study: Study) -> int:
     return (designs_of(study) + study.table.evaluations * study.table.samples) * study.table.count
 
 
+def points_of(scene: Scene) -> int:
+    """Return the number of points of a sweep, for every sample of ranges."""
+    return scene.points * (scene.sampled.samples * (len(scene.ranges) + 2) if scene.ranges else 1)
+
+
 def sweep_seconds(scene: Scene, workers: int) -> float:
     """Return the time of a sweep, s."""
-    return scene.points * (run_seconds(scene) + exponent_seconds(scene)) / workers
+    return points_of(scene) * (run_seconds(scene) + exponent_seconds(scene)) / workers
 
 
 def exponent_seconds(scene: Scene) -> float:
