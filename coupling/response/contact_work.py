@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-
-from vanedamp.coupling.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.response.evaluation import Outcome
 
 
 class ContactWork(NamedTuple):
@@ -35,25 +30,3 @@ class ContactWork(NamedTuple):
     def impacts(self) -> float:
         """Sum of the energies of impacts to a power, J^exponent: half the contact's mass times speed squared."""
         return float(self.course[:, 1].sum())
-
-
-def contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
-    """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
-    records, rows, window = run.records, run.rows, slice(first, run.periods)
-    found = []
-    for row, (number, side, corner) in enumerate(rows.places):
-        friction = _friction(scene, run, row)
-        sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
-        course = np.stack([sliding, records.struck[window, row]], axis=1)
-        found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
-    return tuple(found)
-
-
-def _friction(scene: Scene, run: Outcome, row: int) -> float:
-    """Return the coefficient of friction of a row of the log; 0: none, and no work of it."""
-    number, side, _ = run.rows.places[row]
-    if run.rows.without_body[row]:
-        return scene.friction_damper[number].friction if side == "casing" else 0.0
-    if run.system.in_plane and row < run.system.contacts:
-        return float(run.system.friction[row])
-    return scene.damper[number].friction if side == "floor" else 0.0

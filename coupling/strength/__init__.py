@@ -1,1 +1,1 @@
-"""What vibration does to the structure: fatigue data of materials, utilisation, life."""
+"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear."""
