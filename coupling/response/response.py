@@ -250,6 +250,7 @@ class Response(Plotted):
             data["advice"] = self.advice
         if self.stress is not None:
             data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
+            data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.response.spot_stress import SCALARS, SpotStress
 from vanedamp.coupling.strength.counting import Cycles
 from vanedamp.coupling.strength.haigh import equivalent_amplitude, utilisation, yield_utilisation
 from vanedamp.coupling.strength.life import damage, hours, quantiles
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.multiaxial import largest_principal, signed_von_mises
+from vanedamp.files.toml_input import validate
 
 
 def fatigue_of(facts: Mapping[str, Any]) -> Fatigue | None:
     """Return the fatigue data in the facts of a hot spot (rom.recovery.hot_spots); None without a strength."""
     data = facts.get("fatigue") or {}
-    return Fatigue(**data).completed(None) if data.get("strength") else None
+    return validate(Fatigue, data, "fatigue data of a hot spot").completed(None) if data.get("strength") else None
 
 
 def assessed(
@@ -51,6 +54,19 @@ def assessed(
         found["damage_per_hour"] = 3600.0 * total / duration
         found["life_hours"] = quantiles(median, fatigue)
     return found
+
+
+def with_strength(stress: SpotStress, material: Fatigue | None, cycles: Cycles | None, duration: float) -> SpotStress:
+    """Return the stress of a spot with utilisation and life; cycles: counted over a duration, s.
+
+    Where static stresses are not known ("mean_known"), the mean stress is that of the motion.
+    """
+    if material is None:
+        return stress
+    amplitudes = {f"{name}{of}": getattr(stress, f"{name}{of}") for name in SCALARS for of in ("", "_max")}
+    static = stress.mean if stress.static is None else stress.static
+    found = {"mean_known": stress.static is not None} | assessed(material, amplitudes, static, cycles, duration)
+    return replace(stress, strength=found)
 
 
 def mean_stress(fatigue: Fatigue, static: np.ndarray) -> float:
