@@ -25,11 +25,14 @@ WORDS = {"motion": tuple(Motion), "exponent_status": tuple(PassageStatus)}
 SECTIONS = {
     "section_displacement": "m", "section_velocity": "m/s", "section_slip": "m", "section_slip_velocity": "m/s",
 }  # fmt: skip
-#: stresses at hot spots, Pa, each an array over the grid and the spots, and those with components over these as well
-STRESSES = (
-    *(f"stress_{name}{of}" for name in SCALARS for of in ("", "_max", *(f"_{curve}" for curve in LINEAR))),
-    "stress_amplitude", "stress_static",
-)  # fmt: skip
+#: utilisation and damage at hot spots and their units (strength.assessment)
+STRENGTHS = {"utilisation": "1", "utilisation_max": "1", "yield_utilisation": "1", "damage_per_hour": "1/h"}
+#: stresses and strengths at hot spots and their units, each an array over the grid and the spots, and those with
+#: components over these as well
+STRESSES = {
+    **{f"stress_{name}{of}": "Pa" for name in SCALARS for of in ("", "_max", *(f"_{curve}" for curve in LINEAR))},
+    "stress_amplitude": "Pa", "stress_static": "Pa", **STRENGTHS,
+}  # fmt: skip
 _OF_COMPONENTS = ("stress_amplitude", "stress_static")
 _WIDTH = len(STRESSES) + (len(COMPONENTS) - 1) * len(_OF_COMPONENTS)
 
@@ -53,7 +56,7 @@ def _columns(spot: SpotStress) -> list[float]:
         columns += [getattr(spot, name), getattr(spot, f"{name}_max")]
         columns += [(getattr(spot, curve) or {name: np.nan})[name] for curve in LINEAR]
     static = np.full(len(COMPONENTS), np.nan) if spot.static is None else spot.static
-    return [*columns, *spot.amplitude.values(), *static]
+    return [*columns, *spot.amplitude.values(), *static, *(spot.strength.get(name, np.nan) for name in STRENGTHS)]
 
 
 def stresses_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:

@@ -24,7 +24,7 @@ PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
-_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | dict.fromkeys(STRESSES, "Pa")
+_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES
 #: columns of the table in a notebook, beside the axes, and its rows
 _SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
 _MOST_ROWS = 20
@@ -55,7 +55,8 @@ class Sweep(SceneRecord, Plotted):
                           unless the table has `sections`
     stress                by the names of STRESSES, (*grid, spots) or (*grid, spots, 6) Pa, at a reduced model's hot
                           spots (response.spot_stress): amplitudes and the largest of a period, of the linear curves
-                          too, of all components, and static stress; empty without hot spots
+                          too, of all components, and static stress; utilisation and damage per hour, nan without data
+                          of the material (strength.assessment); empty without hot spots
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
@@ -153,7 +154,7 @@ class Sweep(SceneRecord, Plotted):
             variables["stress_component"] = Variable(np.array(COMPONENTS, object), ("stress_component",))
         for name, values in self.stress.items():
             own = (*dims, "hot_spot", "stress_component")
-            variables[name] = Variable(values, own[: values.ndim], "Pa")
+            variables[name] = Variable(values, own[: values.ndim], STRESSES[name])
         swept = resonance_axis(self.scene, self.axes)[0]
         others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
