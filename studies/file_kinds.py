@@ -24,6 +24,7 @@ KINDS = {
             ("numbers", "forced", "decay", "impacts"),
         ),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
         FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),
     )

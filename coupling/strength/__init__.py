@@ -1,0 +1,1 @@
+"""Strength: what motions mean for materials. Begin with `contact_numbers.contact`."""
