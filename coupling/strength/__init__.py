@@ -1,1 +1,1 @@
-"""Strength: what motions mean for materials. Begin with `contact_numbers.contact`."""
+"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear, strength of contacts."""

@@ -26,6 +26,7 @@ from vanedamp.studies.commands.support.declaration import Command, Function, arg
 #: endings of a result, which is HDF5 (a device has none); an output that is a folder
 _RECORD, _FOLDER = (".h5", ".hdf5", ".nc", ""), ("/",)
 _CASE, _SCENE = Function("support.cases:read_case"), Function("support.scenes:read_scene")
+_RANGES = Function("support.scenes:read_scene_or_ranges")
 
 COMMANDS = (
     Command(
@@ -141,7 +142,7 @@ COMMANDS = (
                 help="Lyapunov exponents by N periods after the run, at least 32: periodic, quasi-periodic or chaotic",
             ),
         ),
-        writes={"output": _RECORD}, reads=_SCENE,
+        writes={"output": _RECORD}, reads=_RANGES,
     ),
     Command(
         "sweep", "a run at every point of the scene's [sweep] grid", 80,
@@ -153,7 +154,7 @@ COMMANDS = (
             ),
             resume,
         ),
-        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_SCENE,
+        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
     ),
     Command(
         "explore", "sliders, and a forced response that follows them, in the browser", 85,
@@ -205,6 +206,11 @@ COMMANDS = (
             json_file,
         ),
         writes={"output": (".csv",), "picture": (".png",)},
+    ),
+    Command(
+        "life", "how long a damper damps: wear over hours, and the response with the gaps that it opens", 92,
+        (input_file("STUDY.toml"), output_file("LIFE.h5"), json_file, workers, resume),
+        writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(
         "identify", "numbers of a scene from measurements, with what these tell of each", 95,

@@ -12,14 +12,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.ensembles.record import Ensemble
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.response.response import UNITS
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.rom.recovery import hot_spots
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.spots import spot_lines
 from vanedamp.studies.report.forced_response import best_first, forced_responses
 
 #: entries of a list that are shown
@@ -27,8 +31,8 @@ _MOST = 10
 #: ending of the kinds of checkpoints
 _CHECKPOINT = "-checkpoint"
 _OF_RESPONSE = (
-    "status", "classification", "frequency", "amplitude_mean", "amplitude_max", "amplitude_harmonic",
-    "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
+    "status", "classification", "frequency", "amplitude_mean", "amplitude_mean_dynamic", "amplitude_max",
+    "amplitude_harmonic", "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
 )  # fmt: skip
 
 
@@ -146,11 +150,17 @@ def _reduced(record: _Record) -> Iterator[Fact]:
     yield Fact("basis", made.get("basis"))
     yield Fact("estimate", made.get("estimate", {}).get("sentence"))
     yield from _level(made.get("fatigue"))
+    for line in spot_lines(hot_spots(ReducedModel.load(record.path))):
+        yield Fact(*line.split(" ", 1))
 
 
 def _response(record: _Record) -> Iterator[Fact]:
     for name in _OF_RESPONSE:
         yield Fact(name, record.attributes.get(name), UNITS.get(name, ""))
+    for name, spot in record.attributes.get("stress", {}).items():
+        share = spot["strength_fraction"]
+        level = "" if share is None else f"{share:.3g} of the fatigue strength"
+        yield Fact(f"{name}_von_mises", spot["von_mises"], "Pa", level)
 
 
 def _sweep(record: _Record) -> Iterator[Fact]:
@@ -163,6 +173,14 @@ def _sweep(record: _Record) -> Iterator[Fact]:
     found = [response.sentence for response in best_first(forced_responses(sweep)) if response.reference > 0]
     yield Fact("response", found[:1], "", "best curve")
     yield Fact("curves", len(found))
+
+
+def _ensemble(record: _Record) -> Iterator[Fact]:
+    found = Ensemble.load(record.path)
+    yield Fact("ranges", {path: list(ends) for path, ends in found.scene.ranges.items()})
+    yield Fact("samples", len(found.status))
+    yield Fact("status", dict(Counter(map(str, found.status.ravel()))), "", "points")
+    yield Fact("response", list(found.sentences())[:1])
 
 
 def _orbits(record: _Record) -> Iterator[Fact]:
@@ -208,6 +226,14 @@ def _optimisation(record: _Record) -> Iterator[Fact]:
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
 
 
+def _life(record: _Record) -> Iterator[Fact]:
+    attributes, of = record.attributes, {name: variable.values for name, variable in record.variables.items()}
+    yield Fact("answer", attributes["sentence"])
+    yield Fact("hours", of["time"][[0, -1]].tolist(), "h", "first and last moment")
+    yield Fact("gap", of["gap"][[0, -1]].tolist(), "m", "of the cavities, then")
+    yield Fact("runs", attributes["runs"], "", f"of them {attributes['trouble']} not ok")
+
+
 def _identification(record: _Record) -> Iterator[Fact]:
     attributes = record.attributes
     yield Fact("status", attributes["status"])
@@ -246,10 +272,12 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
+    "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),
     "orbits": ("branches of periodic orbits", "orbits", _orbits),
     "ramp": ("run-ups and run-downs", "ramp", _ramp),
     "ring_down": ("a ring-down", "ringdown", _ring_down),
     "optimisation": ("an optimisation", "optimise", _optimisation),
+    "life": ("the life of a damper", "life", _life),
     "identification": ("numbers of a scene from measurements", "identify", _identification),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),

@@ -31,7 +31,7 @@ from vanedamp.studies.pipeline.tables import (
     ReduceStage,
     SweepStage,
 )
-from vanedamp.studies.scene_checks import check_model, check_moved
+from vanedamp.studies.scene_checks import check_model, check_moved, check_numbers
 
 #: tables of a scene for other commands
 _OF_OTHERS = ("orbit", "ramp", "ring_down")
@@ -307,6 +307,7 @@ class Sweep(Stage):
 
     def _check(self, scene: Scene) -> None:
         check_moved(scene)
+        check_numbers(scene, f"{self.file}: ")
         if not scene.axes:
             raise InputError(
                 'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
