@@ -45,6 +45,7 @@ PARTS = (
     Part("vanedamp.rom"),
     Part("vanedamp.rom.bases"),
     Part("vanedamp.coupling"),
+    Part("vanedamp.coupling.contacts"),
     Part("vanedamp.coupling.scene"),
     Part("vanedamp.coupling.scene.contact_laws"),
     Part("vanedamp.coupling.scene.waveforms"),
