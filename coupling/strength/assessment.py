@@ -14,6 +14,7 @@ from vanedamp.coupling.strength.haigh import equivalent_amplitude, utilisation, 
 from vanedamp.coupling.strength.life import damage, hours, quantiles
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.multiaxial import largest_principal, signed_von_mises
+from vanedamp.coupling.strength.spectral import Moments, dirlik_damage, narrow_band_damage
 from vanedamp.files.toml_input import validate
 
 
@@ -56,16 +57,29 @@ def assessed(
     return found
 
 
-def with_strength(stress: SpotStress, material: Fatigue | None, cycles: Cycles | None, duration: float) -> SpotStress:
+def with_strength(
+    stress: SpotStress,
+    material: Fatigue | None,
+    cycles: Cycles | None,
+    noise: Mapping[str, Moments],
+    duration: float,
+) -> SpotStress:
     """Return the stress of a spot with utilisation and life; cycles: counted over a duration, s.
 
-    Where static stresses are not known ("mean_known"), the mean stress is that of the motion.
+    Where static stresses are not known ("mean_known"), the mean stress is that of the motion. noise: spectral moments
+    of von Mises stress, by linear curve, whose damages per hour "noise" has.
     """
     if material is None:
         return stress
     amplitudes = {f"{name}{of}": getattr(stress, f"{name}{of}") for name in SCALARS for of in ("", "_max")}
     static = stress.mean if stress.static is None else stress.static
     found = {"mean_known": stress.static is not None} | assessed(material, amplitudes, static, cycles, duration)
+    if noise and material.exponent is not None:
+        rules = {"narrow_band": narrow_band_damage, "dirlik": dirlik_damage}
+        found["noise"] = {
+            curve: {f"{name}_per_hour": rule(of, 3600.0, material, found["mean"]) for name, rule in rules.items()}
+            for curve, of in noise.items()
+        }
     return replace(stress, strength=found)
 
 

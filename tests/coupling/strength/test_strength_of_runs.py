@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.coupling.strength.test_stressed_runs import MASS, STIFFNESS, STRESS, scene
+from tests.coupling.strength.test_stressed_runs import FIRST, MASS, STIFFNESS, STRESS, scene
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.counting import rainflow_cycles
 from vanedamp.coupling.strength.life import damage
 from vanedamp.coupling.strength.material import Fatigue
+from vanedamp.coupling.strength.spectral import dirlik_damage, narrow_band_damage
+from vanedamp.coupling.strength.stress_spectrum import linear_moments, run_moments
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError
@@ -85,3 +87,48 @@ def test_bad_data_in_a_model_end_in_one_line(tmp_path):
     bad = {"hot1": FACTS["hot1"] | {"fatigue": CURVE | {"exponent": -5.0}}}
     with pytest.raises(InputError, match=r"^fatigue data of a hot spot: exponent: should be greater than 0"):
         simulate(scene(saved(tmp_path / "rom.h5", bad), time={"periods": 3, "transient": 1}))
+
+
+def noise(file, **changes):
+    """21 sines about the first mode, of random phases; the periods are 40 of its own."""
+    waveform = {"shape": "multisine", "orders": [30, 50], "seed": 3}
+    excitation = {"frequency": FIRST / 40.0, "force": 100.0, "at": "tip", "waveform": waveform}
+    return scene(file, excitation=excitation, time={"periods": 40, "transient": 8}, **changes)
+
+
+def test_moments_of_a_linear_response_to_noise_are_those_of_its_run(file):
+    made = noise(file, cavity=[], damper=[])
+    dense = respond(made, samples_per_period=2000)
+    q = dense.coordinates[8 * 2000 :] @ ReducedModel.load(file).natural[1].T
+    for name, rows, factor in (("hot1", STRESS["hot1"][0], 1.0), ("hot2", STRESS["hot2"][3], 3.0)):
+        place = list(STRESS).index(name)
+        exact = linear_moments(made)["undamped"][place]
+        history = q @ rows
+        assert factor * np.var(history) == pytest.approx(exact.l0, rel=1e-4)
+        omega = 2j * np.pi * np.fft.rfftfreq(len(history), dense.time[1] - dense.time[0])
+        velocity = np.fft.irfft(omega * np.fft.rfft(history), len(history))
+        assert factor * np.var(velocity) == pytest.approx(exact.l2, rel=1e-4)
+        estimated = run_moments(made, 2000, highest_hz=3.0 * FIRST)[place]
+        assert estimated.l0 == pytest.approx(exact.l0, rel=0.01)
+        assert estimated.crossings == pytest.approx(exact.crossings, rel=0.01)
+
+
+def test_noise_has_the_damage_of_its_spectrum(file):
+    """One draw of the phases against the mean of all, and the closed form of the spectrum in the result."""
+    made = noise(file, cavity=[], damper=[])
+    spot = simulate(made).stress[0]
+    material = Fatigue(**CURVE).completed(None)
+    found = linear_moments(made)["undamped"][0]
+    expected = {
+        "narrow_band_per_hour": narrow_band_damage(found, 3600.0, material, 5e8),
+        "dirlik_per_hour": dirlik_damage(found, 3600.0, material, 5e8),
+    }
+    assert spot.strength["noise"]["undamped"] == pytest.approx(expected, rel=1e-3)
+    assert 0.5 < spot.strength["damage_per_hour"] / expected["dirlik_per_hour"] < 2.0
+
+
+def test_a_spectrum_needs_hot_spots_and_sines(file, tmp_path):
+    bare = tmp_path / "bare.h5"
+    ReducedModel.from_matrices(MASS, STIFFNESS, {"root": 0, "tip": 2}, damping_ratio=0.01).save(bare)
+    with pytest.raises(InputError, match=r"^structure: no hot spots; take a reduced model with them"):
+        linear_moments(noise(str(bare)))
