@@ -70,9 +70,7 @@ def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
     if sweep.stress:
         stress = {name: values[line] for name, values in sweep.stress.items()}
         curves = _curves(stress, list(sweep.hot_spots))
-        rows = (
-            [spot, at, *values] for spot, own in curves.items() for at, *values in zip(x, *own.values(), strict=True)
-        )
+        rows = ([spot, *row] for spot, own in curves.items() for row in zip(x, *own.values(), strict=True))
         figure = dressed(stress_figure(x, title, curves), height=460)
         shown["charts"].append(page.chart("stress", figure, ("hot_spot", axis, *CURVES), rows, [file]))
         shown["worst"] = _worst(x, stress, list(sweep.hot_spots))
@@ -106,7 +104,7 @@ def _worst(x: np.ndarray, stress: Mapping[str, np.ndarray], spots: Sequence[str]
         return None
     at, spot = np.unravel_index(int(np.nanargmax(measure)), measure.shape)
     return {
-        "at": float(x[at]), "spot": spots[spot], "utilisation": float(used[at, spot]),
+        "at": float(x[at]), "spot": spots[int(spot)], "utilisation": float(used[at, spot]),
         "stress": float(stress["stress_von_mises"][at, spot]),
     }  # fmt: skip
 

@@ -37,7 +37,7 @@ class SpotLife(NamedTuple):
 
 
 def stress_figure(x: np.ndarray, title: str, curves: Mapping[str, Mapping[str, np.ndarray]]) -> go.Figure:
-    """Draw amplitudes of von Mises stress (n,), Pa, over an axis with its title: by hot spot, by the names of CURVES."""
+    """Draw amplitudes of von Mises stress (n,), Pa, over an axis with its title: by hot spot, by names of CURVES."""
     figure = go.Figure()
     for place, (name, own) in enumerate(curves.items()):
         for curve, values in own.items():
