@@ -255,6 +255,7 @@ class Response(Plotted):
             data["wear"] = [contact.to_json() for contact in self.wear]
         if self.stress is not None:
             data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
+            data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
