@@ -298,8 +298,8 @@ class Response(Plotted):
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}
-        if self.wear is not None:
-            attributes["wear"] = json.dumps(attributes["wear"])
+        for name in attributes.keys() & {"wear", "contact_strength"}:
+            attributes[name] = json.dumps(attributes[name])
         for name in attributes.keys() & _OF_BODIES:
             attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
         return variables, attributes
