@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.strength.stress_watch import stressed
 
 
 def simulate(
@@ -32,7 +32,7 @@ def simulate(
     started = time.perf_counter()
     scene = loaded(scene)
     chosen = choose(scene)
-    response = respond(chosen.scene, events, samples_per_period, start or chosen.start, progress)
+    response = stressed(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene), wall_time_s=took

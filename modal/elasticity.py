@@ -143,6 +143,7 @@ class Solid:
         self.space = fenicsx.vector_space(self.domain.mesh, degree)
         self._trial, self._test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.temperature = temperature
+        self._static_stresses: dict[str, Any] = {}
         self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
         self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
@@ -199,6 +200,7 @@ class Solid:
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
         stress = self.stress(self._static(matrices, load, _NO_CENTRIFUGAL_SOLUTION))
+        self._static_stresses["rotation"] = stress
         return RotatingMatrices(
             standing=matrices,
             centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
@@ -235,18 +237,19 @@ class Solid:
         """
         self._check_size(displacements, 2)
         given = np.atleast_2d(displacements)
-        space = fenicsx.discontinuous_space(self.domain, 1)
-        cells = None if points is None else fenicsx.cells_of(space, np.asarray(points))
-        places = slice(None) if points is None else np.asarray(points)
         moved = fenicsx.field(self.space, given[0])
-        stress = self.stress(moved)
-        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-        components = [fenicsx.evaluator(stress[pair], space, cells) for pair in pairs]
-        found = []
+        components, found = self._components(self.stress(moved), points), []
         for displacement in given:
             moved.x.array[:] = displacement
-            found.append([np.array(component().x.array[places]) for component in components])
+            found.append(components())
         return np.array(found[0] if np.ndim(displacements) == 1 else found)
+
+    def static_stresses(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        """Return stresses (6, k), as stress_components, of the static solutions that have given geometric stiffness.
+
+        By cause: "temperature" in Pa, of `assemble`, and "rotation" in Pa per squared speed (rad/s), of `rotating`.
+        """
+        return {name: np.array(self._components(stress, points)()) for name, stress in self._static_stresses.items()}
 
     def stress_points(self) -> np.ndarray:
         """Return the places (k, 3), m, of the values of `von_mises`."""
@@ -268,6 +271,15 @@ class Solid:
         at = self.temperature.at
         return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
 
+    def _components(self, stress: Any, points: np.ndarray | None) -> Callable[[], list[np.ndarray]]:
+        """Return what evaluates the six components of a UFL stress at corners of cells (points; None: at all)."""
+        space = fenicsx.discontinuous_space(self.domain, 1)
+        cells = None if points is None else fenicsx.cells_of(space, np.asarray(points))
+        places = slice(None) if points is None else np.asarray(points)
+        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+        components = [fenicsx.evaluator(stress[pair], space, cells) for pair in pairs]
+        return lambda: [np.array(component().x.array[places]) for component in components]
+
     def _heated(self, matrices: SystemMatrices) -> SystemMatrices:
         """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""
         if self.temperature is None or not any(material.expansion for material in self.materials.values()):
@@ -277,6 +289,7 @@ class Solid:
         pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
         load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
         stress = self.stress(self._static(matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
+        self._static_stresses["temperature"] = stress
         added = self._geometric_stiffness(stress)
         share = stable_share(matrices, added)
         if share < 1.0:

@@ -41,10 +41,7 @@ class HotSpot:
 def peak_stresses(solid: Solid, displacement: np.ndarray) -> list[PeakStress]:
     """Return the corner of a cell with the largest von Mises stress of displacements (N,), of every volume group."""
     groups, places = list(solid.domain.volumes), solid.stress_points()
-    stress = solid.von_mises(displacement)
-    # the group of a cell, seen from its corners
-    numbers = fenicsx.cell_functions(solid.domain, lambda name, places: np.full(len(places), groups.index(name)))
-    group = numbers.x.array.astype(int)
+    stress, group = solid.von_mises(displacement), corner_groups(solid)
     peaks = []
     for number, name in enumerate(groups):
         corners = np.flatnonzero(group == number)
@@ -52,6 +49,13 @@ def peak_stresses(solid: Solid, displacement: np.ndarray) -> list[PeakStress]:
         x, y, z = places[worst].tolist()
         peaks.append(PeakStress(float(stress[worst]), (x, y, z), name))
     return peaks
+
+
+def corner_groups(solid: Solid) -> np.ndarray:
+    """Return the number (k,) of the volume group, in the order of `domain.volumes`, of the corners of all cells."""
+    groups = list(solid.domain.volumes)
+    numbers = fenicsx.cell_functions(solid.domain, lambda name, places: np.full(len(places), groups.index(name)))
+    return np.asarray(numbers.x.array.astype(int))
 
 
 def hot_spot(

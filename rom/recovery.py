@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +69,24 @@ def with_stresses(
     return with_outputs(
         model, _rows(stresses, model.size), None if residual is None else _rows(residual, len(model.interface))
     )
+
+
+def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
+    """Return what the model's provenance has of the places with outputs of all six components: name -> facts.
+
+    coordinates (m), group (of the mesh's volumes), per_amplitude ("at", "von_mises": Pa/m of the first mode), static
+    (by cause, six components: "rotation" per squared speed in rad/s, "temperature"), fatigue (data of the material);
+    each where it is known.
+    """
+    known, names = model.provenance.get("hot_spots", {}), [name.rpartition(".") for name in model.outputs]
+    places = dict.fromkeys(place for place, _, component in names if component == COMPONENTS[0])
+    found = {}
+    for place in places:
+        if {f"{place}.{component}" for component in COMPONENTS} <= set(model.outputs):
+            facts = known.get(place, {})
+            # of files before version 0.3 the coordinates only
+            found[place] = dict(facts) if isinstance(facts, Mapping) else {"coordinates": list(facts)}
+    return found
 
 
 def von_mises(components: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from vanedamp.coupling.methods import Method
-from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
+from vanedamp.coupling.response.evaluation import Run, Watch, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
@@ -28,12 +28,17 @@ def respond(
     samples_per_period: int = 0,
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
+    watch: Watch | None = None,
 ) -> Response:
-    """Return the response of a scene without open choices. Arguments as in coupling.simulation.simulate."""
+    """Return the response of a scene without open choices. Arguments as in coupling.simulation.simulate.
+
+    watch: looks at more samples than are asked for.
+    """
     started = time.perf_counter()
-    run = run_of(scene, events, samples_per_period, start)
-    ended = run_scene(run, scene, progress)
-    response = evaluate(scene, run.outcome(), ended, started)
+    run = run_of(scene, events, samples_per_period, start, watch)
+    ended = run_scene(run, scene, progress, watch)
+    outcome = run.outcome() if watch is None else watch.close(run.outcome())
+    response = evaluate(scene, outcome, ended, started)
     return replace(response, final=final_state(scene, run))
 
 
@@ -43,7 +48,13 @@ def final_state(scene: Scene, run: Run) -> RestartState | None:
     return None if state is None else marked_with_speed(scene, state)
 
 
-def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: RestartState | None = None) -> Run:
+def run_of(
+    scene: Scene,
+    events: bool = False,
+    samples_per_period: int = 0,
+    start: RestartState | None = None,
+    watch: Watch | None = None,
+) -> Run:
     """Return a run of the scene's method at time zero.
 
     Raises InputError for a scene that the method cannot run, such as one that begins with the state of another run.
@@ -53,11 +64,20 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
+    if scene.wear is not None and (reason := _why_not(scene.solver.method, "WEARS")):
+        raise InputError(f"wear: {reason}; leave the table out")
     system = assemble(scene)
     _check_bodies(scene, system)
+    samples = samples_per_period if watch is None else watch.samples(scene, system, samples_per_period)
     records = new_records(
-        system, most_periods(scene), samples_per_period, isinstance(scene.structure, Rom), deflects(scene, system)
+        system,
+        most_periods(scene),
+        samples,
+        isinstance(scene.structure, Rom),
+        deflects(scene, system),
+        None if scene.wear is None else scene.wear.impact_exponent,
     )
+    records = records if watch is None else watch.records(records)
     return method.begin(scene, system, records, events, start_of(scene, system, start))
 
 
@@ -105,7 +125,7 @@ def check_waveform(scene: Scene, method: str) -> None:
 
 
 def _why_not(method: str, ability: str) -> str | None:
-    """Return why a method lacks an ability, RESTARTS or WAVEFORMS; None if it has it."""
+    """Return why a method lacks an ability, RESTARTS, WAVEFORMS or WEARS; None if it has it."""
     if getattr(METHODS.part(method), ability, False):
         return None
     able = [name for name, part in METHODS.all().items() if getattr(part, ability, False)]

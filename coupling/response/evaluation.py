@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import Rows, events_of
 from vanedamp.coupling.response.figures import (
     FIGURES,
@@ -66,6 +67,22 @@ class Run(Protocol):
         """Return the state that another run can begin with; None if the run ended within a period, or keeps none."""
 
 
+class Watch(Protocol):
+    """What looks at the samples of a run while it advances (registry.respond)."""
+
+    def samples(self, scene: Scene, system: System, asked: int) -> int:
+        """Return how many samples of each period the run keeps for it, a multiple of those asked for."""
+
+    def records(self, empty: Records) -> Records:
+        """Return the records to which the run writes."""
+
+    def __call__(self, run: Run, dropped: int | None) -> None:
+        """Look at the run so far; dropped: periods that will be left out, None if that is open."""
+
+    def close(self, outcome: Outcome) -> Outcome:
+        """Look at the rest of a run that has ended. Return its outcome with the samples that were asked for."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The outcome of a run: records of `periods` periods, counters, chunks of its log and the meaning of their rows.
@@ -94,21 +111,25 @@ class Ended(NamedTuple):
     confidence: float | None = None
 
 
-def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> Ended:
+def run_scene(
+    run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None, watch: Watch | None = None
+) -> Ended:
     """Run all periods; where their number is open, until the response is steady; with steady = "auto", until its mean
     is known well enough.
 
-    progress: called with the number of periods done and of those to do.
+    progress: called with the number of periods done and of those to do; watch: called before the run, and as it goes.
     """  # fmt: skip
     transient = Transient(scene, run.outcome().system)
     dropped, periods, most = transient.length()
     if scene.time.steady == "auto":
-        return _run_until_known(run, transient, periods, progress)
+        return _run_until_known(run, transient, periods, progress, watch)
     done = 0
     while True:
         while done < periods:
+            if watch is not None:
+                watch(run, dropped)
             # compiled functions hear of no interrupt before they return
-            done = min(done + _CHUNK, periods)
+            done = min(done + _CHUNK, dropped if done < dropped else periods)
             ended = run.advance_to(done)
             if ended is not Status.OK:
                 return Ended(ended, dropped)
@@ -122,11 +143,17 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
 
 
 def _run_until_known(
-    run: Run, transient: Transient, periods: int, progress: Callable[[int, int], None] | None
+    run: Run,
+    transient: Transient,
+    periods: int,
+    progress: Callable[[int, int], None] | None,
+    watch: Watch | None,
 ) -> Ended:
     """Run until the mean amplitude is known well enough, at most some periods."""
     tolerance, ended = transient.scene.time.tolerance, Ended(Status.NOT_STEADY, transient.scene.time.dropped)
     for done in [*range(_CHUNK, periods, _CHUNK), periods]:
+        if watch is not None:
+            watch(run, None)
         status = run.advance_to(done)
         if status is not Status.OK:
             return Ended(status, ended.transient)
@@ -166,6 +193,8 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         status = Status.TILTED if tilted and status in _USABLE else status
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
+    if scene.wear is not None:
+        extent["contact_work"] = _contact_work(scene, run, first)
     return Response(
         status=status,
         frequency=scene.frequency,
@@ -182,6 +211,28 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         **_series(system, records, done),
         **extent,
     )
+
+
+def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
+    """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
+    records, rows, window = run.records, run.rows, slice(first, run.periods)
+    found = []
+    for row, (number, side, corner) in enumerate(rows.places):
+        friction = _friction(scene, run, row)
+        sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
+        course = np.stack([sliding, records.struck[window, row]], axis=1)
+        found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
+    return tuple(found)
+
+
+def _friction(scene: Scene, run: Outcome, row: int) -> float:
+    """Return the coefficient of friction of a row of the log; 0: none, and no work of it."""
+    number, side, _ = run.rows.places[row]
+    if run.rows.without_body[row]:
+        return scene.friction_damper[number].friction if side == "casing" else 0.0
+    if run.system.in_plane and row < run.system.contacts:
+        return float(run.system.friction[row])
+    return scene.damper[number].friction if side == "floor" else 0.0
 
 
 def closed_status(status: Status, imbalance: float, bound: float) -> Status:

@@ -10,7 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.spot_stress import SpotStress
+from vanedamp.coupling.response.spot_stress import variables as stress_variables
 from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, dataset, save
 
@@ -216,6 +219,10 @@ class Response(Plotted):
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    contact_work: tuple[ContactWork, ...] | None = None
+    """work of friction and impacts of each contact; None without [wear]"""
+    stress: tuple[SpotStress, ...] | None = None
+    """stress at the hot spots of a reduced model; None without any [Pa]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
@@ -241,6 +248,8 @@ class Response(Plotted):
             data["estimate"] = self.estimate
         if self.advice is not None:
             data["advice"] = self.advice
+        if self.stress is not None:
+            data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
@@ -273,6 +282,8 @@ class Response(Plotted):
             variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
         if self.in_plane is not None:
             variables |= self.in_plane.variables()
+        if self.stress:
+            variables |= stress_variables(self.stress)
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}

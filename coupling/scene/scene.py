@@ -30,6 +30,7 @@ from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.coupling.scene.wear import Wear
 from vanedamp.files.display import Displayed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.open_record import OpenRecord
@@ -169,6 +170,8 @@ class Scene(OpenRecord, Displayed):
     """speed of the frame that everything turns with (default: standstill)"""
     contact: Contact = field(default_factory=Newton)
     """law of impacts and contacts at walls, stops and between bodies"""
+    wear: Wear | None = None
+    """wear of contacts (default: not counted)"""
     time: Time = field(default_factory=Time)
     """how long a run is, and what of it is evaluated"""
     solver: Solver = field(default_factory=partial(options_of, {}))

@@ -1,16 +1,20 @@
-"""What a sweep keeps of a point if its table asks for it: Poincare sections, and Lyapunov exponents."""
+"""What a sweep keeps of a point besides its measures: Poincare sections and Lyapunov exponents if its table asks for
+them, and stresses of a model with hot spots."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.exponents.lyapunov import Motion, lyapunov
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.spot_stress import LINEAR, SCALARS, SpotStress
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.files.store import frozen, read_only
+from vanedamp.rom.recovery import COMPONENTS
 
 #: measures of the exponents and their units, each an array over the grid; words, kept as their numbers
 EXPONENTS = {
@@ -21,6 +25,47 @@ WORDS = {"motion": tuple(Motion), "exponent_status": tuple(PassageStatus)}
 SECTIONS = {
     "section_displacement": "m", "section_velocity": "m/s", "section_slip": "m", "section_slip_velocity": "m/s",
 }  # fmt: skip
+#: stresses at hot spots, Pa, each an array over the grid and the spots, and those with components over these as well
+STRESSES = (
+    *(f"stress_{name}{of}" for name in SCALARS for of in ("", "_max", *(f"_{curve}" for curve in LINEAR))),
+    "stress_amplitude", "stress_static",
+)  # fmt: skip
+_OF_COMPONENTS = ("stress_amplitude", "stress_static")
+_WIDTH = len(STRESSES) + (len(COMPONENTS) - 1) * len(_OF_COMPONENTS)
+
+
+def stress_width(base: Scene) -> int:
+    """Return the number of columns of a point's stresses."""
+    return _WIDTH * len(hot_spots_in_file(base.structure))
+
+
+def put_stresses(row: np.ndarray, base: Scene, found: Sequence[SpotStress] | None) -> None:
+    """Put the stresses of a run into a row, at the places of the base's hot spots."""
+    known = {spot.name: spot for spot in found or ()}
+    for place, name in enumerate(hot_spots_in_file(base.structure)):
+        if (spot := known.get(name)) is not None:
+            row[place * _WIDTH : (place + 1) * _WIDTH] = _columns(spot)
+
+
+def _columns(spot: SpotStress) -> list[float]:
+    columns = []
+    for name in SCALARS:
+        columns += [getattr(spot, name), getattr(spot, f"{name}_max")]
+        columns += [(getattr(spot, curve) or {name: np.nan})[name] for curve in LINEAR]
+    static = np.full(len(COMPONENTS), np.nan) if spot.static is None else spot.static
+    return [*columns, *spot.amplitude.values(), *static]
+
+
+def stresses_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the stresses of a grid from the columns (points, n) of its points."""
+    if not values.shape[1]:
+        return
+    given, at = values.reshape(*shape, -1, _WIDTH), 0
+    for name in STRESSES:
+        wide = len(COMPONENTS) if name in _OF_COMPONENTS else 1
+        part = given[..., at : at + wide]
+        yield name, frozen(part if name in _OF_COMPONENTS else part[..., 0])
+        at += wide
 
 
 def exponent_width(base: Scene) -> int:

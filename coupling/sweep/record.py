@@ -12,18 +12,19 @@ import numpy as np
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Plotted, html_table
 from vanedamp.files.store import Variable, frozen
+from vanedamp.rom.recovery import COMPONENTS
 
 #: peaks of the linear curves over the swept frequencies and their units, each an array over the other axes
 PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
-_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1")
+_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | dict.fromkeys(STRESSES, "Pa")
 #: columns of the table in a notebook, beside the axes, and its rows
 _SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
 _MOST_ROWS = 20
@@ -52,6 +53,9 @@ class Sweep(SceneRecord, Plotted):
     sections              by the names of SECTIONS, (*grid, sections), of bodies (*grid, sections, bodies): states at
                           the start of the last evaluated periods and at their end, nan where there are fewer; empty
                           unless the table has `sections`
+    stress                by the names of STRESSES, (*grid, spots) or (*grid, spots, 6) Pa, at a reduced model's hot
+                          spots (response.spot_stress): amplitudes and the largest of a period, of the linear curves
+                          too, of all components, and static stress; empty without hot spots
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
@@ -82,6 +86,7 @@ class Sweep(SceneRecord, Plotted):
     in_plane: Mapping[str, np.ndarray] = field(default_factory=dict)
     exponents: Mapping[str, np.ndarray] = field(default_factory=dict)
     sections: Mapping[str, np.ndarray] = field(default_factory=dict)
+    stress: Mapping[str, np.ndarray] = field(default_factory=dict)
     peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -89,6 +94,11 @@ class Sweep(SceneRecord, Plotted):
     def shape(self) -> tuple[int, ...]:
         """Shape of the grid."""
         return self.status.shape
+
+    @property
+    def hot_spots(self) -> dict[str, dict[str, Any]]:
+        """What is known of the hot spots of `stress`, by name in their order (rom.recovery.hot_spots)."""
+        return dict(self.provenance.get("hot_spots", {}))
 
     def _repr_html_(self) -> str:
         """Return the table of points that a notebook shows, at most _MOST_ROWS of them."""
@@ -113,7 +123,7 @@ class Sweep(SceneRecord, Plotted):
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
         notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
-        further = {**self.in_plane, **self.exponents, **self.peaks}
+        further = {**self.in_plane, **self.exponents, **self.stress, **self.peaks}
         units = self.units() | MEASURES | {name: _FURTHER[name] for name in further}
         return (
             {"axes": axes, "units": units}
@@ -138,6 +148,12 @@ class Sweep(SceneRecord, Plotted):
         for name, values in self.sections.items():
             own = (*dims, "section", "damper")
             variables[name] = Variable(values, own[: values.ndim], SECTIONS[name])
+        if self.stress:
+            variables["hot_spot"] = Variable(np.array(list(self.hot_spots), object), ("hot_spot",))
+            variables["stress_component"] = Variable(np.array(COMPONENTS, object), ("stress_component",))
+        for name, values in self.stress.items():
+            own = (*dims, "hot_spot", "stress_component")
+            variables[name] = Variable(values, own[: values.ndim], "Pa")
         swept = resonance_axis(self.scene, self.axes)[0]
         others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
@@ -166,6 +182,7 @@ class Sweep(SceneRecord, Plotted):
                 if name in values
             },
             sections={name: frozen(values[name]) for name in SECTIONS if name in values},
+            stress={name: frozen(values[name]) for name in STRESSES if name in values},
             **given,
         )
 

@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.further import exponents_of, sections_of
+from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
@@ -36,6 +36,7 @@ from vanedamp.coupling.sweep.worker import (
 )
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.files.store import frozen, read_only
 from vanedamp.files.toml_input import InputError, validate
 
@@ -119,8 +120,10 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
         exponents=dict(exponents_of(parts["exponents"], grid.shape)),
         sections=dict(sections_of(parts["sections"], grid.shape, len(grid.base.damper))),
+        stress=dict(stresses_of(parts["stress"], grid.shape)),
         peaks=linear_tops(grid),
         provenance=provenance
+        | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),

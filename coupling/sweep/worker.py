@@ -20,7 +20,14 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
-from vanedamp.coupling.sweep.further import exponent_width, put_exponents, put_sections, section_width
+from vanedamp.coupling.sweep.further import (
+    exponent_width,
+    put_exponents,
+    put_sections,
+    put_stresses,
+    section_width,
+    stress_width,
+)
 from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
@@ -127,16 +134,17 @@ def _status(code: int, figures: np.ndarray) -> Status:
 
 
 def parts_of(base: Scene) -> dict[str, slice]:
-    """Return the columns of a scene's points behind COLUMNS: "in_plane", "exponents" and "sections"."""
+    """Return the columns of a scene's points behind COLUMNS: "in_plane", "exponents", "sections" and "stress"."""
     in_plane = len(IN_PLANE) * len(base.damper) if base.planar else 0
-    ends = np.cumsum([len(COLUMNS), in_plane, exponent_width(base), section_width(base)]).tolist()
-    names = ("in_plane", "exponents", "sections")
+    widths = in_plane, exponent_width(base), section_width(base), stress_width(base)
+    ends = np.cumsum([len(COLUMNS), *widths]).tolist()
+    names = ("in_plane", "exponents", "sections", "stress")
     return {name: slice(*between) for name, between in zip(names, itertools.pairwise(ends), strict=True)}
 
 
 def width_of(base: Scene) -> int:
     """Return the number of columns of a scene's points."""
-    return int(parts_of(base)["sections"].stop)
+    return int(parts_of(base)["stress"].stop)
 
 
 def broken(error: BaseException, width: int = len(COLUMNS), points: int = 1) -> TaskResult:
@@ -216,6 +224,7 @@ def _run(
         of_bodies[place] = getattr(response, name)  # None, of sliders, is nan
     section = np.hstack([response.section, response.slip, response.slip_velocity])
     put_sections(row[parts["sections"]], section[response.transient :])
+    put_stresses(row[parts["stress"]], maker.base, response.stress)
     return response.final, (response.status.value, response.classification)
 
 

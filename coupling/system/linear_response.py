@@ -69,6 +69,14 @@ class LinearResponse:
         amplitude[finite] = np.abs(waves[0, finite]) if len(waves) == 1 else peaks(waves[:, finite], self.order)
         return amplitude
 
+    def motion(self, frequency: float) -> np.ndarray:
+        """Return the complex modal coordinates (e, n) of the harmonics at a frequency, Hz.
+
+        Raises LinAlgError at a resonance without damping.
+        """
+        omega = 2 * np.pi * frequency * self.order
+        return steady_motion(self.stiffness, self.damping, self.mass, self.load, omega)
+
     def _wave(self, h: int, frequencies: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,), Hz; load: (f, n)."""
         omega = 2 * np.pi * self.order[h] * frequencies

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.scene.structures import Rom, Structure
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.checks import ReducedModelError
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
 
@@ -46,6 +47,13 @@ def restricted(structure: Rom, speed: float) -> Restricted:
 def greatest_speed(structure: Rom) -> float:
     """Return the speed of rotation, rad/s, up to which the model of a file holds; 0 for one that does not rotate."""
     return _loaded(structure.file, file_stamp(structure.file)).greatest_speed
+
+
+def hot_spots_in_file(structure: Structure) -> dict[str, dict[str, Any]]:
+    """Return what is known of the hot spots of a structure by name (rom.recovery.hot_spots); empty without any."""
+    if not isinstance(structure, Rom):
+        return {}
+    return hot_spots(_loaded(structure.file, file_stamp(structure.file)))
 
 
 def coordinates_in_file(structure: Rom) -> int:

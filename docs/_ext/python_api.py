@@ -55,6 +55,7 @@ PARTS = (
     Part("vanedamp.coupling.derivatives", ("matrix_direction", "passage")),
     Part("vanedamp.coupling.sensitivity", ("sensitivity", "sensitivity_record")),
     Part("vanedamp.coupling.exponents"),
+    Part("vanedamp.coupling.strength"),
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),

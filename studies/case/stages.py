@@ -16,7 +16,7 @@ from scipy import linalg
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, load_any, save
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_input import InputError, tables
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
@@ -30,7 +30,7 @@ from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
-from vanedamp.modal.stress import HotSpot, PeakStress, hot_spot, peak_stresses
+from vanedamp.modal.stress import HotSpot, PeakStress, corner_groups, hot_spot, peak_stresses
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis import BLOCKS, basis_ladder, basis_named
@@ -43,7 +43,7 @@ from vanedamp.rom.interface import (
     outward_normal,
     plane_motion,
 )
-from vanedamp.rom.recovery import with_stresses
+from vanedamp.rom.recovery import von_mises, with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
@@ -62,6 +62,8 @@ _UNCOUNTED = (
 )
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
+# fraction of the interface's largest motion by a mode below which a coordinate does not show it
+_UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -473,16 +475,39 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) ->
             raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
         picked.append(first_largest(stress))
         stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
-    names = [f"hot{index + 1}" for index in range(spots)]
+    names, points = [f"hot{index + 1}" for index in range(spots)], np.array(picked)
 
     def stresses(vectors: np.ndarray) -> dict[str, np.ndarray]:
-        values = solid.stress_components(vectors.T, np.array(picked))
+        values = solid.stress_components(vectors.T, points)
         return {name: values[:, :, index].T for index, name in enumerate(names)}
 
     residual = None if model.residual_recovery is None else stresses(model.residual_recovery)
-    spots_at = {name: places[place].tolist() for name, place in zip(names, picked, strict=True)}
-    provenance = dict(model.provenance) | {"hot_spots": spots_at}
+    facts = _facts_of_spots(structure, at_speed, shape, points)
+    provenance = dict(model.provenance) | {"hot_spots": dict(zip(names, facts, strict=True))}
     return with_stresses(replace(model, provenance=provenance), stresses(model.recovery), residual)
+
+
+def _facts_of_spots(
+    structure: Structure, model: ReducedModel, shape: np.ndarray, points: np.ndarray
+) -> list[dict[str, Any]]:
+    """Return the facts (rom.recovery.hot_spots) of corners of cells, points (s,), with the first mode's shape (n,)."""
+    case, solid, label = structure.case, structure.solid, structure.case.response_label
+    assert model.recovery is not None
+    groups, numbers = list(solid.domain.volumes), corner_groups(solid)[points]
+    static = solid.static_stresses(points)
+    stress = von_mises(solid.stress_components(model.recovery @ shape, points))
+    moved = 0.0 if label is None else abs(float(model.row(label) @ shape))
+    seen = moved > _UNSEEN * np.abs(model.selection @ shape).max()
+    facts = []
+    for place, (number, coordinates) in enumerate(zip(numbers, solid.stress_points()[points], strict=True)):
+        spot: dict[str, Any] = {"coordinates": coordinates.tolist(), "group": groups[number]}
+        if seen:
+            spot["per_amplitude"] = {"at": label, "von_mises": float(stress[place]) / moved}
+        spot["static"] = {cause: values[:, place].tolist() for cause, values in static.items()}
+        data = case.fatigue(groups[number])
+        spot["fatigue"] = {} if data is None else tables(data)
+        facts.append(spot)
+    return facts
 
 
 def reduction(

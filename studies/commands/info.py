@@ -19,8 +19,11 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.rom.recovery import hot_spots
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.spots import spot_lines
 from vanedamp.studies.report.forced_response import best_first, forced_responses
 
 #: entries of a list that are shown
@@ -28,8 +31,8 @@ _MOST = 10
 #: ending of the kinds of checkpoints
 _CHECKPOINT = "-checkpoint"
 _OF_RESPONSE = (
-    "status", "classification", "frequency", "amplitude_mean", "amplitude_max", "amplitude_harmonic",
-    "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
+    "status", "classification", "frequency", "amplitude_mean", "amplitude_mean_dynamic", "amplitude_max",
+    "amplitude_harmonic", "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
 )  # fmt: skip
 
 
@@ -147,11 +150,17 @@ def _reduced(record: _Record) -> Iterator[Fact]:
     yield Fact("basis", made.get("basis"))
     yield Fact("estimate", made.get("estimate", {}).get("sentence"))
     yield from _level(made.get("fatigue"))
+    for line in spot_lines(hot_spots(ReducedModel.load(record.path))):
+        yield Fact(*line.split(" ", 1))
 
 
 def _response(record: _Record) -> Iterator[Fact]:
     for name in _OF_RESPONSE:
         yield Fact(name, record.attributes.get(name), UNITS.get(name, ""))
+    for name, spot in record.attributes.get("stress", {}).items():
+        share = spot["strength_fraction"]
+        level = "" if share is None else f"{share:.3g} of the fatigue strength"
+        yield Fact(f"{name}_von_mises", spot["von_mises"], "Pa", level)
 
 
 def _sweep(record: _Record) -> Iterator[Fact]:

@@ -6,10 +6,12 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.spots import spot_lines
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -27,6 +29,7 @@ def run(arguments: Namespace, case: Case) -> None:
         "basis": arguments.basis,
         "interface": list(model.interface),
         "outputs": list(model.outputs),
+        "hot_spots": hot_spots(model),
         "estimate": model.provenance["estimate"],
         "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
         "wall_time_s": time.perf_counter() - started,
@@ -48,6 +51,7 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
     if rotation is not None:
         yield rotation["sentence"]
     yield "frequencies, Hz: " + _listed(model)
+    yield from spot_lines(hot_spots(model))
     if rotation is not None:
         yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest)
 

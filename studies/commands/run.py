@@ -41,6 +41,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
         for name, value in result.items()
         if not isinstance(value, dict | list)
     ]
+    lines += [f"{'stress':26} {spot.sentence}" for spot in response.stress or ()]
     if (found := response.lyapunov) is not None:
         lines.append(
             f"{'motion':26} {found['motion']}: largest exponent {found['exponent']:.4g} +- {found['confidence']:.2g} "

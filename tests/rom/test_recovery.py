@@ -10,7 +10,7 @@ from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
-from vanedamp.rom.recovery import COMPONENTS, von_mises, with_displacements, with_outputs, with_stresses
+from vanedamp.rom.recovery import COMPONENTS, hot_spots, von_mises, with_displacements, with_outputs, with_stresses
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.reduction import reduce
 from vanedamp.rom.truncation import truncated
@@ -78,7 +78,7 @@ def test_static_stress_of_a_cantilever(block):
     """Bending stress 6 F l / (w t^2) of a beam, at the hot spot near the clamp (Gere, Mechanics of Materials)."""
     _, _, model = block
     q = np.linalg.solve(model.stiffness, model.row("tip"))
-    spot = model.provenance["hot_spots"]["hot1"]
+    spot = hot_spots(model)["hot1"]["coordinates"]
     stress = model.evaluate(q)[model.outputs.index("hot1.xx")]
     assert min(abs(spot[2]), abs(spot[2] - 0.01)) < 1e-9  # on the surface
     assert abs(stress) == pytest.approx(6 * (0.1 - spot[0]) / (0.02 * 0.01**2), rel=0.1)
@@ -92,7 +92,8 @@ def test_stress_history_of_a_damped_run_equals_modal_superposition(block, tmp_pa
     from vanedamp.studies.case.stages import interface
 
     rows = modes.shapes @ interface(structure.case, structure.matrices).vectors
-    place = np.argmin(np.linalg.norm(structure.solid.stress_points() - model.provenance["hot_spots"]["hot1"], axis=1))
+    spot = hot_spots(model)["hot1"]["coordinates"]
+    place = np.argmin(np.linalg.norm(structure.solid.stress_points() - spot, axis=1))
     stresses = np.array([structure.solid.stress_components(shape, [place])[:, 0] for shape in modes.shapes])
     full = ReducedModel.from_matrices(
         np.eye(len(modes)), np.diag(modes.angular_frequencies**2), dict(zip(model.interface, rows.T, strict=True)),

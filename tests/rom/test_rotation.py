@@ -17,7 +17,7 @@ from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.rotating import UnstableError
 from vanedamp.rom.bases.projection import ReductionError
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
-from vanedamp.rom.recovery import with_stresses
+from vanedamp.rom.recovery import hot_spots, with_stresses
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.rotation import SpeedBases, reduce_rotating
 from vanedamp.rom.truncation import massless, truncated
@@ -179,7 +179,7 @@ def test_hot_spots_are_those_at_the_speed_of_the_case(tmp_path):
     turning = model.at_speed(5000.0)
     spotted = with_hot_spots(structure, model)
     stress = structure.solid.von_mises(turning.recovery @ turning.natural[1][:, 0])
-    away = np.linalg.norm(structure.solid.stress_points() - spotted.provenance["hot_spots"]["hot1"], axis=1)
+    away = np.linalg.norm(structure.solid.stress_points() - hot_spots(spotted)["hot1"]["coordinates"], axis=1)
     assert stress[away == 0.0].max() == pytest.approx(stress.max(), rel=1e-6)  # one of those equal by symmetry
     assert spotted.at_speed(5000.0).outputs == spotted.outputs
 
@@ -192,7 +192,9 @@ def test_stresses_at_a_speed_are_those_of_modal_superposition(tmp_path):
     replace(reduced, recovery=None, coordinates=None).save(tmp_path / "rom.h5")
     modes = solve_modes(structure.rotating.at(speed), 24)
     rows = modes.shapes @ interface(structure.case, structure.matrices).vectors
-    place = np.argmin(np.linalg.norm(structure.solid.stress_points() - reduced.provenance["hot_spots"]["hot1"], axis=1))
+    place = np.argmin(
+        np.linalg.norm(structure.solid.stress_points() - hot_spots(reduced)["hot1"]["coordinates"], axis=1)
+    )
     stresses = np.array([structure.solid.stress_components(shape, [place])[:, 0] for shape in modes.shapes])
     full = ReducedModel.from_matrices(
         np.eye(len(modes)), np.diag(modes.angular_frequencies**2), dict(zip(reduced.interface, rows.T, strict=True)),

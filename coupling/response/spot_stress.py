@@ -1,0 +1,112 @@
+"""Stress at a hot spot of a reduced model over a run: the record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.store import Variable
+from vanedamp.rom.recovery import COMPONENTS
+
+#: stresses with an amplitude: the components, signed von Mises stress, and the principal stress of largest magnitude
+SCALARS = ("von_mises", "principal")
+MEASURES = (*COMPONENTS, *SCALARS)
+#: linear curves that a stress is compared with: without bodies, and with every body fixed to its floor
+LINEAR = ("undamped", "fixed")
+
+
+@dataclass(frozen=True, eq=False)
+class SpotStress:
+    """Stress at a hot spot over the evaluated periods of a run, Pa.
+
+    An amplitude is the mean over the periods of half the range within a period, as `amplitude_mean_dynamic` is of the
+    displacement; with `_max`, the largest one of a period. Von Mises and principal stress are those of the stress about
+    the period's mean, negative where it goes against the largest one of the period.
+
+    name                    of the model's outputs "<name>.xx" ...
+    coordinates, group      place, m (None: unknown), and volume group ("": unknown)
+    amplitude               by component, "xx" to "zx"
+    von_mises, principal    amplitudes of signed von Mises stress and of the principal stress of largest magnitude
+    amplitude_max, von_mises_max, principal_max
+    mean                    (6,) mean of the motion, which static loads of the bodies deflect
+    static                  (6,) that and the stress of rotation and temperature; None: unknown
+    undamped, fixed         amplitudes "von_mises" and "principal" of the linear structure without bodies, and with
+                            every body fixed to its floor; None for an excitation that is no sum of sines
+    fatigue                 data of the material, such as "strength", Pa
+    samples_per_period      from which the amplitudes are taken
+    sampling_error          change of von Mises amplitudes by leaving out every other sample, relative: an upper bound
+                            for the error of all of them, where stress is smooth
+    """
+
+    name: str
+    coordinates: tuple[float, ...] | None
+    group: str
+    amplitude: dict[str, float]
+    von_mises: float
+    principal: float
+    amplitude_max: dict[str, float]
+    von_mises_max: float
+    principal_max: float
+    mean: np.ndarray
+    static: np.ndarray | None
+    undamped: dict[str, float] | None
+    fixed: dict[str, float] | None
+    fatigue: Mapping[str, Any] = field(default_factory=dict)
+    samples_per_period: int = 0
+    sampling_error: float = 0.0
+
+    @property
+    def strength_fraction(self) -> float | None:
+        """Amplitude of von Mises stress over the fatigue strength; None without a strength."""
+        strength = self.fatigue.get("strength")
+        return None if strength is None else self.von_mises / float(strength)
+
+    @property
+    def sentence(self) -> str:
+        """Place and amplitude in words."""
+        place = "" if self.coordinates is None else " at ({:.4g}, {:.4g}, {:.4g}) m".format(*self.coordinates)
+        inside, share = f" in {self.group}" if self.group else "", self.strength_fraction
+        level = "" if share is None else f", {share:.3g} of the fatigue strength"
+        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{level}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data, components by name."""
+        data: dict[str, Any] = {
+            "coordinates": None if self.coordinates is None else list(self.coordinates), "group": self.group,
+            "amplitude": dict(self.amplitude), "von_mises": self.von_mises, "principal": self.principal,
+            "amplitude_max": dict(self.amplitude_max), "von_mises_max": self.von_mises_max,
+            "principal_max": self.principal_max, "mean": named(self.mean),
+            "static": None if self.static is None else named(self.static), "undamped": self.undamped,
+            "fixed": self.fixed, "strength_fraction": self.strength_fraction, "fatigue": dict(self.fatigue),
+            "samples_per_period": self.samples_per_period, "sampling_error": self.sampling_error,
+        }  # fmt: skip
+        return data
+
+
+def named(components: np.ndarray) -> dict[str, float]:
+    """Return the six components of a stress, the first of some values, by name."""
+    return dict(zip(COMPONENTS, map(float, components), strict=False))
+
+
+def variables(spots: Sequence[SpotStress]) -> dict[str, Variable]:
+    """Return the variables of a file for the spots of a run, Pa."""
+    unknown = np.full(6, np.nan)
+    components = {
+        "stress_amplitude": [list(spot.amplitude.values()) for spot in spots],
+        "stress_mean": [spot.mean for spot in spots],
+        "stress_static": [unknown if spot.static is None else spot.static for spot in spots],
+    }
+    found = {
+        "hot_spot": Variable(np.array([spot.name for spot in spots], object), ("hot_spot",)),
+        "stress_component": Variable(np.array(COMPONENTS, object), ("stress_component",)),
+    }
+    found |= {
+        name: Variable(np.array(values, float), ("hot_spot", "stress_component"), "Pa")
+        for name, values in components.items()
+    }
+    for name in (*SCALARS, *(f"{name}_max" for name in SCALARS)):
+        found[f"stress_{name}"] = Variable(np.array([getattr(spot, name) for spot in spots]), ("hot_spot",), "Pa")
+    return found

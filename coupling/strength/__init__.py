@@ -1,0 +1,1 @@
+"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear."""

@@ -1,0 +1,29 @@
+"""Hot spots of a reduced model in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from vanedamp.rom.recovery import von_mises
+
+#: unit of the stress of a cause, and how many of them a Pa is
+_UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}
+_MPA = ("MPa", 1e-6)
+
+
+def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a line for each hot spot (rom.recovery.hot_spots): place, stress of the first mode, static stresses."""
+    for name, facts in spots.items():
+        x, y, z = facts["coordinates"]
+        line = f"{name} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
+        line += f" in {facts['group']}" if facts.get("group") else ""
+        parts = []
+        if mode := facts.get("per_amplitude"):
+            parts.append(f"first mode {mode['von_mises'] * 1e-12:.4g} MPa per um of {mode['at']}")
+        for cause, values in facts.get("static", {}).items():
+            unit, factor = _UNITS.get(cause, _MPA)
+            parts.append(f"{cause} {von_mises(np.array(values)) * factor:.4g} {unit}")
+        yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
