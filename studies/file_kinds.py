@@ -23,7 +23,9 @@ KINDS = {
             "vanedamp.studies.identification.tables:IdentificationFile",
             ("numbers", "forced", "decay", "impacts"),
         ),
+        FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
         FileKind(
             "scene",

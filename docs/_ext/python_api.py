@@ -45,6 +45,7 @@ PARTS = (
     Part("vanedamp.rom"),
     Part("vanedamp.rom.bases"),
     Part("vanedamp.coupling"),
+    Part("vanedamp.coupling.contacts"),
     Part("vanedamp.coupling.scene"),
     Part("vanedamp.coupling.scene.contact_laws"),
     Part("vanedamp.coupling.scene.waveforms"),
@@ -59,6 +60,7 @@ PARTS = (
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),
+    Part("vanedamp.studies.life", ("study", "life", "record", "slow")),
     Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density")),
 )
 
