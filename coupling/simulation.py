@@ -35,5 +35,6 @@ def simulate(
     response = stressed(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started
     return replace(
-        response, estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene), wall_time_s=took
+        response, estimate=chosen.estimate, advice=chosen.advice,
+        warnings=warnings_of(chosen.scene) + response.warnings, wall_time_s=took,
     )  # fmt: skip

@@ -37,23 +37,30 @@ making_schema = ContextVar("making_schema", default=False)
 class FileKind(NamedTuple):
     """A kind of input file.
 
-    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds.
+    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
+    completed: "module:function" that takes the schema of the record and returns that of the files, "" for the same.
     """
 
     name: str
     place: str
     tables: tuple[str, ...] = ()
+    completed: str = ""
 
     @property
     def record(self) -> Any:
         """The record that a file of this kind is read as."""
-        module, name = self.place.split(":")
-        return getattr(import_module(module), name)
+        return _at(self.place)
 
     @property
     def schema(self) -> dict[str, Any]:
         """JSON Schema of the files of this kind."""
-        return schema(self.record)
+        made = schema(self.record)
+        return _at(self.completed)(made) if self.completed else made
+
+
+def _at(place: str) -> Any:
+    module, name = place.split(":")
+    return getattr(import_module(module), name)
 
 
 def schema(record: Any) -> dict[str, Any]:

@@ -186,7 +186,7 @@ def _shared_flexibility(scene: Scene, structure: Rom) -> dict[str, Any] | None:
     residual = model.residual_flexibility
     if residual is None:
         return None
-    own, largest = law.flexibility, 0.0
+    own, largest = min((law.flexibility(damper.mass) for damper in scene.damper), default=0.0), 0.0
     for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
         if one != other:
             size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))

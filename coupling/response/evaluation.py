@@ -32,6 +32,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steadiness import judge, run_ends
 from vanedamp.coupling.response.steady_state import transient_length
+from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
@@ -194,7 +195,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     if scene.wear is not None:
-        extent["contact_work"] = _contact_work(scene, run, first)
+        extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
     return Response(
         status=status,
         frequency=scene.frequency,
@@ -211,6 +212,13 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         **_series(system, records, done),
         **extent,
     )
+
+
+def _worn(scene: Scene, work: tuple[ContactWork, ...], friction: float) -> dict[str, Any]:
+    """Return work and wear of the contacts, and a warning if it does not fit the friction work of the balance, J."""
+    if not work or not len(work[0].course):
+        return {"contact_work": work}
+    return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": ledger_warning(work, friction)}
 
 
 def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:

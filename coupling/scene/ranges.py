@@ -60,6 +60,36 @@ def read(record: type[T], data: Mapping[str, Any], source: str) -> T:
     return scene
 
 
+def with_ranges(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the JSON Schema of a scene in which every number of its tables may be a range."""
+    made = copy.deepcopy(schema)
+    nodes: list[Any] = [node for key, node in made["properties"].items() if key not in _OTHERS]
+    known: set[str] = set()
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, list):
+            nodes += node
+        elif isinstance(node, dict):
+            name = node.get("$ref", "").rsplit("/", 1)[-1]
+            if name and name not in known:
+                known.add(name)
+                nodes.append(made["$defs"][name])
+            for key, inner in node.get("properties", {}).items():
+                node["properties"][key] = _ranged(inner)
+            nodes += [value for value in node.values() if isinstance(value, dict | list)]
+    return made
+
+
+def _ranged(node: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a key whose number may be a range; of any other key as it is."""
+    if node.get("type") != "number":
+        return node
+    bounds = ("type", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
+    number = {key: node[key] for key in bounds if key in node}
+    pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+    return {key: value for key, value in node.items() if key not in number} | {"anyOf": [number, pair]}
+
+
 def _peeled(data: dict[str, Any], places: list[list[Any]], source: str) -> dict[str, Any]:
     """Return a scene's tables with the middle of each range in its place, and the ranges in their own table."""
     table = data.get("ensemble")

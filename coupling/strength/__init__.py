@@ -1,1 +1,1 @@
-"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear."""
+"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear, strength of contacts."""

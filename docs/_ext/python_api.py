@@ -45,11 +45,13 @@ PARTS = (
     Part("vanedamp.rom"),
     Part("vanedamp.rom.bases"),
     Part("vanedamp.coupling"),
+    Part("vanedamp.coupling.contacts"),
     Part("vanedamp.coupling.scene"),
     Part("vanedamp.coupling.scene.contact_laws"),
     Part("vanedamp.coupling.scene.waveforms"),
     Part("vanedamp.coupling.response", ("response", "restart_state", "steady_state")),
     Part("vanedamp.coupling.sweep", ("sweep", "record", "steady_states")),
+    Part("vanedamp.coupling.ensembles", ("design", "record")),
     Part("vanedamp.coupling.orbits", ("orbits", "branch", "border", "multipliers", "bifurcations", "history")),
     Part("vanedamp.coupling.derivatives", ("matrix_direction", "passage")),
     Part("vanedamp.coupling.sensitivity", ("sensitivity", "sensitivity_record")),
@@ -58,6 +60,7 @@ PARTS = (
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),
+    Part("vanedamp.studies.life", ("study", "life", "record", "slow")),
     Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density")),
 )
 

@@ -226,6 +226,14 @@ def _optimisation(record: _Record) -> Iterator[Fact]:
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
 
 
+def _life(record: _Record) -> Iterator[Fact]:
+    attributes, of = record.attributes, {name: variable.values for name, variable in record.variables.items()}
+    yield Fact("answer", attributes["sentence"])
+    yield Fact("hours", of["time"][[0, -1]].tolist(), "h", "first and last moment")
+    yield Fact("gap", of["gap"][[0, -1]].tolist(), "m", "of the cavities, then")
+    yield Fact("runs", attributes["runs"], "", f"of them {attributes['trouble']} not ok")
+
+
 def _identification(record: _Record) -> Iterator[Fact]:
     attributes = record.attributes
     yield Fact("status", attributes["status"])
@@ -269,6 +277,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "ramp": ("run-ups and run-downs", "ramp", _ramp),
     "ring_down": ("a ring-down", "ringdown", _ring_down),
     "optimisation": ("an optimisation", "optimise", _optimisation),
+    "life": ("the life of a damper", "life", _life),
     "identification": ("numbers of a scene from measurements", "identify", _identification),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),

@@ -46,7 +46,7 @@ def _ensemble(file: str, record: Ensemble, page: Page) -> dict[str, Any]:
         shown.append({"title": title(record, place), "bands": bands, "bars": bars})
     return {
         "file": file, "record": record, "curves": shown, "every": len(all_places), "quantiles": QUANTILES,
-        "ranges": [(path, unit_of(path).replace("1", ""), *ends) for path, ends in record.scene.ranges.items()],
+        "ranges": [(path, unit_of(path).replace("1", ""), *record.scene.ranges[path]) for path in record.numbers],
         "sentences": list(record.sentences())[:_MOST], "rows": list(_quantile_rows(record)),
     }  # fmt: skip
 
