@@ -11,6 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
@@ -46,6 +47,8 @@ class RampRun:
     displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
     energy           J by the names of WORKS, over the run
     energy_residual  imbalance of the run's energies, relative to the largest term
+    stress           (p, s, 8) Pa, amplitudes of stress in it at s hot spots, by response.spot_stress.MEASURES; None
+                     without any
     """
 
     rate: float
@@ -61,6 +64,7 @@ class RampRun:
     velocity: np.ndarray
     energy: Mapping[str, float]
     energy_residual: float
+    stress: np.ndarray | None = None
 
     @property
     def direction(self) -> str:
@@ -131,13 +135,22 @@ class Ramp(SceneRecord, Plotted):
                 "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
                 "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
                 "energy": dict(run.energy), "energy_residual": run.energy_residual,
-            }
+            } | ({} if run.stress is None else {"stress": self._tops_of_stress(run)})
             for run in self.runs
         ]  # fmt: skip
         return {
             "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
             "warnings": list(self.warnings),
         }  # fmt: skip
+
+    def _tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
+        """Return the largest amplitudes of von Mises and principal stress of a run, Pa, by hot spot."""
+        assert run.stress is not None
+        tops = run.stress.max(axis=0)
+        return {
+            spot: {name: float(tops[place, MEASURES.index(name)]) for name in SCALARS}
+            for place, spot in enumerate(self.provenance["hot_spots"])
+        }
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
@@ -164,6 +177,11 @@ class Ramp(SceneRecord, Plotted):
             "energy": Variable([[run.energy[name] for name in WORKS] for run in runs], ("run", "work"), "J"),
             **{f"linear_{name}": Variable(self.curves[name], ("linear",), units) for name, units in CURVES.items()},
         }
+        if any(run.stress is not None for run in runs):
+            spots, dims = list(self.provenance["hot_spots"]), ("period", "hot_spot", "stress_measure")
+            none = np.zeros((0, len(spots), len(MEASURES)))
+            stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
+            found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
         if dampers:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
@@ -186,6 +204,7 @@ class Ramp(SceneRecord, Plotted):
                     rate=float(rate), status=str(values["status"][number]), stuck=frozen(stuck, bool),
                     energy=dict(zip(WORKS, values["energy"][number].tolist(), strict=True)),
                     energy_residual=float(values["energy_residual"][number]),
+                    stress=frozen(values["stress"][inside]) if "stress" in values and inside.any() else None,
                     **{name: frozen(values[name][inside]) for name in SERIES},
                     **{name: frozen(values[name][starts]) for name in STATES},
                 )

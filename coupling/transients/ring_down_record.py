@@ -12,6 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
@@ -51,6 +52,8 @@ class RingDown(SceneRecord, Plotted):
     energies            J over the free motion: initial, viscous, friction, impact, contact and left
     energy_residual     imbalance of the energies, relative to its largest term
     drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
+    stress              (p, s, 8) Pa, amplitudes of stress in each of p periods of `duration` at s hot spots, by
+                        response.spot_stress.MEASURES; None without any
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """
 
@@ -73,6 +76,7 @@ class RingDown(SceneRecord, Plotted):
     advice: dict[str, Any] | None = None
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    stress: np.ndarray | None = None
 
     @property
     def table(self) -> RingDownTable:
@@ -152,6 +156,10 @@ class RingDown(SceneRecord, Plotted):
             "damping_ratio_energy": Variable(whole.damping_ratio_energy, ("cycle",)),
             "energy_loss": Variable(whole.loss, ("cycle",), "J"),
         }
+        if self.stress is not None:
+            dims = ("period", "hot_spot", "stress_measure")
+            found |= stress_axes(list(self.provenance["hot_spots"])) | {"stress": Variable(self.stress, dims, "Pa")}
+            found["period_time"] = Variable(np.arange(len(self.stress)) / self.scene.frequency, ("period",), "s")
         if self.table.bins:
             for name, each in self.bins.items():
                 units = {"low": "m", "high": "m", "number": "1"}
@@ -179,6 +187,7 @@ class RingDown(SceneRecord, Plotted):
         linear, energies = (json.loads(attributes[name]) for name in ("linear", "energies"))
         return cls(
             status=Status(attributes["status"]), linear=LinearMode(**linear), impacts=frozen(values["impacts"], int),
+            stress=frozen(values["stress"]) if "stress" in values else None,
             rest_time=float(attributes["rest_time"]) if "rest_time" in attributes else None,
             # a file has them in the order of their names
             energies={name: energies[name] for name in PARTS if name in energies},

@@ -113,6 +113,14 @@ def test_moments_of_a_linear_response_to_noise_are_those_of_its_run(file):
         assert estimated.crossings == pytest.approx(exact.crossings, rel=0.01)
 
 
+def test_moments_of_a_motion_with_rigid_impacts_grow_with_the_band(file):
+    """A jump of velocity leaves a density of omega^-4: l4 grows in proportion to the band, l0 has a limit."""
+    made = scene(file, contact={"law": "newton"}, time={"periods": 440, "transient": 40})
+    narrow, wide = (run_moments(made, 2000, highest_hz)[0] for highest_hz in (50e3, 100e3))
+    assert wide.l4 / narrow.l4 == pytest.approx(2.0, abs=0.4)
+    assert wide.l0 / narrow.l0 == pytest.approx(1.0, abs=1e-6)
+
+
 def test_noise_has_the_damage_of_its_spectrum(file):
     """One draw of the phases against the mean of all, and the closed form of the spectrum in the result."""
     made = noise(file, cavity=[], damper=[])
