@@ -37,23 +37,30 @@ making_schema = ContextVar("making_schema", default=False)
 class FileKind(NamedTuple):
     """A kind of input file.
 
-    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds.
+    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
+    completed: "module:function" that takes the schema of the record and returns that of the files, "" for the same.
     """
 
     name: str
     place: str
     tables: tuple[str, ...] = ()
+    completed: str = ""
 
     @property
     def record(self) -> Any:
         """The record that a file of this kind is read as."""
-        module, name = self.place.split(":")
-        return getattr(import_module(module), name)
+        return _at(self.place)
 
     @property
     def schema(self) -> dict[str, Any]:
         """JSON Schema of the files of this kind."""
-        return schema(self.record)
+        made = schema(self.record)
+        return _at(self.completed)(made) if self.completed else made
+
+
+def _at(place: str) -> Any:
+    module, name = place.split(":")
+    return getattr(import_module(module), name)
 
 
 def schema(record: Any) -> dict[str, Any]:
@@ -97,10 +104,14 @@ def constants(node: dict[str, Any]) -> dict[str, str]:
 
 
 def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a table among the variants that a node stands for: the one whose constants it has."""
+    """Return the schema of a table among the variants that a node stands for: the one with its constants, or keys."""
     tables = [option for option in options(schema, node) if option.get("type") == "object"]
     fitting = [one for one in tables if all(table.get(key) == value for key, value in constants(one).items())]
-    return max(fitting, key=lambda one: len(constants(one))) if fitting else next(iter(tables), {})
+
+    def fit(one: dict[str, Any]) -> tuple[int, int]:
+        return len(constants(one)), len(one.get("properties", {}).keys() & table.keys())
+
+    return max(fitting, key=fit) if fitting else next(iter(tables), {})
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:

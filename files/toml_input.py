@@ -124,6 +124,16 @@ def validated_or_none(record: type[T], data: Mapping[str, Any]) -> T | None:
         return None
 
 
+def lists_for_numbers(record: type[T], data: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the places of plain data, by keys and numbers of entries, where a list stands and a number belongs."""
+    try:
+        _adapter(record).validate_python(data)  # type: ignore[arg-type]
+    except ValidationError as error:
+        found = [one for one in error.errors() if one["type"] == "float_type" and isinstance(one["input"], list)]
+        return [_path_in_data(one["loc"], data, names_absent_key=False) for one in found]
+    return []
+
+
 def tables(record: Any) -> dict[str, Any]:
     """Return a record as plain nested data, as in its file, without values that are None."""
     data: dict[str, Any] = _adapter(record.__class__).dump_python(record, mode="json", exclude_none=True, by_alias=True)
@@ -153,7 +163,7 @@ def nearest(word: str, known: list[str]) -> str:
 def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
     kind = error["type"]
     path = _path_in_data(error["loc"], data, names_absent_key="argument" in kind or "missing" in kind)
-    key = _dotted(path)
+    key = dotted(path)
     if kind in _UNKNOWN:
         return f"{key}: {_unknown(adapter.json_schema(), error['loc'], str(path[-1]))}"
     if kind in ("missing", "missing_argument"):
@@ -164,7 +174,7 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
         return f"{key}.{tag}: must be one of {expected}"
     value = error["input"]
     if kind in _NO_TABLE:
-        heading = f"[{key}]" if path and isinstance(path[-1], str) else f"[[{_dotted(path[:-1])}]]"
+        heading = f"[{key}]" if path and isinstance(path[-1], str) else f"[[{dotted(path[:-1])}]]"
         return f"{key}: expected a table, headed {heading}"
     if kind in _NO_LIST and isinstance(value, Mapping) and len(path) == 1:
         return f"{key}: expected a list of tables, each headed [[{key}]], not [{key}]"
@@ -202,7 +212,8 @@ def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) 
     return path
 
 
-def _dotted(path: list[Any]) -> str:
+def dotted(path: list[Any]) -> str:
+    """Return a place in data as messages name it, such as damper[0].mass."""
     text = ""
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else str(step))

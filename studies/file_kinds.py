@@ -23,9 +23,16 @@ KINDS = {
             "vanedamp.studies.identification.tables:IdentificationFile",
             ("numbers", "forced", "decay", "impacts"),
         ),
+        FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
-        FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),
+        FileKind(
+            "scene",
+            "vanedamp.coupling.scene.scene:Scene",
+            ("structure", "excitation", "cavity", "damper"),
+            "vanedamp.coupling.scene.ranges:with_ranges",
+        ),
     )
 }
 

@@ -1,4 +1,4 @@
-"""`vanedamp.sweep`: sweeps as programs and notebooks run them, with processes and a progress bar by arguments."""
+"""`vanedamp.sweep` and `vanedamp.ensemble`: as programs and notebooks run them, processes and progress by arguments."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import closing, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from vanedamp.coupling.ensembles.ensemble import ensemble as run_ensemble
+from vanedamp.coupling.ensembles.record import Ensemble
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.terminal import Bar
 from vanedamp.studies.workers import workers as processes
+
+T = TypeVar("T")
 
 
 def sweep(
@@ -36,8 +40,33 @@ def sweep(
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the workers are lost for good.
     """
+    return _run(run_sweep, "sweep", scene, executor, progress, checkpoint, provenance, workers)
+
+
+def ensemble(
+    scene: Scene | str | Path,
+    executor: Executor | None = None,
+    progress: bool | Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    *,
+    workers: int = 1,
+) -> Ensemble:
+    """Run a scene, or that in a TOML file, for every sample of its ranges, over its [sweep] table if it has one.
+
+    The [ensemble] table says how numbers are sampled; choices for `modes` and `shape` "auto" are those of the scene's
+    own numbers. All arguments are those of `sweep`, as are the errors raised.
+    """
+    return _run(run_ensemble, "ensemble", scene, executor, progress, checkpoint, provenance, workers)
+
+
+def _run(
+    work: Callable[..., T], title: str, scene: Scene | str | Path, executor: Executor | None,
+    progress: bool | Callable[[int, int], None] | None, checkpoint: str | Path | None,
+    provenance: Mapping[str, Any] | None, workers: int,
+) -> T:  # fmt: skip
     if workers < 0 or (workers != 1 and executor is not None):
         raise InputError("workers: expected a number of processes, 0 for one per core; leave it out beside an executor")
-    shown = closing(Bar("sweep", unit="point", leave=True)) if progress is True else nullcontext(progress or None)
+    shown = closing(Bar(title, unit="point", leave=True)) if progress is True else nullcontext(progress or None)
     with processes(workers) if executor is None else nullcontext(executor) as pool, shown as report:
-        return run_sweep(scene, pool, report, checkpoint, provenance)
+        return work(scene, pool, report, checkpoint, provenance)

@@ -9,11 +9,21 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 
 
-def load_scene(path: str | Path) -> Scene:
-    """Load a scene whose reduced model is there. Raises InputError."""
+def load_scene(path: str | Path, ranges: bool = False) -> Scene:
+    """Load a scene whose reduced model is there; ranges: whether its numbers may be ranges. Raises InputError."""
     scene = Scene.load(path)
+    if not ranges:
+        check_numbers(scene, f"{path}: ")
     check_model(scene)
     return scene
+
+
+def check_numbers(scene: Scene, source: str = "") -> None:
+    """Raise InputError for a scene with a number that is a range."""
+    for path, (low, high) in scene.ranges.items():
+        raise InputError(
+            f"{source}{path}: the range [{low:g}, {high:g}] is for `vanedamp run` and `vanedamp sweep`; give a number"
+        )
 
 
 def check_moved(scene: Scene) -> None:

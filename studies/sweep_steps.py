@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.ensembles.members import Members
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -70,7 +71,7 @@ def run_points(prepared: Prepared, output: str | Path | None, pool: Executor | N
     return result
 
 
-def ends_of(points: Grid) -> list[Scene]:
+def ends_of(points: Grid | Members) -> list[Scene]:
     """Return the scenes of the first and the last point, without open choices."""
     scenes = Points(points.base, points.choices)
     return [scenes.scene(points.values(index)) for index in {0, points.size - 1}]

@@ -6,7 +6,10 @@ from vanedamp import meshes as meshes
 from vanedamp import modal as modal
 from vanedamp import rom as rom
 from vanedamp import studies as studies
+from vanedamp.coupling.contacts.numbers import ContactNumbers as ContactNumbers
+from vanedamp.coupling.contacts.pair import Pair as Pair
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection as MatrixDirection
+from vanedamp.coupling.ensembles.record import Ensemble as Ensemble
 from vanedamp.coupling.exponents.lyapunov import Exponents as Exponents
 from vanedamp.coupling.exponents.lyapunov import lyapunov as lyapunov
 from vanedamp.coupling.methods import Method as Method
@@ -24,6 +27,7 @@ from vanedamp.coupling.scene.waveform import Waveform as Waveform
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity as sensitivity
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity as Sensitivity
 from vanedamp.coupling.simulation import simulate as simulate
+from vanedamp.coupling.strength.contact_numbers import contact as contact
 from vanedamp.coupling.sweep.record import Sweep as Sweep
 from vanedamp.coupling.sweep.steady_states import steady_states as steady_states
 from vanedamp.coupling.transients.ramp import ramp as ramp
@@ -51,8 +55,12 @@ from vanedamp.studies.identification.density import LogDensity as LogDensity
 from vanedamp.studies.identification.record import Identification as Identification
 from vanedamp.studies.identification.search import identify as identify
 from vanedamp.studies.identification.study import IdentificationStudy as IdentificationStudy
+from vanedamp.studies.life.life import life as life
+from vanedamp.studies.life.record import LifeRecord as LifeRecord
+from vanedamp.studies.life.study import LifeStudy as LifeStudy
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study
+from vanedamp.studies.parallel_sweep import ensemble as ensemble
 from vanedamp.studies.parallel_sweep import sweep as sweep
 from vanedamp.studies.pipeline.pipeline import pipeline as pipeline
 from vanedamp.studies.report.plot import plot as plot

@@ -64,11 +64,18 @@ def run_of(
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
+    if scene.wear is not None and (reason := _why_not(scene.solver.method, "WEARS")):
+        raise InputError(f"wear: {reason}; leave the table out")
     system = assemble(scene)
     _check_bodies(scene, system)
     samples = samples_per_period if watch is None else watch.samples(scene, system, samples_per_period)
     records = new_records(
-        system, most_periods(scene), samples, isinstance(scene.structure, Rom), deflects(scene, system)
+        system,
+        most_periods(scene),
+        samples,
+        isinstance(scene.structure, Rom),
+        deflects(scene, system),
+        None if scene.wear is None else scene.wear.impact_exponent,
     )
     records = records if watch is None else watch.records(records)
     return method.begin(scene, system, records, events, start_of(scene, system, start))
@@ -118,7 +125,7 @@ def check_waveform(scene: Scene, method: str) -> None:
 
 
 def _why_not(method: str, ability: str) -> str | None:
-    """Return why a method lacks an ability, RESTARTS or WAVEFORMS; None if it has it."""
+    """Return why a method lacks an ability, RESTARTS, WAVEFORMS or WEARS; None if it has it."""
     if getattr(METHODS.part(method), ability, False):
         return None
     able = [name for name, part in METHODS.all().items() if getattr(part, ability, False)]

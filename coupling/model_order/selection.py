@@ -137,11 +137,13 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene without open choices: of its method, impact laws on several modes, and loads."""
+    """Return the warnings of a scene without open choices: of method, impact laws on several modes, loads, ranges."""
     rubs = any(damper.form.planar and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
+    ranges = ", ".join(scene.ranges)
     return (
         *([] if warning is None else [f"solver.method: {warning}"]),
+        *([f"ranges: {ranges}: the scene's own numbers are taken; vanedamp.ensemble samples ranges"] if ranges else []),
         *_of_rotation(scene),
         *_of_impact_laws(scene),
         *load_warnings(scene),
@@ -184,7 +186,7 @@ def _shared_flexibility(scene: Scene, structure: Rom) -> dict[str, Any] | None:
     residual = model.residual_flexibility
     if residual is None:
         return None
-    own, largest = law.flexibility, 0.0
+    own, largest = min((law.flexibility(damper.mass) for damper in scene.damper), default=0.0), 0.0
     for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
         if one != other:
             size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import Rows, events_of
 from vanedamp.coupling.response.figures import (
     FIGURES,
@@ -31,6 +32,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steadiness import judge, run_ends
 from vanedamp.coupling.response.steady_state import transient_length
+from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
@@ -192,6 +194,8 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         status = Status.TILTED if tilted and status in _USABLE else status
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
+    if scene.wear is not None:
+        extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
     return Response(
         status=status,
         frequency=scene.frequency,
@@ -208,6 +212,35 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         **_series(system, records, done),
         **extent,
     )
+
+
+def _worn(scene: Scene, work: tuple[ContactWork, ...], friction: float) -> dict[str, Any]:
+    """Return work and wear of the contacts, and a warning if it does not fit the friction work of the balance, J."""
+    if not work or not len(work[0].course):
+        return {"contact_work": work}
+    return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": ledger_warning(work, friction)}
+
+
+def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
+    """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
+    records, rows, window = run.records, run.rows, slice(first, run.periods)
+    found = []
+    for row, (number, side, corner) in enumerate(rows.places):
+        friction = _friction(scene, run, row)
+        sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
+        course = np.stack([sliding, records.struck[window, row]], axis=1)
+        found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
+    return tuple(found)
+
+
+def _friction(scene: Scene, run: Outcome, row: int) -> float:
+    """Return the coefficient of friction of a row of the log; 0: none, and no work of it."""
+    number, side, _ = run.rows.places[row]
+    if run.rows.without_body[row]:
+        return scene.friction_damper[number].friction if side == "casing" else 0.0
+    if run.system.in_plane and row < run.system.contacts:
+        return float(run.system.friction[row])
+    return scene.damper[number].friction if side == "floor" else 0.0
 
 
 def closed_status(status: Status, imbalance: float, bound: float) -> Status:

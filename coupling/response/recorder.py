@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.compiler.jit import entry, inlined
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.response.records import STORED
 
 
@@ -89,6 +89,13 @@ def cubic_extremum(h, x0, x1, rate0, rate1):
     t = rate0 / (rate0 - rate1)
     u = 1.0 - t
     return x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1)
+
+
+@kernel
+def note_impact(records, period, row, energy):
+    """Let an impact on a row of the log, and the energy of its relative motion (J), count in wear."""
+    records.struck[period, row] += energy ** records.exponent[0]
+    records.hits[period, row] += 1.0
 
 
 @entry

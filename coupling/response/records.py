@@ -37,6 +37,10 @@ class Records(NamedTuple):
     shut: np.ndarray  # (periods * s, u) int: whether contacts are closed there
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
     swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
+    worn: np.ndarray  # (periods + 1, w) work of friction of each row of the log, J; w = 0: not wanted
+    struck: np.ndarray  # (periods + 1, w) sum over its impacts of their energy to the power `exponent`, J^exponent
+    hits: np.ndarray  # (periods + 1, w) its impacts
+    exponent: np.ndarray  # (1,)
 
     @property
     def samples_per_period(self) -> int:
@@ -45,15 +49,19 @@ class Records(NamedTuple):
 
 
 def new_records(
-    system: System, periods: int, samples: int, coordinates: bool = False, deflected: bool = False
-) -> Records:
+    system: System, periods: int, samples: int, coordinates: bool = False, deflected: bool = False,
+    exponent: float | None = None,
+) -> Records:  # fmt: skip
     """Return empty records for `periods` periods with `samples` samples each.
 
-    coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure.
+    coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure;
+    exponent: of the energies of impacts that wear; None: wear is not wanted.
     """
     b = system.bodies
     kept = np.empty((periods * samples, system.modes if coordinates else 0))
     kept[:1] = np.nan  # unused entries of a run that ends early take no memory
+    rows = 0 if exponent is None else system.bodies + system.dampers + system.contacts
+    worn, struck, hits = np.zeros((3, periods + 1, rows))
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
@@ -65,4 +73,5 @@ def new_records(
         shut=np.zeros((periods * samples, len(system.rest)), np.int8),
         log=np.zeros((4096 + 4 * (system.bodies + system.dampers + system.contacts), 6)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
+        worn=worn, struck=struck, hits=hits, exponent=np.array([1.0 if exponent is None else exponent]),
     )  # fmt: skip

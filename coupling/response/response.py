@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.response.contact_strength import ContactStrength
+from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.response.spot_stress import variables as stress_variables
@@ -218,8 +221,14 @@ class Response(Plotted):
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: np.ndarray | None = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    contact_work: tuple[ContactWork, ...] | None = None
+    """work of friction and impacts of each contact; None without [wear]"""
+    wear: tuple[ContactWear, ...] | None = None
+    """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
     stress: tuple[SpotStress, ...] | None = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
+    contacts: tuple[ContactStrength, ...] | None = None
+    """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
@@ -245,8 +254,13 @@ class Response(Plotted):
             data["estimate"] = self.estimate
         if self.advice is not None:
             data["advice"] = self.advice
+        if self.wear is not None:
+            data["wear"] = [contact.to_json() for contact in self.wear]
         if self.stress is not None:
             data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
+            data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
+        if self.contacts is not None:
+            data["contact_strength"] = [contact.to_json() for contact in self.contacts]
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
@@ -284,6 +298,8 @@ class Response(Plotted):
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}
+        for name in attributes.keys() & {"wear", "contact_strength"}:
+            attributes[name] = json.dumps(attributes[name])
         for name in attributes.keys() & _OF_BODIES:
             attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
         return variables, attributes

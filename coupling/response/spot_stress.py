@@ -36,6 +36,7 @@ class SpotStress:
     undamped, fixed         amplitudes "von_mises" and "principal" of the linear structure without bodies, and with
                             every body fixed to its floor; None for an excitation that is no sum of sines
     fatigue                 data of the material, such as "strength", Pa
+    strength                utilisation and life, by the names of strength.assessment; empty without a fatigue strength
     samples_per_period      from which the amplitudes are taken
     sampling_error          change of von Mises amplitudes by leaving out every other sample, relative: an upper bound
                             for the error of all of them, where stress is smooth
@@ -55,6 +56,7 @@ class SpotStress:
     undamped: dict[str, float] | None
     fixed: dict[str, float] | None
     fatigue: Mapping[str, Any] = field(default_factory=dict)
+    strength: Mapping[str, Any] = field(default_factory=dict)
     samples_per_period: int = 0
     sampling_error: float = 0.0
 
@@ -70,7 +72,16 @@ class SpotStress:
         place = "" if self.coordinates is None else " at ({:.4g}, {:.4g}, {:.4g}) m".format(*self.coordinates)
         inside, share = f" in {self.group}" if self.group else "", self.strength_fraction
         level = "" if share is None else f", {share:.3g} of the fatigue strength"
-        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{level}"
+        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{level}{self._life}"
+
+    @property
+    def _life(self) -> str:
+        """Utilisation by the line of mean stress and life, in words; nothing where there is neither."""
+        found, words = self.strength, ""
+        if found and found["mean_line"] != "none":
+            about = f"{found['mean_line'].capitalize()}, mean stress {found['mean'] / 1e6:.4g} MPa"
+            words = f", utilisation {found['utilisation']:.3g} ({about})"
+        return words + (f", median life {found['life_hours']['50%']:.3g} h" if "life_hours" in found else "")
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain data, components by name."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Annotated, Any, TypeVar
 
 from vanedamp.coupling.scene.contact_laws.compliant import Compliant
+from vanedamp.coupling.scene.contact_laws.hertz import Hertz
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
 from vanedamp.coupling.scene.contact_laws.massless import Massless
 from vanedamp.coupling.scene.contact_laws.newton import Newton
@@ -37,7 +38,7 @@ WAVEFORMS = Variants("waveform", Waveform, "shape", "vanedamp.waveforms")
 Contact = Annotated[ContactLaw, LAWS]
 #: type of an excitation's `waveform`
 AnyWaveform = Annotated[Waveform, WAVEFORMS]
-for _law in (Newton, Poisson, Compliant, Massless, Viscoelastic):
+for _law in (Newton, Poisson, Compliant, Massless, Viscoelastic, Hertz):
     LAWS.register(_law)
 for _waveform in (Multisine, History):
     WAVEFORMS.register(_waveform)

@@ -22,13 +22,15 @@ from vanedamp.coupling.scene.elements.element import SceneElement
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
-from vanedamp.coupling.scene.paths import Range, assign, axis_values
+from vanedamp.coupling.scene.paths import Range, assign, axis_values, number_at
 from vanedamp.coupling.scene.ramp import Ramp
+from vanedamp.coupling.scene.ranges import EnsembleTable, read
 from vanedamp.coupling.scene.registration import ELEMENTS, Contact
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.coupling.scene.wear import Wear
 from vanedamp.files.display import Displayed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.open_record import OpenRecord
@@ -41,7 +43,6 @@ from vanedamp.files.toml_input import (
     nearest,
     read_toml,
     tables,
-    validate,
 )
 
 
@@ -169,6 +170,8 @@ class Scene(OpenRecord, Displayed):
     """speed of the frame that everything turns with (default: standstill)"""
     contact: Contact = field(default_factory=Newton)
     """law of impacts and contacts at walls, stops and between bodies"""
+    wear: Wear | None = None
+    """wear of contacts (default: not counted)"""
     time: Time = field(default_factory=Time)
     """how long a run is, and what of it is evaluated"""
     solver: Solver = field(default_factory=partial(options_of, {}))
@@ -177,6 +180,11 @@ class Scene(OpenRecord, Displayed):
     """how the runs of a sweep begin"""
     sweep: Annotated[dict[str, Axis], Field(json_schema_extra=_describe_kept)] = field(default_factory=dict)
     """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
+    ranges: dict[str, tuple[Real, Real]] = field(default_factory=dict)
+    """numbers that run as an ensemble, by dotted paths such as "damper.0.friction": [lowest, highest]; a file may also
+    give the range in the place of the number, `friction = [0.2, 0.5]`, whose middle is then the number"""
+    ensemble: EnsembleTable | None = None
+    """how numbers that are ranges are sampled"""
     orbit: Orbit | None = None
     """periodic motion that `vanedamp orbits` finds and follows"""
     ramp: Ramp | None = None
@@ -213,6 +221,8 @@ class Scene(OpenRecord, Displayed):
                 raise ValueError(f"sweep.{path}: expected a whole number of periods, at least {_KEPT[path][0]}")
             if isinstance(axis, int) and path not in _KEPT:
                 raise ValueError(f"sweep.{path}: {_NO_AXIS}")
+        if self.ranges:
+            self._check_ranges()
 
     @property
     def speed(self) -> float:
@@ -402,6 +412,23 @@ class Scene(OpenRecord, Displayed):
             if self.initial != Initial():
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
 
+    def _check_ranges(self) -> None:
+        """Raise ValueError for a range that is none, or of no number of the scene."""
+        data = self.to_dict()
+        for path, (low, high) in self.ranges.items():
+            if not low < high:
+                raise ValueError(f"ranges.{path}: expected [lowest, highest], not [{low:g}, {high:g}]")
+            if low <= 0.0 and self.sampled.distribution == "log-uniform":
+                raise ValueError(
+                    f'ranges.{path}: distribution = "log-uniform" takes a range above zero, not [{low:g}, {high:g}]'
+                )
+            if path in self.axes:
+                raise ValueError(f"sweep.{path}: is a range as well; it can be one of them")
+            try:
+                number_at(data, path)
+            except InputError as error:
+                raise ValueError(f"ranges.{str(error).removeprefix('scene: ')}") from None
+
     def _check_elements(self) -> None:
         """Raise ValueError for an element that the structure, or something else in the scene, does not fit."""
         for table, number, element in self.elements:
@@ -428,7 +455,7 @@ class Scene(OpenRecord, Displayed):
         """Return the scene in the tables of a TOML file that lies at `path`."""
         for table, key in _named_files(data):
             table[key] = str(Path(path).parent / table[key])
-        return validate(cls, data, str(path))
+        return read(cls, data, str(path))
 
     def save(self, path: str | Path) -> None:
         """Write the TOML file that `load` reads; files in its folder, such as a reduced model's, are relative to it.
@@ -465,6 +492,11 @@ class Scene(OpenRecord, Displayed):
         return {path: axis for path, axis in self.sweep.items() if isinstance(axis, int)}
 
     @property
+    def sampled(self) -> EnsembleTable:
+        """How numbers that are ranges are sampled."""
+        return self.ensemble or EnsembleTable()
+
+    @property
     def points(self) -> int:
         """Points of the grid of its sweep."""
         return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.axes.values())
@@ -494,12 +526,14 @@ class Scene(OpenRecord, Displayed):
     def replace(self, values: Mapping[str, Any]) -> Scene:
         """Return another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
 
-        A path that names a list without index ("damper.mass") changes every entry. Raises InputError.
+        A path that names a list without index ("damper.mass") changes every entry. [low, high] in the place of a number
+        makes it a range. Raises InputError.
         """
         data = self.to_dict()
+        data["ranges"] = {path: ends for path, ends in data["ranges"].items() if path not in values}
         for path, value in values.items():
             assign(data, path.split("."), value, path)
-        return validate(Scene, data, "scene")
+        return read(Scene, data, "scene")
 
     def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
         """Return the grid of the [sweep] table: axes by path, points of their product with the last axis fastest."""

@@ -1,1 +1,1 @@
-"""Strength: stress at the hot spots of reduced models."""
+"""Strength: stress at hot spots, fatigue data of materials, utilisation, life, wear, strength of contacts."""

@@ -10,6 +10,8 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.strength.assessment import fatigue_of
+from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
@@ -38,6 +40,11 @@ class Spots:
     def size(self) -> np.ndarray:
         """(s, n) Pa, a norm of the stress per modal coordinate."""
         return np.sqrt((self.rows**2).sum(axis=1))
+
+    @cached_property
+    def materials(self) -> list[Fatigue | None]:
+        """Fatigue data of the spots (s); None for one without a fatigue strength."""
+        return [fatigue_of(facts) for facts in self.facts.values()]
 
     def stress(self, coordinates: np.ndarray) -> np.ndarray:
         """Return stresses (s, 6, ...), Pa, of modal coordinates (..., n)."""

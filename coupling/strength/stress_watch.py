@@ -22,9 +22,13 @@ from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.spot_stress import LINEAR, MEASURES, SCALARS, SpotStress, named
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.waveforms.multisine import Multisine
+from vanedamp.coupling.strength.assessment import with_strength
 from vanedamp.coupling.strength.linear_stress import linear_stresses
+from vanedamp.coupling.strength.spot_history import SpotHistories
 from vanedamp.coupling.strength.spots import Spots, samples_of, spots_of
 from vanedamp.coupling.strength.stress import PeriodStress, every_other, period_stress
+from vanedamp.coupling.strength.stress_spectrum import linear_moments
 from vanedamp.coupling.system.system import System
 
 #: fields of the records with a row for every sample
@@ -49,7 +53,7 @@ def stressed(
         return respond(scene, events, samples_per_period, start, progress)
     watch = StressWatch(spots)
     response = respond(scene, events, samples_per_period, start, progress, watch)
-    return replace(response, stress=watch.result(scene, response.transient))
+    return replace(response, stress=watch.result(scene, response))
 
 
 class StressWatch:
@@ -61,10 +65,12 @@ class StressWatch:
         self._whole: Records | None = None
         self._taken, self._sampling, self._parts = 0, True, list[tuple[int, PeriodStress]]()
         self._checked = np.zeros((2, len(spots.rows)))
+        self._histories, self._period = SpotHistories(spots.materials), 0.0
 
     def samples(self, scene: Scene, system: System, asked: int) -> int:
         """Return how many samples of each period the run keeps."""
         self.each, self.asked = samples_of(scene, system, self.spots, asked), asked
+        self._period = system.period
         return self.each
 
     def records(self, empty: Records) -> Records:
@@ -89,15 +95,22 @@ class StressWatch:
             plane = plane_of(outcome.system, records, plane.bound, plane.walls)
         return replace(outcome, records=records, plane=plane)
 
-    def result(self, scene: Scene, first: int) -> tuple[SpotStress, ...] | None:
-        """Return the stress over the periods from the first one evaluated on; None if there is none."""
+    def result(self, scene: Scene, response: Response) -> tuple[SpotStress, ...] | None:
+        """Return the stress over the periods evaluated; None if there is none."""
+        first = response.transient
         parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in part)) for begin, part in self._parts]
         whole = PeriodStress(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True))) if parts else None
         if whole is None or not len(whole.mean):
             return None
         all_of, half = self._checked
         error = np.abs(half - all_of) / np.where(all_of > 0.0, all_of, 1.0)
-        return spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
+        found = spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
+        repeats, duration = response.classification != "non-periodic", len(whole.mean) * self._period
+        counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(found))]
+        noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
+        spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(found))]
+        materials = self.spots.materials
+        return tuple(with_strength(*each, duration) for each in zip(found, materials, counted, spectra, strict=True))
 
     def _take(self, done: int) -> None:
         """Take the stress of the periods up to `done`, and give their samples back."""
@@ -112,6 +125,7 @@ class StressWatch:
         stress = self.spots.stress(np.concatenate([before[None], q[rows], q[rows][-1:]]))
         found = period_stress(stress, self.each)
         self._parts.append((begin, found))
+        self._histories.add(rows.start, stress[..., 1:-1])
         few = min(_CHECKED, done - begin)
         if self.each % 2 == 0:
             halved = period_stress(every_other(stress[..., : few * self.each + 2]), self.each // 2)

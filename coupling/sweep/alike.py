@@ -148,7 +148,7 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
         _LAST.key, _LAST.kind = key, None
         with suppress(InputError, ValueError):  # its own run says what is wrong
             chosen = maker.chosen(point)
-            settled = chosen.start is None and chosen.scene.time.steady is None
+            settled = chosen.start is None and chosen.scene.time.steady is None and chosen.scene.wear is None
             if settled and columned(chosen.scene, paths) == paths:  # other values may be in the way of a column
                 _LAST.kind = Kind(chosen.scene)
     return _LAST.kind

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -91,6 +91,28 @@ class Chain(NamedTuple):
     linked: bool
 
 
+class PointSet(Protocol):
+    """Points that run as tasks: those of a grid, of a list, of an ensemble."""
+
+    @property
+    def base(self) -> Scene:
+        """The scene that points change, without sweep."""
+
+    @property
+    def choices(self) -> Choices:
+        """Choices for its open ones."""
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+
+    def table(self, points: Sequence[int]) -> PointTable:
+        """Return the values that some points change in the base."""
+
+    def chains(self) -> Iterator[Chain]:
+        """Yield all points, in chains that can run side by side."""
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """The product of the axes of a [sweep] table, the last axis fastest.
@@ -134,6 +156,8 @@ class Grid:
 
     def table(self, points: Sequence[int]) -> PointTable:
         """Return the values of the axes at some points."""
+        if not self.axes:
+            return PointTable({})
         places = np.unravel_index(np.asarray(points, np.int64), self.shape)
         axes = zip(self.axes.items(), places, strict=True)
         return PointTable({path: [values[place] for place in own.tolist()] for (path, values), own in axes})
@@ -168,10 +192,15 @@ class PointList:
         yield Chain(range(self.size), False)
 
 
-def grid(scene: Scene) -> Grid:
-    """Return the grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
+def grid(scene: Scene, empty: bool = False) -> Grid:
+    """Return the grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run.
+
+    empty: whether a scene without axes is a grid of one point.
+    """
+    for path in scene.ranges:
+        raise InputError(f"ranges: {path} is a range, which vanedamp.ensemble samples; give a number")
     axes = {path: axis_values(values) for path, values in scene.axes.items()}
-    if not axes:
+    if not axes and not empty:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
         )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.sweep.grid import Grid, PointList
+from vanedamp.coupling.sweep.grid import PointSet
 from vanedamp.coupling.sweep.worker import (
     SweepError,
     SweepTable,
@@ -38,7 +38,7 @@ _Entry = tuple[Task, Sequence[int]]
 
 
 def run_tasks(
-    grid: Grid | PointList, finished: SweepTable, executor: Executor | None
+    grid: PointSet, finished: SweepTable, executor: Executor | None
 ) -> Iterator[tuple[Task, Sequence[int], TaskResult]]:
     """Yield tasks as they are done, each with the rest of its chain, and its result."""
     workers = _workers(executor)
@@ -93,7 +93,7 @@ def _workers(executor: Executor | None) -> int:
     return known if isinstance(known, int) else _UNKNOWN
 
 
-def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Future[TaskResult]:
+def _submit(grid: PointSet, task: Task, executor: Executor | None) -> Future[TaskResult]:
     points = grid.table(task.points)
     if executor is None:
         future: Future[TaskResult] = Future()
@@ -110,7 +110,7 @@ def _handed_out(executor: Executor, function: Callable[..., Any], *arguments: An
 
 
 def _ended(
-    grid: Grid | PointList, running: dict[Future[TaskResult], _Entry], executor: Executor | None
+    grid: PointSet, running: dict[Future[TaskResult], _Entry], executor: Executor | None
 ) -> Iterator[tuple[_Entry, TaskResult]]:
     """Yield tasks that have ended, taken from those that run.
 
@@ -133,7 +133,7 @@ def _ended(
         yield (task, rest), _one_by_one(grid, task, future, executor)
 
 
-def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[TaskResult], executor: Executor | None) -> TaskResult:
+def _one_by_one(grid: PointSet, task: Task, lost: Future[TaskResult], executor: Executor | None) -> TaskResult:
     """Run the points of a lost task, each as a task of its own."""
     results, state = [], task.start
     for point in task.points:

@@ -18,8 +18,8 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of
-from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
+from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of, wear_of
+from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import run_tasks
@@ -62,15 +62,27 @@ def sweep(
     """
     grid = scene if isinstance(scene, Grid) else grid_of(loaded(scene))
     provenance = dict(provenance or {})
-    with Checkpoint(checkpoint, grid.scene, grid.size, provenance) as kept:
+    return result_of(grid, run_all(grid.scene, grid, executor, progress, checkpoint, provenance), provenance)
+
+
+def run_all(
+    scene: Scene,
+    points: PointSet,
+    executor: Executor | None,
+    progress: Callable[[int, int], None] | None,
+    checkpoint: str | Path | None,
+    provenance: Mapping[str, Any],
+) -> SweepTable:
+    """Run all points of a scene with a [sweep] table, or with ranges; other arguments as of `sweep`."""
+    with Checkpoint(checkpoint, scene, points.size, provenance) as kept:
         finished = kept.finished
         if progress is not None:
-            progress(finished.count, grid.size)
-        for task, rest, result in run_tasks(grid, finished, executor):
+            progress(finished.count, points.size)
+        for task, rest, result in run_tasks(points, finished, executor):
             kept.add(task, result, bool(rest))
             if progress is not None:
-                progress(finished.count, grid.size)
-    return result_of(grid, finished, provenance)
+                progress(finished.count, points.size)
+    return finished
 
 
 def run_list(
@@ -109,6 +121,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         exponents=dict(exponents_of(parts["exponents"], grid.shape)),
         sections=dict(sections_of(parts["sections"], grid.shape, len(grid.base.damper))),
         stress=dict(stresses_of(parts["stress"], grid.shape)),
+        wear=dict(wear_of(parts["wear"], grid.shape)),
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
@@ -119,7 +132,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
 
 
 #: keys that linear curves do not depend on
-_UNFELT = re.compile(r"damper(\.[^.]+)?\.(friction|restitution|position|velocity)|cavity(\.[^.]+)?\.gap|initial\..+")
+UNFELT = re.compile(r"damper(\.[^.]+)?\.(friction|restitution|position|velocity)|cavity(\.[^.]+)?\.gap|initial\..+")
 
 
 def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
@@ -130,7 +143,7 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     others = {path: values for path, values in grid.axes.items() if path != swept}
     low, high = min(grid.axes[swept]), max(grid.axes[swept])
     points, found, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
-    feels = [path for path in others if not _UNFELT.fullmatch(path)]
+    feels = [path for path in others if not UNFELT.fullmatch(path)]
     fits = set(columned(grid.base, others)) | set(feels) == set(others)  # others may keep bodies from fitting together
     for values in itertools.product(*others.values()):
         felt = tuple(value for path, value in zip(others, values, strict=True) if path in feels)

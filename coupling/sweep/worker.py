@@ -21,14 +21,16 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.further import (
+    WEARS,
     exponent_width,
     put_exponents,
     put_sections,
     put_stresses,
+    put_wear,
     section_width,
     stress_width,
 )
-from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointTable
+from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import StoreError
@@ -134,11 +136,12 @@ def _status(code: int, figures: np.ndarray) -> Status:
 
 
 def parts_of(base: Scene) -> dict[str, slice]:
-    """Return the columns of a scene's points behind COLUMNS: "in_plane", "exponents", "sections" and "stress"."""
+    """Return the columns of a point behind COLUMNS: "in_plane", "exponents", "sections", "wear" and "stress"."""
     in_plane = len(IN_PLANE) * len(base.damper) if base.planar else 0
-    widths = in_plane, exponent_width(base), section_width(base), stress_width(base)
+    wear = len(WEARS) if base.wear is not None else 0
+    widths = in_plane, exponent_width(base), section_width(base), wear, stress_width(base)
     ends = np.cumsum([len(COLUMNS), *widths]).tolist()
-    names = ("in_plane", "exponents", "sections", "stress")
+    names = ("in_plane", "exponents", "sections", "wear", "stress")
     return {name: slice(*between) for name, between in zip(names, itertools.pairwise(ends), strict=True)}
 
 
@@ -225,6 +228,7 @@ def _run(
     section = np.hstack([response.section, response.slip, response.slip_velocity])
     put_sections(row[parts["sections"]], section[response.transient :])
     put_stresses(row[parts["stress"]], maker.base, response.stress)
+    put_wear(row[parts["wear"]], response.wear)
     return response.final, (response.status.value, response.classification)
 
 
@@ -242,9 +246,7 @@ def _linear(scene: Scene) -> list[float]:
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 
-def tasks_of(
-    grid: Grid | PointList, finished: SweepTable, size: Callable[[], int]
-) -> Iterator[tuple[Task, Sequence[int]]]:
+def tasks_of(grid: PointSet, finished: SweepTable, size: Callable[[], int]) -> Iterator[tuple[Task, Sequence[int]]]:
     """Yield tasks that can run side by side, each with the rest of its chain; size: of the next task, in points.
 
     All tasks of chains that are not linked, and the first of those that are; of points that are not done.

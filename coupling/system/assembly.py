@@ -28,6 +28,7 @@ from vanedamp.coupling.system.units import (
     contacts_of,
     element_units,
     friction_elements,
+    layered,
 )
 
 #: the moment after which contacts are checked again, in periods of the excitation or of the fastest contact
@@ -176,7 +177,8 @@ def _contacts(
     """
     contacts: list[Unit] = []
     for index, cavity in enumerate(scene.cavity):
-        contacts += contacts_of(law, cavity, surfaces[index], [bodies[k] for k in scene.bodies_in(cavity)])
+        single = contacts_of(law, cavity, surfaces[index], [bodies[k] for k in scene.bodies_in(cavity)])
+        contacts += [layer for unit in single for layer in layered(scene.contact, unit)]
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
     reach = np.abs(force).sum(axis=0) / squares

@@ -80,6 +80,12 @@ class Law(NamedTuple):
         return self.contact.element(restitution, 1 / max(float(mobility.sum()), _LIGHT), yields)
 
 
+def layered(contact: ContactLaw, unit: Unit) -> Iterator[Unit]:
+    """Yield the units of a contact of the scene's law: springs in parallel begin one below the other."""
+    for depth, element in contact.layers(unit.element):
+        yield unit._replace(rest=unit.rest + depth, element=element)
+
+
 def contacts_of(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies: list[Body]) -> Iterator[Unit]:
     """Yield the contacts in a cavity, from left to right: of each body with walls, floor and ceiling, and neighbours.
 
@@ -216,7 +222,8 @@ def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
             springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid
             if (springs and not element.yields) or ((unit.friction or unit.limit) and not element.rubs):
                 raise TypeError(f"{table}: its units have springs or friction: declare `yields` or `rubs` of its class")
-            yield unit._replace(side=table)
+            named = unit._replace(side=table)
+            yield from (named,) if element.yields or not unit.normal.any() else layered(scene.contact, named)
 
 
 def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:

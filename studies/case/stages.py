@@ -16,7 +16,7 @@ from scipy import linalg
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, load_any, save
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_input import InputError, tables
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
@@ -508,7 +508,8 @@ def _facts_of_spots(
         if seen:
             spot["per_amplitude"] = {"at": label, "von_mises": float(stress[place]) / moved}
         spot["static"] = {cause: values[:, place].tolist() for cause, values in static.items()}
-        spot["fatigue"] = case.fatigue_data(groups[number])
+        data = case.fatigue(groups[number])
+        spot["fatigue"] = {} if data is None else tables(data)
         facts.append(spot)
     return facts
 

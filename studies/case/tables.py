@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, GetPydanticSchema, Tag
 from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.key_tables import documented
 from vanedamp.files.toml_input import (
     STRICT,
@@ -162,6 +163,8 @@ class MaterialTable:
     """modal damping of every mode, as a fraction of critical damping; overridden by that of [modes] [-]"""
     fatigue_strength: Positive | None = None
     """fatigue strength, by which `vanedamp calibrate` sets the excitation [Pa]"""
+    fatigue: Fatigue | None = None
+    """fatigue data (default: those of [material.fatigue], which are for all materials)"""
     expansion: Annotated[Real, Field(gt=-_EXPANSION, lt=_EXPANSION)] = 0.0
     """coefficient of thermal expansion, for [temperature] [1/K]"""
     young_at: tuple[tuple[Real, Positive], ...] = ()
@@ -172,6 +175,82 @@ class MaterialTable:
         temperatures = [temperature for temperature, _ in self.young_at]
         if len(temperatures) == 1 or any(b <= a for a, b in pairwise(temperatures)):
             raise ValueError("young_at: expected [[temperature, modulus], ...], at least two, temperatures ascending")
+
+    def fatigue_data(self, strength: float | None) -> Fatigue | None:
+        """Return the fatigue data, complete, or only the fatigue strength; None without either.
+
+        strength: the fatigue strength if the material has none, Pa. Raises ValueError for data without any.
+        """
+        strength = self.fatigue_strength or strength
+        fatigue = self.fatigue or (None if strength is None else Fatigue())
+        return None if fatigue is None else fatigue.completed(strength)
+
+
+#: keys by which a table below [material] is a material, or fatigue data
+_MATERIAL_KEYS = {"young", "poisson", "density"}
+_FATIGUE_KEYS = {item.name for item in fields(Fatigue)}
+
+
+def _kind_of_material(table: Any) -> str:
+    keys = table.keys() if isinstance(table, Mapping) else set()
+    return (
+        "fatigue" if isinstance(table, Fatigue) or (keys & _FATIGUE_KEYS and not keys & _MATERIAL_KEYS) else "material"
+    )
+
+
+def without_strengths(materials: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables below [material] of a case without fatigue strengths and fatigue data."""
+    kept = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
+    return {name: {key: kept[name][key] for key in kept[name] if not key.startswith("fatigue")} for name in kept}
+
+
+def _one_kind(table: Any) -> Any:
+    """Reject a table that is a material and fatigue data."""
+    if isinstance(table, Mapping) and table.keys() & _MATERIAL_KEYS and (stray := table.keys() & _FATIGUE_KEYS):
+        raise ValueError(f"{min(stray)}: is fatigue data; head it [material.<group>.fatigue]")
+    return table
+
+
+def _spread(materials: dict[str, MaterialTable | Fatigue]) -> dict[str, MaterialTable]:
+    """Return the materials with the fatigue data of [material.fatigue] where they have none of their own."""
+    common = materials.get("fatigue")
+    common = common if isinstance(common, Fatigue) else None
+    spread = {}
+    for group, table in materials.items():
+        if isinstance(table, Fatigue):
+            if group != "fatigue":
+                raise ValueError(f"{group}: has fatigue data only; head them [material.{group}.fatigue]")
+            continue
+        spread[group] = replace(table, fatigue=table.fatigue or common)
+    if not spread:
+        raise ValueError("no material; add [material.default] with young, poisson and density")
+    least = _least_strength(spread)
+    for group, material in spread.items():
+        try:
+            material.fatigue_data(least)
+        except ValueError as error:
+            raise ValueError(f"{group}.fatigue.{error}") from None
+    return spread
+
+
+def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
+    return min((t.fatigue_strength for t in materials.values() if t.fatigue_strength is not None), default=None)
+
+
+_Material = Annotated[
+    Annotated[MaterialTable, Tag("material")] | Annotated[Fatigue, Tag("fatigue")],
+    Discriminator(_kind_of_material),
+    BeforeValidator(_one_kind),
+]
+#: below [material]: the materials, and fatigue data for all of them, of which `_spread` leaves the former
+_Materials = Annotated[
+    dict[
+        str,
+        Annotated[MaterialTable, GetPydanticSchema(lambda _, handler: handler(_Material))],
+    ],
+    Field(min_length=1),
+    AfterValidator(_spread),
+]
 
 
 #: facet groups with the components that are held
@@ -330,8 +409,8 @@ class Case:
 
     mesh: Mesh
     """mesh from a file or a generator"""
-    material: Annotated[dict[str, MaterialTable], Field(min_length=1)]
-    """materials, by volume group; "default" for all that have none of their own"""
+    material: _Materials
+    """materials, by volume group; "default" for all that have none of their own, "fatigue" for fatigue data of all"""
     support: Support = field(default_factory=Support)
     """what holds the structure (default: nothing)"""
     modes: ModesTable = field(default_factory=ModesTable)
@@ -399,7 +478,7 @@ class Case:
     @property
     def fatigue_strength(self) -> float | None:
         """The least of the materials' fatigue strengths, Pa."""
-        return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
+        return _least_strength(self.material)
 
     def strengths(self, volumes: Iterable[str]) -> dict[str, float]:
         """Return the fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
@@ -409,10 +488,13 @@ class Case:
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
 
-    def fatigue_data(self, volume: str) -> dict[str, float]:
-        """Return the fatigue data of a volume group's material, by name; empty without any."""
-        strength = self.strengths([volume]).get(volume)
-        return {} if strength is None else {"strength": strength}
+    def fatigue(self, volume: str) -> Fatigue | None:
+        """Return the complete fatigue data of a volume group's material; None without any.
+
+        Without a fatigue strength of its own the material has the least of all (`strengths`).
+        """
+        table = self.material.get(volume, self.material.get("default"))
+        return None if table is None else table.fatigue_data(self.fatigue_strength)
 
     @property
     def response_label(self) -> str | None:

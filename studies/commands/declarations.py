@@ -11,7 +11,9 @@ from vanedamp.studies.commands.support.arguments import (
     hertz,
     input_file,
     json_file,
+    metres_per_second,
     mode_count,
+    newtons,
     output_file,
     period_count,
     ratio,
@@ -24,6 +26,7 @@ from vanedamp.studies.commands.support.declaration import Command, Function, arg
 #: endings of a result, which is HDF5 (a device has none); an output that is a folder
 _RECORD, _FOLDER = (".h5", ".hdf5", ".nc", ""), ("/",)
 _CASE, _SCENE = Function("support.cases:read_case"), Function("support.scenes:read_scene")
+_RANGES = Function("support.scenes:read_scene_or_ranges")
 
 COMMANDS = (
     Command(
@@ -139,7 +142,7 @@ COMMANDS = (
                 help="Lyapunov exponents by N periods after the run, at least 32: periodic, quasi-periodic or chaotic",
             ),
         ),
-        writes={"output": _RECORD}, reads=_SCENE,
+        writes={"output": _RECORD}, reads=_RANGES,
     ),
     Command(
         "sweep", "a run at every point of the scene's [sweep] grid", 80,
@@ -151,7 +154,7 @@ COMMANDS = (
             ),
             resume,
         ),
-        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_SCENE,
+        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
     ),
     Command(
         "explore", "sliders, and a forced response that follows them, in the browser", 85,
@@ -187,6 +190,26 @@ COMMANDS = (
     Command(
         "optimise", "mass, gap and number of bodies that reduce most", 90,
         (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers, resume),
+        writes={"output": _RECORD}, checkpoint=True,
+    ),
+    Command(
+        "contact", "numbers of a contact from geometry and materials: stiffness, yield, restitution over speed", 97,
+        (
+            argument("input", metavar="FILE.toml", help="a scene with [contact.pair], or a file with [pair] and mass"),
+            output_file("TABLE.csv"),
+            argument("--picture", metavar="FILE.png", help="force and restitution over the speed as a picture"),
+            argument(
+                "--speeds", type=metres_per_second, nargs=2, metavar=("LOW", "HIGH"),
+                help="speeds of approach, m/s (default: 0.1 to 300 times that of first yield)",
+            ),
+            argument("--preload", type=newtons, metavar="N", help="force at which the tangent stiffness is wanted"),
+            json_file,
+        ),
+        writes={"output": (".csv",), "picture": (".png",)},
+    ),
+    Command(
+        "life", "how long a damper damps: wear over hours, and the response with the gaps that it opens", 92,
+        (input_file("STUDY.toml"), output_file("LIFE.h5"), json_file, workers, resume),
         writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(

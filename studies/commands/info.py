@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.ensembles.record import Ensemble
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.response.response import UNITS
 from vanedamp.coupling.sweep.record import Sweep
@@ -175,6 +176,14 @@ def _sweep(record: _Record) -> Iterator[Fact]:
     yield Fact("curves", len(found))
 
 
+def _ensemble(record: _Record) -> Iterator[Fact]:
+    found = Ensemble.load(record.path)
+    yield Fact("ranges", {path: list(ends) for path, ends in found.scene.ranges.items()})
+    yield Fact("samples", len(found.status))
+    yield Fact("status", dict(Counter(map(str, found.status.ravel()))), "", "points")
+    yield Fact("response", list(found.sentences())[:1])
+
+
 def _orbits(record: _Record) -> Iterator[Fact]:
     branches = Branches.load(record.path)
     yield Fact("parameter", branches.parameter)
@@ -218,6 +227,14 @@ def _optimisation(record: _Record) -> Iterator[Fact]:
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
 
 
+def _life(record: _Record) -> Iterator[Fact]:
+    attributes, of = record.attributes, {name: variable.values for name, variable in record.variables.items()}
+    yield Fact("answer", attributes["sentence"])
+    yield Fact("hours", of["time"][[0, -1]].tolist(), "h", "first and last moment")
+    yield Fact("gap", of["gap"][[0, -1]].tolist(), "m", "of the cavities, then")
+    yield Fact("runs", attributes["runs"], "", f"of them {attributes['trouble']} not ok")
+
+
 def _identification(record: _Record) -> Iterator[Fact]:
     attributes = record.attributes
     yield Fact("status", attributes["status"])
@@ -256,10 +273,12 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
+    "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),
     "orbits": ("branches of periodic orbits", "orbits", _orbits),
     "ramp": ("run-ups and run-downs", "ramp", _ramp),
     "ring_down": ("a ring-down", "ringdown", _ring_down),
     "optimisation": ("an optimisation", "optimise", _optimisation),
+    "life": ("the life of a damper", "life", _life),
     "identification": ("numbers of a scene from measurements", "identify", _identification),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),

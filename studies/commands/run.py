@@ -13,7 +13,8 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.ensembles import run_at_one_frequency
+from vanedamp.studies.commands.support.messages import wear_lines, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.sweep_steps import compile_engine
@@ -21,7 +22,10 @@ from vanedamp.studies.terminal import progress
 
 
 def run(arguments: Namespace, scene: Scene) -> None:
-    """Simulate the scene."""
+    """Simulate the scene, or all samples of its ranges."""
+    if scene.ranges:
+        run_at_one_frequency(arguments, scene)
+        return
     check_run(scene, arguments.samples)
 
     compile_engine([scene])
@@ -43,6 +47,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
             f"{'motion':26} {found['motion']}: largest exponent {found['exponent']:.4g} +- {found['confidence']:.2g} "
             f"1/s, {found['exponent_per_period']:.4g} per period ({found['status']}, {found['periods']} periods)"
         )
+    lines += [f"{'contact':26} {contact.sentence}" for contact in response.contacts or ()]
+    lines += wear_lines(response)
 
     def save(path: str) -> None:
         response.save(path, {"versions": versions(), "scene": scene.to_dict()})

@@ -10,6 +10,7 @@ from functools import partial
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.studies.commands.support.budget import check_run, check_sweep
+from vanedamp.studies.commands.support.ensembles import run_ensemble
 from vanedamp.studies.commands.support.messages import print_note, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
@@ -21,7 +22,10 @@ _MOST_LINES = 12
 
 
 def run(arguments: Namespace, scene: Scene) -> None:
-    """Run the grid."""
+    """Run the grid, for all samples of ranges."""
+    if scene.ranges:
+        run_ensemble(arguments, scene)
+        return
     check_sweep(scene, arguments.workers or available_cores())
     if arguments.peak is not None:
         check_run(scene, PEAK_SAMPLES)

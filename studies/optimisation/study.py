@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Damper
-from vanedamp.coupling.scene.paths import Range, axis_values
-from vanedamp.coupling.scene.rotation import Rotation, hertz_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points
@@ -26,12 +23,11 @@ from vanedamp.coupling.system.transient import left_over, settled_after, timed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
+from vanedamp.studies.band import UNITS, Band, drive, ends, placed, reference_amplitude, scene_in
+from vanedamp.studies.optimisation.measures import SERVICE, Limits, Measure, check_measured, reference_stress
 
-_MOST_FREQUENCIES = 10_000
 #: longest transient that is proposed, in periods
 _MOST_PERIODS = 10_000_000
-#: quantity of the points of a band, and its unit
-_UNITS = {"band": ("frequencies", "Hz"), "speeds": ("speeds", "rad/s"), "rpm": ("speeds", "rpm")}
 
 
 def _bounds(value: Any) -> Any:
@@ -39,7 +35,6 @@ def _bounds(value: Any) -> Any:
     return [value, value] if isinstance(value, int | float) else value
 
 
-_Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
 _Count = Annotated[Whole, Field(ge=1, le=32)]
 Bounds = Annotated[
     tuple[Positive, Positive], BeforeValidator(_bounds, json_schema_input_type=Positive | tuple[Positive, Positive])
@@ -100,23 +95,22 @@ class Map:
 
 
 @dataclass(frozen=True, config=STRICT)
-class Optimise:
+class Optimise(Band):
     """The objective, and how it is minimised."""
 
-    band: _Values | None = None
-    """excitation frequencies, a rising list or a range {start, stop, num} [Hz]"""
-    speeds: _Values | None = None
-    """speeds in place of the band, along an engine order [rad/s]"""
-    rpm: _Values | None = None
-    """speeds in revolutions per minute in place of the band, along an engine order [rpm]"""
+    TABLE: ClassVar[str] = "optimise"
     variables: Variables = field(default_factory=Variables)
     """what may be chosen"""
     tolerances: Tolerances = field(default_factory=Tolerances)
     """what the design cannot hold (default: nothing)"""
     map: Map = field(default_factory=Map)
     """map over mass ratio and gap ratio"""
-    measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
-    """amplitude of a run that counts: mean of the peaks of its periods, or largest; without static deflection"""
+    limits: Limits = field(default_factory=Limits)
+    """what designs must keep (default: nothing)"""
+    measure: Measure = "amplitude_mean"
+    """what counts of a run: "amplitude_mean", the mean of the peaks of its periods, or "amplitude_max", both without
+    static deflection; "stress", the amplitude of von Mises stress at the worst hot spot; "life", Miner's sum of the
+    worst hot spot in 10,000 h; "wear", the depth at the contact that wears fastest in 10,000 h, over X"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"
@@ -130,51 +124,15 @@ class Optimise:
     seed: Annotated[Whole, Field(ge=0)] = 1
     """seed of searches and samples"""
 
-    def __post_init__(self) -> None:
-        if sum(getattr(self, name) is not None for name in _UNITS) != 1:
-            raise ValueError("give one of band (Hz) and, for an engine order, speeds (rad/s) and rpm")
-        key, (what, unit) = self.key, _UNITS[self.key]
-        if self.count > _MOST_FREQUENCIES:
-            raise ValueError(f"{key}: {self.count} {what}; at most {_MOST_FREQUENCIES}")
-        if self.values.min() <= 0.0:
-            raise ValueError(f"{key}: expected positive {what}, not {self.values.min():g} {unit}")
-        for before, after in itertools.pairwise(self.values.tolist()):
-            if after <= before:
-                raise ValueError(f"{key}: expected {what} that rise, not {after:g} {unit} after {before:g} {unit}")
+    @property
+    def by_amplitude(self) -> bool:
+        """Whether an amplitude counts, which has derivatives and a resonance curve."""
+        return self.measure in ("amplitude_mean", "amplitude_max")
 
     @property
-    def key(self) -> str:
-        """Which of band, speeds and rpm is given."""
-        return next(name for name in _UNITS if getattr(self, name) is not None)
-
-    @property
-    def count(self) -> int:
-        """Number of points of the band."""
-        given = getattr(self, self.key)
-        return given.num if isinstance(given, Range) else len(given)
-
-    @property
-    def values(self) -> np.ndarray:
-        """Points of the band, in the unit of its key."""
-        return np.array(axis_values(getattr(self, self.key)), float)
-
-    def frequencies(self, order: float | None) -> np.ndarray:
-        """Return the excitation frequencies, Hz, with an engine order if there is one.
-
-        Raises InputError for frequencies of an engine order, and for speeds without one.
-        """
-        if self.key == "band":
-            if order is not None:
-                raise InputError(
-                    "optimise.band: the frequency follows the speed by excitation.engine_order; give speeds or rpm"
-                )
-            return self.values
-        if order is None:
-            raise InputError(
-                f"optimise.{self.key}: a frequency follows the speed by excitation.engine_order only; name that in "
-                "place of excitation.frequency, or give a band in Hz"
-            )
-        return hertz_of("rotation.rpm" if self.key == "rpm" else "rotation.speed", order) * self.values
+    def linear(self) -> bool:
+        """Whether what counts is over that without bodies at the same level."""
+        return self.by_amplitude or self.measure == "stress"
 
 
 class Design(NamedTuple):
@@ -199,8 +157,9 @@ class Study(NamedTuple):
 
     frequencies: (f,) Hz, of the band.
     resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
-    refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
-    damped amplitudes refer. doubts: what the file may not mean.
+    refer; reference: what the measure of damped runs refers to: the undamped amplitude (m) or stress (Pa) in the band,
+    its maximum or its mean as `over_band` says; damage (1/h) of 1, or depth of wear (m/h) of X, in 10,000 h.
+    doubts: what the file may not mean.
     """
 
     scene: Scene
@@ -228,32 +187,27 @@ class Study(NamedTuple):
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
         given = data["optimise"]
-        if isinstance(given, dict) and not set(_UNITS) & set(given):
+        if isinstance(given, dict) and not set(UNITS) & set(given):
             raise InputError(
                 f"{path}: optimise.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
             )
         file = StudyFile.of(data, path)
-        table, scene = file.optimise, Scene(**{item.name: getattr(file, item.name) for item in fields(Scene)})
-        worst = table.over_band == "worst"
+        table, scene = file.optimise, scene_in(file)
+        for number in scene.ranges:
+            raise InputError(f"{path}: {number}: a range is for `vanedamp run` and `vanedamp sweep`; give [tolerances]")
         try:
-            band = table.frequencies(scene.excitation.engine_order)
-            if scene.excitation.resonance_near is None:
-                near = float(band[0]), float(band[-1])
-                scene = replace(scene, excitation=replace(scene.excitation, resonance_near=near))
-            scene = _at(scene, float(band[0]))
+            scene, band = placed(scene, table)
             _check(scene)
             _check_settled(scene, band)
             force, resonance = excitation_force(scene), chosen_resonance(scene)
-            if worst:
-                reference = linear_peaks(scene, *_ends(scene, band))[0].amplitude
-            else:
-                reference = float(linear_amplitudes(scene, band)[0].mean())
+            check_measured(scene, table.measure, table.limits)
+            reference = _reference(scene, band, table, resonance, force * resonance.flexibility)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         if force == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
         study = cls(
-            replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, float(reference),
+            replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, reference,
             tuple(_doubts(scene, given)),
         )  # fmt: skip
         try:
@@ -283,7 +237,7 @@ class Study(NamedTuple):
     def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
         """Return the amplitudes (f,), m, without bodies, and with a design's bodies fixed, and their peaks by PEAKS."""
         scene = self.scene_of(design, deviation, float(self.frequencies[0]))
-        peaks = tops(*linear_peaks(scene, *_ends(scene, self.frequencies)))
+        peaks = tops(*linear_peaks(scene, *ends(scene, self.frequencies)))
         return *linear_amplitudes(scene, self.frequencies), peaks
 
     def scene_of(self, design: Design, deviation: Mapping[str, float], frequency: float) -> Scene:
@@ -320,7 +274,18 @@ class Study(NamedTuple):
             "friction": max(first.friction + deviation["friction"], 0.0),
             "orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
         }
-        return places | _drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
+        return places | drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
+
+
+def _reference(scene: Scene, band: np.ndarray, table: Optimise, resonance: Resonance, amplitude: float) -> float:
+    """Return what the measure of damped runs refers to (Study.reference)."""
+    if table.by_amplitude:
+        return reference_amplitude(scene, band, table.over_band)
+    if table.measure == "stress":
+        within = table.over_band == "worst" and band[0] <= resonance.frequency <= band[-1]
+        frequencies = [*band.tolist(), *([resonance.frequency] if within else [])]
+        return reference_stress([scene.replace(drive(scene, frequency)) for frequency in frequencies], table.over_band)
+    return (amplitude if table.measure == "wear" else 1.0) / SERVICE
 
 
 def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:
@@ -330,30 +295,12 @@ def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:
         yield f"optimise.variables.bodies: missing, so that designs have 1 body, the scene {count}: bodies = {count}"
 
 
-def _at(scene: Scene, frequency: float) -> Scene:
-    """Return the scene at a frequency, Hz, of its engine order; one without an engine order as it is."""
-    order = scene.excitation.engine_order
-    return scene if order is None else replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
-
-
-def _drive(scene: Scene, frequency: float) -> dict[str, Any]:
-    """Return what changes in a scene, at some speed with an engine order, for another frequency, Hz."""
-    order = scene.excitation.engine_order
-    return {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
-
-
-def _ends(scene: Scene, band: np.ndarray) -> tuple[float, float]:
-    """Return the ends of a band of frequencies (f,), Hz, as `linear_peaks` takes them."""
-    low, high, order = float(band[0]), float(band[-1]), scene.excitation.engine_order
-    return (low, high) if order is None else (speed_of(order, low), speed_of(order, high))
-
-
 def _check_settled(scene: Scene, band: np.ndarray) -> None:
     """Raise InputError where runs would be evaluated before the structure's own transient has ended.
 
     Bodies may end it sooner, but those that do are not the best ones for that.
     """
-    ends = [timed(scene.replace(_drive(scene, float(frequency)))) for frequency in (band[0], band[-1])]
+    ends = [timed(scene.replace(drive(scene, float(frequency)))) for frequency in (band[0], band[-1])]
     if scene.time.steady == "auto":
         return
     left, dropped = max((left_over(end, end.time.dropped), end.time.dropped) for end in ends)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,8 @@ from vanedamp.studies.report.summary import summary
 _FOLDER = Path(__file__).parent
 #: scenes that a table can have side by side; more stand below each other
 _MOST_COLUMNS = 4
+#: headings of what templates of several sections move to one, by their calls, in the order of the page
+_COMMON = {"strength": "Strength and life", "later": "Where the energy goes"}
 #: scripts of the page by the kind of chart that needs them
 _SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response"}
 _SLIDERS = (
@@ -46,7 +50,7 @@ class Page:
     names   short names of the result files by path
     study   name of the study that the results belong to; None for results of their own
     charts  charts made so far, by the first part of their name
-    later   pieces that templates move to the energies, by the call `later`
+    common  pieces that templates move to a common section, by the calls of _COMMON
     """
 
     results: Results
@@ -55,7 +59,7 @@ class Page:
     environment: jinja2.Environment
     study: str | None = None
     charts: Counter[str] = field(default_factory=Counter)
-    later: list[str] = field(default_factory=list)
+    common: dict[str, list[str]] = field(default_factory=lambda: {name: [] for name in _COMMON})
 
     def chart(
         self, kind: str, figure: go.Figure, header: Sequence[str], rows: Iterable[Iterable[Any]], files: Iterable[str]
@@ -81,25 +85,27 @@ class Page:
         blocks = []
         for kind, section in sorted(self.known.items(), key=lambda item: item[0] == CLAIMS):  # the claims come last
             if kind == CLAIMS:
-                blocks.append(self._energies())
+                blocks.append(self._common_sections())
+            moves = {name: partial(self._put_off, name) for name in _COMMON}
             template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
             for study, files in [(None, own), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
                     name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
                     shows = section.section(results, replace(self, study=name))
-                    of = {"section": shows, "study": name, "title": title, "not_ok": not_ok, "later": self._put_off}
+                    of = {"section": shows, "study": name, "title": title, "not_ok": not_ok, **moves}
                     blocks.append(self.environment.from_string(template).render(of))
         return "".join(blocks)
 
-    def _put_off(self, caller: Callable[[], str]) -> str:
-        """Keep a piece of a template for the section of the energies."""
-        self.later.append(caller())
+    def _put_off(self, section: str, caller: Callable[[], str]) -> str:
+        """Keep a piece of a template for a common section."""
+        self.common[section].append(caller())
         return ""
 
-    def _energies(self) -> str:
-        """Return the pieces that were put off, below their heading."""
-        return "".join(["<h2>Where the energy goes</h2>", *self.later]) if self.later else ""
+    def _common_sections(self) -> str:
+        """Return the pieces that were put off, below their headings."""
+        parts = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
+        return "".join(itertools.chain.from_iterable(parts))
 
 
 def write_report(results: Results, path: str | Path, title: str | None = None) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from vanedamp.coupling.ensembles.record import Ensemble
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
@@ -23,6 +24,7 @@ from vanedamp.modal.frf import UNITS
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
 from vanedamp.studies.report.border_chart import borders_figure
+from vanedamp.studies.report.ensemble_charts import ensemble_figure
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.identification_charts import data_figure
@@ -41,7 +43,7 @@ _MOST_CURVES = 8
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
     Branches: lambda found: (borders_figure if found.borders else branches_figure)(found),
     Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
-    Identification: data_figure,
+    Identification: data_figure, Ensemble: ensemble_figure,
 }  # fmt: skip
 
 
@@ -51,9 +53,10 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
 
     A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a Response
     its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and Campbell their
-    diagrams, Branches with borders the map of these; an Identification its measurements over the model; a file of
-    `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the tuned
-    frequencies. Raises InputError for anything else, and for a response without samples.
+    diagrams, Branches with borders the map of these; an Identification its measurements over the model; an Ensemble its
+    curve with bands, of one frequency its indices; a file of `vanedamp modal` its modes; one of `vanedamp calibrate`
+    the measured response with its fit, or else the tuned frequencies. Raises InputError for anything else, and for a
+    response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
@@ -83,6 +86,7 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
 @plot.register(RingDown)
 @plot.register(Campbell)
 @plot.register(Identification)
+@plot.register(Ensemble)
 def _(result: Any, scene: Scene | None = None) -> go.Figure:
     return _DIAGRAMS[type(result)](result)
 

@@ -52,7 +52,7 @@ def summary(results: Results, page: Any) -> dict[str, Any]:
         history = next(iter(results.kinds["response"].values())).record
         scene = history.scene
         answer.append(_of_run(history.measures))
-    for kind in ("optimisation", "identification"):
+    for kind in ("optimisation", "life", "identification"):
         answer += [result.record.sentence for result in results.kinds[kind].values()]
     picture, facts, mass = _structure(results, scene)
     bodies = [] if scene is None else list(_bodies(scene, mass))

@@ -253,6 +253,19 @@ def test_case_of_a_mesh_file_knows_its_groups(tmp_path, capfd):
     assert "no facet group 'clmp'" in capfd.readouterr().err
 
 
+FATIGUE = "[material.fatigue]\nstrength = 4e8\nexponent = 8.0\nknee = 1e7\n[support]"
+
+
+def test_case_with_fatigue_data(tmp_path, capfd):
+    found = checked(tmp_path, capfd, changed(CLUSTER, ("[support]", FATIGUE)))
+    assert found["fatigue"]["default"] == {
+        "strength": 4e8, "mean_stress": "none", "criterion": "von_mises", "exponent": 8.0, "knee": 1e7,
+        "after_knee": "haibach", "scatter": 1.0,
+    }  # fmt: skip
+    assert found["defaults"]["material.fatigue.scatter"] == 1.0
+    assert "material.fatigue.expansion" not in found["defaults"]
+
+
 def test_external_model(tmp_path, capfd):
     np.savez(tmp_path / "m.npz", m=np.eye(2), k=np.diag([4e6, 9e6]))
     tables = {

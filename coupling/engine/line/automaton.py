@@ -107,7 +107,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             return ILL_CONDITIONED
         amplitude_changes(flows, st, scratch, tau)
         account(system, flows, st, rec, scratch, tau)
-        _advance_motion(system, flows, st, scratch, tau)
+        _advance_motion(system, flows, st, rec, scratch, tau)
         # the end of a period is no event: a row that has let go just before it still does
         if tau > (0.0 if event >= 0 else AT_START * system.period):
             _forget_released(st)
@@ -463,9 +463,10 @@ def _largest(amplitude, acceleration, speed, count):
 
 
 @inlined
-def _advance_motion(system, flows, st, scratch, tau):
+def _advance_motion(system, flows, st, rec, scratch, tau):
     """Advance rows and amplitudes by tau."""
     s, count, friction = st.counters[FLOW], st.counters[ACTIVE], system.friction_rows
+    wears = rec.worn.shape[1] > 0
     for r in range(len(st.state)):
         state = st.state[r]
         if (r >= friction and (system.moves_with_floor[r] or state == CLOSED or state == TOUCHING)) or (
@@ -478,6 +479,8 @@ def _advance_motion(system, flows, st, scratch, tau):
         st.velocity[r] += speed
         if r < friction:
             st.ledger[FRICTION] -= st.applied_force[r] * shift
+            if wears:
+                rec.worn[st.counters[PERIOD], r] += abs(st.applied_force[r] * shift)
         if r >= friction or rigid(system, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
             shift_slip(st, r, shift)
     if flows.sprung[s]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from vanedamp.coupling.engine.line.gap_kinematics import rigid, spring_energy
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, IMPACTS, LOGGED, OPEN, PERIOD, SPRUNG, STICK
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
-from vanedamp.coupling.response.recorder import put_response
+from vanedamp.coupling.response.recorder import note_impact, put_response
 from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS, SLIPS, STICKS
 
 
@@ -21,7 +21,10 @@ def log_event(period, counters, time, log, kind, r, before, after, impulse):
 @inlined
 def log_impact(system, st, rec, r, before, after, impulse):
     """Count an impact of row r and log it: relative velocities (m/s), impulse (N s)."""
-    _count(st.counters, rec.impacts, rec.collided, 0.5 * before * before / system.delassus[r, r])
+    energy = 0.5 * before * before / system.delassus[r, r]
+    _count(st.counters, rec.impacts, rec.collided, energy)
+    if rec.struck.shape[1] > 0:
+        note_impact(rec, st.counters[PERIOD], r, energy)
     log_event(system.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
 
 

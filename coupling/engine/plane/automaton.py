@@ -7,6 +7,7 @@ import math
 from vanedamp.coupling.engine.plane.contact_states import decide, move_sliders
 from vanedamp.coupling.engine.plane.energy_balance import account, move, response_at
 from vanedamp.coupling.engine.plane.event_functions import next_event
+from vanedamp.coupling.engine.plane.friction_work import add_friction_work
 from vanedamp.coupling.engine.plane.impacts import collide, log_event, log_impact, stop_wedged
 from vanedamp.coupling.engine.plane.tolerances import (
     ALMOST_CLOSED,
@@ -165,6 +166,8 @@ def _move(system, flows, st, rec, scratch, tau):
     """Advance the motion by tau > 0, with its integrals and samples."""
     q, v = scratch.later[0], scratch.later[1]
     _sample(system, flows, st, rec, scratch, tau, q, v)
+    if rec.worn.shape[1] > 0 and flows.rubs[st.counters[FLOW]]:
+        add_friction_work(system, flows, st, rec, scratch, tau)
     move(system, flows, st, scratch, tau, q, v)
     account(system, flows, st, rec, scratch, tau, q, v)
     for i in range(len(q)):

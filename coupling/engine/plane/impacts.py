@@ -30,6 +30,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE
+from vanedamp.coupling.response.recorder import note_impact
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.unit_kinematics import (
@@ -212,7 +213,10 @@ def log_impact(system, st, rec, log, r, before, after, normal, tangential, loss)
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
     rec.impacts[st.counters[PERIOD]] += 1
-    rec.collided[st.counters[PERIOD]] += 0.5 * before * before / system.delassus[r, r]
+    energy = 0.5 * before * before / system.delassus[r, r]
+    rec.collided[st.counters[PERIOD]] += energy
+    if rec.struck.shape[1] > 0:
+        note_impact(rec, st.counters[PERIOD], r, energy)
     log_event(system, st, log, IMPACT, r, before, after, normal, tangential, loss)
 
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import field
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
+from pydantic import Discriminator, Tag
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.contacts.collision import spring
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element, spring_on_wall
 from vanedamp.files.toml_input import STRICT, InputError, Positive
+
+#: a number, or where it comes from
+Stiffness = Annotated[
+    Annotated[Positive, Tag("number")] | Annotated[Literal["hertz", "patch"], Tag("word")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -21,31 +29,71 @@ class Compliant(ContactLaw):
     """
 
     rigid: ClassVar[bool] = False
-    stiffness: Positive | None = None
-    """stiffness of the contact's spring; or residual = true, or both [N/m]"""
+    stiffness: Stiffness | None = None
+    """stiffness of the contact's spring: a number, "hertz" (of the rounded contact in [contact.pair], as `match` says)
+    or "patch" (residual = true with the body of [contact.pair]); or residual = true, or both [N/m]"""
     residual: bool = False
     """put the residual flexibility of the reduced model's wall in series with the spring"""
+    match: Literal["force", "duration", "tangent"] = "force"
+    """what the spring of "hertz" has in common with the contact: the largest "force" or the "duration" of a collision
+    at `speed`, or the "tangent" at `preload`"""
+    speed: Positive | None = None
+    """speed of approach at which force or duration match [m/s]"""
+    preload: Positive | None = None
+    """force about which the contact vibrates, for the tangent [N]"""
     law: Literal["compliant"] = field(default="compliant", kw_only=True)
     """"compliant": spring and dashpot while the gap is closed"""
 
     def __post_init__(self) -> None:
         if self.stiffness is None and not self.residual:
             raise ValueError("give stiffness (N/m), or residual = true on a reduced model, or both")
+        if self.stiffness == "patch" and (self.pair is None or self.pair.body_flexibility is None):
+            raise ValueError('pair: stiffness = "patch" needs [contact.pair] with young, length and area of the body')
+        hertz = self.stiffness == "hertz"
+        if hertz and (self.pair is None or self.pair.radius is None):
+            raise ValueError('pair: stiffness = "hertz" needs [contact.pair] with young and radius')
+        needed = "preload" if self.match == "tangent" else "speed"
+        for key in ("speed", "preload"):
+            given = getattr(self, key) is not None
+            if given and not (hertz and key == needed):
+                raise ValueError(f'{key}: is of stiffness = "hertz" that matches otherwise; leave it out')
+            if hertz and key == needed and not given:
+                raise ValueError(f'{key}: missing; stiffness = "hertz" that matches the {self.match} depends on it')
 
-    @property
-    def flexibility(self) -> float:
-        """Flexibility of the spring, m/N; 0 where there is only the wall's."""
-        return 0.0 if self.stiffness is None else 1.0 / self.stiffness
+    def flexibility(self, mass: float) -> float:
+        """Return the flexibility of the spring, m/N, with a reduced mass, kg; 0 where there is only the wall's."""
+        if self.stiffness is None:
+            return 0.0
+        if isinstance(self.stiffness, float):
+            return 1.0 / self.stiffness
+        assert self.pair is not None
+        if self.stiffness == "patch":
+            return self.pair.body_flexibility or 0.0
+        contact = self.pair.contact
+        assert contact is not None
+        try:
+            if self.preload is not None:
+                return 1.0 / contact.stiffness(self.preload)
+            return 1.0 / spring(contact, mass, self.speed or 0.0, self.match)
+        except ValueError as error:
+            raise InputError(f"contact.pair: {error}") from None
 
     @property
     def takes_residual_flexibility(self) -> bool:
         """Whether the wall's residual flexibility is in series with the spring."""
-        return self.residual
+        return self.residual or self.stiffness == "patch"
+
+    @property
+    def needs_residual_flexibility(self) -> bool:
+        """Whether a contact is one only with residual flexibility."""
+        return self.takes_residual_flexibility and self.stiffness in (None, "patch")
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
         """Return the element of a pair, as every law does. Raises InputError at restitution 0."""
-        own = self.flexibility
-        stiffness = spring_on_wall(own, flexibility) if self.residual else 1.0 / own
+        own = self.flexibility(mass)
+        if self.stiffness == "patch" and flexibility is not None and flexibility <= 0.0:
+            own = 0.0  # a wall that lacks nothing is no patch
+        stiffness = spring_on_wall(own, flexibility) if self.takes_residual_flexibility else 1.0 / own
         dashpot = 2 * damping_ratio(restitution) * math.sqrt(stiffness * mass)
         return Element(restitution, stiffness, dashpot)
 
@@ -62,6 +110,21 @@ def damping_ratio(restitution: float) -> float:
         raise InputError(f"restitution: a contact with a dashpot needs a value above 0, up to 1 (got {restitution:g})")
     loss = -math.log(restitution)
     return float(brentq(lambda ratio: 2 * ratio * _turn(ratio) - loss, 0.0, 1 / math.sqrt(restitution), xtol=1e-15))
+
+
+def peak_over_mean(restitution: float) -> float:
+    """Return the largest force of a collision over its mean, impulse by duration; pi/2 without a dashpot.
+
+    With sin a the damping ratio, m v omega exp(-(pi/2 - 3 a) tan a) after a while, or that of the dashpot at once from a
+    ratio of 1/2 on. Restitutions beyond 1 and below 1e-6 count as these.
+    """
+    left = min(max(restitution, 1e-6), 1.0)
+    ratio = damping_ratio(left)
+    peak = 2 * ratio
+    if ratio < 0.5:
+        angle = math.asin(ratio)
+        peak = math.exp(-(math.pi / 2 - 3 * angle) * math.tan(angle))
+    return peak * 2 * _turn(ratio) / (1 + left)
 
 
 def _turn(ratio: float) -> float:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple
+from dataclasses import field
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from vanedamp.files.toml_input import InputError
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.contacts.pair import Pair
+from vanedamp.files.toml_input import STRICT, InputError
 
 
 class Element(NamedTuple):
@@ -19,6 +23,7 @@ class Element(NamedTuple):
     dashpot: float = 0.0
 
 
+@dataclass(frozen=True, config=STRICT)
 class ContactLaw:
     """Base of the laws: a frozen record whose `law` names it in the scene's [contact] table, its fields the other keys.
 
@@ -26,12 +31,18 @@ class ContactLaw:
     by minus the restitution, which is the coefficient of the pair at every speed.
     """
 
-    #: the value of `law` in the scene
-    law: str
+    if TYPE_CHECKING:
+
+        @property
+        def law(self) -> str:
+            """The value of `law` in the scene."""
+
     #: whether a closed gap is a constraint with impacts, not a spring
     rigid: ClassVar[bool] = True
     #: whether the restitution is that of impulses, of expansion to compression (Poisson), not of speeds (Newton)
     two_phases: ClassVar[bool] = False
+    pair: Pair | None = field(default=None, kw_only=True)
+    """shapes and materials of what touches: for stiffness, and for the strength of contacts"""
 
     @property
     def title(self) -> str:
@@ -53,9 +64,8 @@ class ContactLaw:
         """Whether the restitution does."""
         return type(self).restitution_at is not ContactLaw.restitution_at
 
-    @property
-    def flexibility(self) -> float:
-        """Flexibility of the contact's own spring, m/N; 0 for a contact that has none."""
+    def flexibility(self, mass: float) -> float:
+        """Return the flexibility of the contact's own spring, m/N, with a reduced mass (kg); 0 without one."""
         return 0.0
 
     @property
@@ -66,7 +76,7 @@ class ContactLaw:
     @property
     def needs_residual_flexibility(self) -> bool:
         """Whether nothing else yields, so that a model without residual flexibility has no such contact."""
-        return self.takes_residual_flexibility and self.flexibility == 0.0
+        return self.takes_residual_flexibility
 
     def pair_restitution(self, left: float, right: float) -> float:
         """Return the coefficient of two bodies that meet, from theirs at a wall: the geometric mean."""
@@ -80,6 +90,10 @@ class ContactLaw:
         Raises InputError, whose message begins with "restitution: ", for a coefficient that the law has no element for.
         """
         return Element(restitution)
+
+    def layers(self, element: Element) -> tuple[tuple[float, Element], ...]:
+        """Return the elements that make up a contact, each with the depth, m, at which it begins: one, at once."""
+        return ((0.0, element),)
 
 
 def spring_on_wall(own: float, flexibility: float | None) -> float:

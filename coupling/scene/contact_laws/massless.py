@@ -33,4 +33,4 @@ class Massless(ContactLaw):
             raise InputError(
                 f"restitution: a massless contact loses nothing and has no impact law; drop it (got {restitution:g})"
             )
-        return Element(1.0, spring_on_wall(self.flexibility, flexibility), 0.0)
+        return Element(1.0, spring_on_wall(0.0, flexibility), 0.0)

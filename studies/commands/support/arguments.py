@@ -46,6 +46,16 @@ def hertz(text: str) -> float:
     return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
 
 
+def metres_per_second(text: str) -> float:
+    """Return a speed."""
+    return _number(text, "a speed in m/s", lambda value: 0.0 < value < math.inf)
+
+
+def newtons(text: str) -> float:
+    """Return a force."""
+    return _number(text, "a force in N", lambda value: 0.0 < value < math.inf)
+
+
 def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
     try:
         value = float(text)

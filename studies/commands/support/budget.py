@@ -18,6 +18,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.terminal import duration
 
 if TYPE_CHECKING:
+    from vanedamp.studies.life.study import LifeStudy
     from vanedamp.studies.optimisation.study import Study
 
 #: s of a run, in addition to its periods: alone, and of a sweep whose points run as one (coupling.sweep.alike)
@@ -26,6 +27,8 @@ RUN, TOGETHER = 1.5e-3, 1e-5
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: s of a period whose derivative is followed, with a few impacts (coupling.exponents)
 DERIVATIVE = 5e-3
+#: about how often a life is evaluated over its band
+_EVALUATIONS = 40
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
 _IN_PLANE = 20
 #: at most: points of a sweep, bytes of a run, s of a command
@@ -49,7 +52,7 @@ def check_run(scene: Scene, samples: int = 0) -> None:
 
 def check_sweep(scene: Scene, workers: int) -> None:
     """Reject a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
-    points, seconds = scene.points, sweep_seconds(scene, workers)
+    points, seconds = points_of(scene), sweep_seconds(scene, workers)
     if points > MOST_POINTS:
         raise InputError(
             f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
@@ -69,6 +72,13 @@ def check_optimise(study: Study, workers: int) -> None:
     scenes = scenes_of(study)
     check_run(study.scene)
     _check_time("optimise", f"{scenes:.3g} scenes on {workers} workers", scenes * run_seconds(study.scene) / workers)
+
+
+def check_life(study: LifeStudy, workers: int) -> None:
+    """Reject a life that takes a month. Raises InputError."""
+    runs = _EVALUATIONS * len(study.frequencies)
+    check_run(study.scene)
+    _check_time("life", f"{runs:.3g} runs on {workers} workers", runs * run_seconds(study.scene) / workers)
 
 
 def _modes(scene: Scene) -> int:
@@ -93,9 +103,14 @@ def scenes_of(study: Study) -> int:
     return (designs_of(study) + study.table.evaluations * study.table.samples) * study.table.count
 
 
+def points_of(scene: Scene) -> int:
+    """Return the number of points of a sweep, for every sample of ranges."""
+    return scene.points * (scene.sampled.samples * (len(scene.ranges) + 2) if scene.ranges else 1)
+
+
 def sweep_seconds(scene: Scene, workers: int) -> float:
     """Return the time of a sweep, s."""
-    return scene.points * (run_seconds(scene) + exponent_seconds(scene)) / workers
+    return points_of(scene) * (run_seconds(scene) + exponent_seconds(scene)) / workers
 
 
 def exponent_seconds(scene: Scene) -> float:

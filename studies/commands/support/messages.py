@@ -7,6 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
+from vanedamp.coupling.response.response import Response
 from vanedamp.files.store import finite, json_text, together, write_json
 from vanedamp.studies.headline import without_round_off
 
@@ -51,6 +52,14 @@ def print_warnings(source: str, warnings: Iterable[str]) -> None:
     """Print warnings about an input file."""
     for warning in warnings:
         print_note(source, f"warning: {warning}")
+
+
+def wear_lines(response: Response) -> Iterator[str]:
+    """Yield the wear of the contacts of a response that wear: volume, depth, work rate."""
+    for one in response.wear or ():
+        if one.volume_rate:
+            depth = "" if one.depth_rate is None else f", {1e9 * one.depth_rate:.4g} nm/h"
+            yield f"{'wear':26} {one.name}: {one.volume_rate:.4g} m^3/h{depth}, work rate {one.work_rate:.4g} W"
 
 
 def cavity_lines(result: Mapping[str, Any]) -> Iterator[str]:

@@ -21,9 +21,19 @@ def read_scene(arguments: Namespace) -> Scene:
     return scene
 
 
-def read_any_scene(arguments: Namespace) -> Scene:
-    """Load the scene of a command. Its files must be there, and none of them may be an output. Raises InputError."""
-    scene = load_scene(arguments.input)
+def read_scene_or_ranges(arguments: Namespace) -> Scene:
+    """Load the scene of a command that runs ranges as an ensemble; as read_scene."""
+    scene = read_any_scene(arguments, ranges=True)
+    check_moved(scene)
+    return scene
+
+
+def read_any_scene(arguments: Namespace, ranges: bool = False) -> Scene:
+    """Load the scene of a command. Its files must be there, and none of them may be an output. Raises InputError.
+
+    ranges: whether its numbers may be ranges.
+    """
+    scene = load_scene(arguments.input, ranges)
     arguments.outputs.keep(scene.files)
     return scene
 

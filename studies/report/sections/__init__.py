@@ -10,5 +10,6 @@ A section is a module with
 
 and with it a Jinja template of the same name, such as sweep.html for sweep.py. It is given `section`, and the name of
 the `study` that the results belong to, if any, and its `title`. It has the macro `plot(chart)` and, for files, the
-filters `name` and `anchor`. What it writes inside `{% call later() %}` stands in the section of the energies.
+filters `name` and `anchor`. What it writes inside `{% call later() %}` stands in the section of the energies,
+and inside `{% call strength() %}` in that of strength and life.
 """

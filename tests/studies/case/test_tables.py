@@ -3,6 +3,7 @@
 import pytest
 
 from tests.tools.input_files import BLOCK, CLUSTER, changed
+from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.studies.case.tables import Case
@@ -64,6 +65,64 @@ def test_least_fatigue_strength_counts(tmp_path):
     second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1000\nfatigue_strength = 3e8\n[support]"
     text = changed(CLUSTER, ("[support]", second), ("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8"))
     assert load(text, tmp_path).fatigue_strength == 3e8
+
+
+FATIGUE = "[material.fatigue]\nexponent = 8.0\nknee = 1e7\ntensile_strength = 1e9\n[support]"
+STRENGTH = ("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8")
+
+
+def test_fatigue_data_of_all_materials_and_of_one(tmp_path):
+    second = (
+        "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1000.0\n"
+        "[material.airfoils.fatigue]\nstrength = 3e8\n" + FATIGUE
+    )
+    case = load(changed(CLUSTER, ("[support]", second), STRENGTH), tmp_path)
+    common = Fatigue(strength=4e8, exponent=8.0, knee=1e7, tensile_strength=1e9, mean_stress="goodman")
+    assert case.fatigue("rim") == common
+    assert case.fatigue("airfoils") == Fatigue(strength=3e8, mean_stress="none")
+    assert case.fatigue_strength == 4e8 and list(case.material) == ["default", "airfoils"]
+
+
+def test_a_fatigue_strength_is_fatigue_data(tmp_path):
+    assert load(CLUSTER, tmp_path).fatigue("rim") is None
+    assert load(changed(CLUSTER, STRENGTH), tmp_path).fatigue("rim") == Fatigue(strength=4e8, mean_stress="none")
+
+
+def test_a_volume_group_may_be_called_fatigue(tmp_path):
+    second = "[material.fatigue]\nyoung = 1e11\npoisson = 0.3\ndensity = 1000.0\nfatigue_strength = 1e8\n[support]"
+    case = load(changed(CLUSTER, ("[support]", second)), tmp_path)
+    assert case.material["fatigue"].young == 1e11 and case.fatigue("fatigue").strength == 1e8
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("8.0", "-8.0", "material.fatigue.exponent: should be greater than 0 (got -8.0)"),
+        ("exponent", "exponnent", "material.fatigue.exponnent: unknown key; did you mean 'exponent'?"),
+        ("knee = 1e7\n", "", "material.fatigue: knee: missing; a curve of stress and life needs it with exponent"),
+        ("1e9", "1e8", "material: default.fatigue.strength: expected at most the tensile strength 1e+08, not 4e+08"),
+        ("1e9", '1e9\nmean_stress = "soderberg"', 'material.fatigue: yield_strength: missing; mean_stress = "soder'),
+        (
+            "tensile_strength = 1e9",
+            'mean_stress = "gerber"',
+            "material.fatigue: tensile_strength: missing; mean_stress",
+        ),
+        ("1e9", "1e9\nyield_strength = 2e9", "material.fatigue: yield_strength: expected at most the tensile strength"),
+        ("1e9", "1e9\nafter_knee = 3.0", "material.fatigue: after_knee: expected at least the exponent 8, not 3"),
+        ("1e9", "1e9\nscatter = 0.5", "material.fatigue.scatter: should be greater than or equal to 1 (got 0.5)"),
+        ("1e9", "1e9\nyoung = 2e11", "material.fatigue: exponent: is fatigue data; head it [material.<group>.fatigue]"),
+        ("material.fatigue", "material.rim", "material: rim: has fatigue data only; head them [material.rim.fatigue]"),
+    ],
+)
+def test_bad_fatigue_data_are_rejected(old, new, message, tmp_path):
+    with pytest.raises(InputError) as error:
+        load(changed(CLUSTER, ("[support]", changed(FATIGUE, (old, new))), STRENGTH), tmp_path)
+    assert str(error.value).startswith(f"{tmp_path / 'case.toml'}: {message}")
+
+
+def test_fatigue_data_without_any_strength_are_rejected(tmp_path):
+    with pytest.raises(InputError, match=r"material: default.fatigue.strength: missing; give it, or the material's"):
+        load(changed(CLUSTER, ("[support]", FATIGUE)), tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vanedamp.files.formats.meshes.msh_header import read_header
+from vanedamp.files.toml_input import tables
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
 from vanedamp.modal.units import size_doubts
@@ -72,6 +73,9 @@ def _of_materials(case: Case) -> Iterator[Fact]:
         for name, table in case.material.items()
     }  # fmt: skip
     yield Fact("materials", materials, "Pa, kg/m^3, m/s", "speeds of shear and pressure waves")
+    fatigue = {name: tables(data) for name in case.material if (data := case.fatigue(name)) is not None}
+    if fatigue:
+        yield Fact("fatigue", fatigue, "Pa", "strength at R = -1, line of mean stress, curve of stress and life")
     yield Fact("damping_ratio", case.damping_ratio, "", "of every mode")
 
 

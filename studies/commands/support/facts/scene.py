@@ -24,7 +24,7 @@ from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds
+from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds, points_of
 from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
 from vanedamp.studies.commands.support.trial import mean_cost, tried
@@ -39,13 +39,18 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 
 def facts(path: str | Path) -> list[Fact]:
     """Return the facts of the scene in a file. Raises InputError, as its commands do."""
-    scene = load_scene(path)
-    if scene.axes:
+    scene = load_scene(path, ranges=True)
+    if scene.axes or scene.ranges:
         check_sweep(scene, available_cores())
     else:
         check_run(scene)
     commands = [name for table, name in _COMMANDS.items() if getattr(scene, table)]
+    ranges, points = scene.ranges, points_of(scene)
+    scene = replace(scene, ranges={})
     found = facts_of(scene)
+    if ranges:
+        ends = {path: list(pair) for path, pair in ranges.items()}
+        found[:0] = [Fact("ranges", ends, "", "figures are of the middle"), Fact("ensemble_points", points)]
     if scene.moved:
         commands.insert(0, "run")
     elif not scene.ring_down:

@@ -51,7 +51,7 @@ def sweep_doubts(scene: Scene) -> Iterator[str]:
 
 def gap_doubts(scene: Scene, amplitude: float) -> Iterator[str]:
     """Yield cavities that are wide against X, m, and walls softer than their gaps allow."""
-    omega, flexibility = 2 * math.pi * scene.frequency, scene.contact.flexibility
+    omega = 2 * math.pi * scene.frequency
     for index, cavity in enumerate(scene.cavity):
         bodies = [scene.damper[number] for number in scene.bodies_in(cavity)]
         if amplitude and cavity.gap > _WIDE * amplitude and bodies:
@@ -59,7 +59,8 @@ def gap_doubts(scene: Scene, amplitude: float) -> Iterator[str]:
                 f"cavity[{index}].gap: {cavity.gap / amplitude:.3g} times the amplitude X = {amplitude:.3g} m, so that "
                 "bodies hardly meet a wall; lengths are in m, not in mm"
             )
-        depth = max((omega * amplitude * math.sqrt(body.mass * flexibility) for body in bodies), default=0.0)
+        soft = [math.sqrt(body.mass * scene.contact.flexibility(body.mass)) for body in bodies]
+        depth = omega * amplitude * max(soft, default=0.0)
         if depth > cavity.gap:
             yield (
                 f"contact.stiffness: a body that meets a wall at the speed omega X overlaps it by {depth:.2g} m, more "

@@ -240,7 +240,7 @@ def test_sweep_over_the_laws_parameter():
         ({"law": "fifth root"}, "contact.c: missing; it is required here"),
         ({"law": "fifth root", "c": 0.0}, r"contact.c: should be greater than 0 \(got 0.0\)"),
         ({"law": "newton", "c": 0.1}, 'contact.c: belongs to law = "fifth root", not to law = "newton"'),
-        ({"law": "fifth root", "c": 0.1, "k": 1.0}, "contact.k: unknown key; known: c, law"),
+        ({"law": "fifth root", "c": 0.1, "k": 1.0}, "contact.k: unknown key; known: c, law, pair"),
     ],
 )  # fmt: skip
 def test_refusals_know_the_law(law, message):

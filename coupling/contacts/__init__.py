@@ -1,0 +1,1 @@
+"""Numbers of a contact from geometry and materials: stiffness, yield, restitution. Begin with `pair.Pair`."""

@@ -1,0 +1,154 @@
+"""The record of an ensemble."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
+from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.worker import MEASURES
+from vanedamp.files.display import Plotted
+from vanedamp.files.store import Variable, frozen
+
+#: results whose spread is told, and their units: at every point of the grid, and of the whole curve along its frequency
+AT_POINTS = {
+    "amplitude_mean": "m", "amplitude_mean_dynamic": "m", "amplitude_max": "m", "amplitude_undamped": "m",
+    "impacts_per_period": "1", "attached_mass_fraction": "1",
+}  # fmt: skip
+OF_CURVES = {"peak_amplitude": "m", "reduction": "1"}
+#: numbers that a sentence names, of the spread's
+_NAMED = 3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(SceneRecord, Plotted):
+    """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers.
+
+    scene     the scene with its ranges
+    axes      dotted path -> values, of its [sweep] table; empty for a run at one frequency
+    samples   dotted path -> (s,) values of each range
+    members   by the names of coupling.sweep.worker.MEASURES, (s, *grid) results of all points, nan where none is
+    status    (s, *grid) of every point, as in a Sweep
+    quantile  (5, ...) quantiles QUANTILES over the samples by the names of AT_POINTS, over the grid, and of OF_CURVES,
+              over its axes other than the frequency or the speed: `peak_amplitude`, the highest mean of a curve (m, as
+              amplitude_mean_dynamic), and `reduction`, what the bodies take of the maximum without bodies; of points
+              that are ok
+    indices   (4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a
+              number causes by itself, and with others, and half widths of their 95 % confidence intervals; nan where
+              nothing spreads
+    provenance  versions and further data of the caller (JSON-able)
+    """
+
+    KIND: ClassVar[str] = "ensemble"
+    scene: Scene
+    axes: Mapping[str, np.ndarray]
+    samples: Mapping[str, np.ndarray]
+    members: Mapping[str, np.ndarray]
+    status: np.ndarray
+    quantile: Mapping[str, np.ndarray]
+    indices: Mapping[str, np.ndarray]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Paths of the numbers that are ranges."""
+        return tuple(self.samples)
+
+    @property
+    def not_ok(self) -> int:
+        """Number of points that are not ok, which quantiles and indices leave out."""
+        return int((self.status != "ok").sum())
+
+    @property
+    def curves(self) -> tuple[str, ...]:
+        """The axes over which there is a curve each: all but the frequency, or the speed along an engine order."""
+        swept = resonance_axis(self.scene, self.axes)[0]
+        return tuple(path for path in self.axes if path != swept)
+
+    def sentences(self) -> Iterator[str]:
+        """Yield for every curve its reduction with what its spread is due to."""
+        for place in np.ndindex(*self.quantile["reduction"].shape[1:]):
+            at = [f"{path} = {self.axes[path][index]}: " for path, index in zip(self.curves, place, strict=True)]
+            yield "".join(at) + self._sentence(place)
+
+    def _sentence(self, place: tuple[Any, ...]) -> str:
+        low, _, middle, _, high = self.quantile["reduction"][(slice(None), *place)].tolist()
+        if not np.isfinite(middle):
+            return "no reduction: nothing to compare with, or no run is ok"
+        total, confidence = self.indices["reduction"][(slice(2, 4), slice(None), *place)]
+        order = [number for number in np.argsort(-total, kind="stable") if np.isfinite(total[number])][:_NAMED]
+        due = ", ".join(f"{self.numbers[one]} {total[one]:.2f} ± {confidence[one]:.2f}" for one in order)
+        return (
+            f"reduction {middle:.3f} in the median, {low:.3f} to {high:.3f} in 90 % of the samples; "
+            f"{f'its spread by total index: {due}' if due else 'it does not spread'}"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data: axes, ranges, quantiles and indices; the file has all members."""
+        own = {path: values.tolist() for path, values in self.axes.items()}
+        units = {path: unit_of(path) for path in (*self.axes, *self.samples)} | AT_POINTS | OF_CURVES
+        return {
+            "axes": own, "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
+            "samples": len(self.status), "points_not_ok": self.not_ok, "quantiles": list(QUANTILES),
+            "quantile": {name: values.tolist() for name, values in self.quantile.items()},
+            "indices": {
+                name: dict(zip(INDICES, (part.tolist() for part in values), strict=True))
+                for name, values in self.indices.items()
+            },
+            "numbers": list(self.numbers), "warnings": list(self.provenance.get("warnings", ())),
+            "sentences": list(self.sentences()),
+        }  # fmt: skip
+
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file. Dimensions are the axes' paths with _ for dots."""
+        grid = tuple(_dimension(path) for path in self.axes)
+        curves = tuple(_dimension(path) for path in self.curves)
+        dims = dict.fromkeys(AT_POINTS, grid) | dict.fromkeys(OF_CURVES, curves)
+        units = AT_POINTS | OF_CURVES
+        found = {
+            "number": Variable(np.array(self.numbers, object), ("number",)),
+            "quantile": Variable(np.array(QUANTILES), ("quantile",)),
+            "index": Variable(np.array(INDICES, object), ("index",)),
+            "status": Variable(self.status, ("sample", *grid)),
+        }
+        for path, values in self.axes.items():
+            found[_dimension(path)] = Variable(values, (_dimension(path),), unit_of(path))
+        for path, values in self.samples.items():
+            found[f"sample_{_dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
+        found |= {name: Variable(values, ("sample", *grid), MEASURES[name]) for name, values in self.members.items()}
+        for name, values in self.quantile.items():
+            found[f"quantile_{name}"] = Variable(values, ("quantile", *dims[name]), units[name])
+        for name, values in self.indices.items():
+            found[f"indices_{name}"] = Variable(values, ("index", "number", *dims[name]))
+        return found
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        return {"axes": list(self.axes), "scene": self.scene.to_dict(), "provenance": dict(self.provenance)}
+
+    @classmethod
+    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ensemble:
+        """Return the record in the variables and attributes of a file."""
+        given = cls.common(attributes, path)
+        axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
+        own = (*AT_POINTS, *OF_CURVES)
+        return cls(
+            axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
+            samples={number: frozen(values[f"sample_{_dimension(number)}"]) for number in values["number"]},
+            members={name: frozen(values[name]) for name in MEASURES},
+            status=frozen(values["status"], object),
+            quantile={name: frozen(values[f"quantile_{name}"]) for name in own},
+            indices={name: frozen(values[key]) for name in own if (key := f"indices_{name}") in values},
+            **given,
+        )
+
+
+def _dimension(path: str) -> str:
+    return path.replace(".", "_")

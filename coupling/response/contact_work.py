@@ -1,0 +1,78 @@
+"""Work of contacts, what Archard's law and laws of impact wear take from a run, and the wear by it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class ContactWork(NamedTuple):
+    """Work of a contact of a body, or of a friction damper, over the evaluated periods (p of them).
+
+    damper, side, corner: as of an Event; friction: coefficient; hits: impacts; course: (p, 2) of each period, integral
+    of normal force times slip speed (N m) and sum of the energies of impacts (J) to the power of [wear] impact_exponent
+    """
+
+    damper: int
+    side: str
+    corner: int
+    friction: float
+    hits: int
+    course: np.ndarray
+
+    @property
+    def sliding(self) -> float:
+        """Integral of normal force times slip speed, N m: the work of friction over the coefficient."""
+        return float(self.course[:, 0].sum())
+
+    @property
+    def impacts(self) -> float:
+        """Sum of the energies of impacts to a power, J^exponent: half the contact's mass times speed squared."""
+        return float(self.course[:, 1].sum())
+
+
+def contact_name(damper: int, side: str, corner: int) -> str:
+    """Return the name of a contact for people."""
+    what = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
+    return f"{what} {damper}" + (f", corner {corner}" if corner >= 0 else "")
+
+
+@dataclass(frozen=True)
+class ContactWear:
+    """Wear of one contact, at the mean rates of the evaluated periods.
+
+    damper, side, corner: as of an Event. sliding: integral of normal force times slip speed, N m; friction: its
+    coefficient times that, J; impacts: sum of their energies to the power n, J^n; hits: their number. work_rate:
+    sliding per time, W. volume_rate: m^3/h of both partners, of which the cavity (of neighbours the right body) loses
+    `share`; depth_rate: m/h, None where the patch is not known. *_confidence: half widths of 95 % confidence intervals,
+    None where there are too few periods.
+    """
+
+    damper: int
+    side: str
+    corner: int
+    sliding: float
+    friction: float
+    impacts: float
+    hits: int
+    work_rate: float
+    volume_rate: float
+    volume_rate_confidence: float | None
+    depth_rate: float | None
+    share: float
+    area: float | None
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return contact_name(self.damper, self.side, self.corner)
+
+    def hours_to(self, depth: float) -> float | None:
+        """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
+        return depth / self.depth_rate if self.depth_rate else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return asdict(self)

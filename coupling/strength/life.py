@@ -1,0 +1,82 @@
+"""Life: Basquin's curve with a knee, Miner's sum, quantiles from scatter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import norm
+
+from vanedamp.coupling.strength.counting import Cycles
+from vanedamp.coupling.strength.haigh import equivalent_amplitude
+from vanedamp.coupling.strength.material import Fatigue
+from vanedamp.files.toml_input import InputError
+
+#: probabilities of failure whose lives are results
+PROBABILITIES = (0.1, 0.5, 0.9)
+# difference of the normal distribution's quantiles at 90 % and 10 %
+_BETWEEN = norm.ppf(0.9) - norm.ppf(0.1)
+
+
+def damage_per_cycle(amplitude: np.ndarray | float, fatigue: Fatigue) -> np.ndarray:
+    """Return 1 / N of fully reversed amplitudes, Pa: (amplitude / strength)^k / knee, k by the side of the knee.
+
+    Source: Basquin (1910); below the knee Haibach (1970): 2 k - 1. Raises InputError without a curve.
+    """
+    if fatigue.exponent is None or fatigue.knee is None or fatigue.strength is None:
+        raise InputError("fatigue.exponent: missing; a life needs exponent and knee of a curve of stress and life")
+    above, below = fatigue.exponents
+    used = np.asarray(amplitude, dtype=float) / fatigue.strength
+    under = np.zeros_like(used) if math.isinf(below) else np.minimum(used, 1.0) ** below
+    return np.where(used >= 1.0, used**above, under) / fatigue.knee
+
+
+def cycles_to_failure(amplitude: np.ndarray | float, fatigue: Fatigue, mean: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return the cycles to failure (50 % probability) of amplitudes at mean stresses, Pa; inf without damage."""
+    damage = damage_per_cycle(equivalent_amplitude(amplitude, mean, fatigue), fatigue)
+    return np.divide(1.0, damage, out=np.full(damage.shape, np.inf), where=damage > 0.0)
+
+
+def damage(cycles: Cycles, fatigue: Fatigue, static: float = 0.0) -> float:
+    """Return Miner's sum of counted cycles of stress, Pa; 1: failure.
+
+    Each counts at its own mean stress, to which the static stress, Pa, is added.
+    """
+    equivalent = equivalent_amplitude(0.5 * cycles.ranges, cycles.means + static, fatigue)
+    return float(np.sum(cycles.counts * damage_per_cycle(equivalent, fatigue)))
+
+
+def damage_rate(
+    amplitude: np.ndarray | float, frequency: float, fatigue: Fatigue, mean: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Return Miner's sum per second of a motion with one cycle of an amplitude, Pa, per period; frequency: Hz."""
+    return frequency * damage_per_cycle(equivalent_amplitude(amplitude, mean, fatigue), fatigue)
+
+
+def life_at(median: float, fatigue: Fatigue, probability: float) -> float:
+    """Return the life by which a fraction of parts has failed, in the unit of the median life.
+
+    log10 of life is normal; its standard deviation is log10(scatter) / 2.563, since scatter is the ratio of the lives
+    at 90 % and 10 %.
+    """
+    if not 0.0 < probability < 1.0:
+        raise InputError(f"probability: expected a number between 0 and 1, not {probability:g}")
+    return float(median * fatigue.scatter ** (norm.ppf(probability) / _BETWEEN))
+
+
+def quantiles(median: float, fatigue: Fatigue, probabilities: Sequence[float] = PROBABILITIES) -> dict[str, float]:
+    """Return the lives by which fractions of parts have failed, {"10%": ...}, in the unit of the median life."""
+    return {f"{100 * chance:g}%": life_at(median, fatigue, chance) for chance in probabilities}
+
+
+def hours(damage: float, duration: float) -> float:
+    """Return the hours until Miner's sum is 1 if a duration, s, brings a damage; inf without damage."""
+    return duration / damage / 3600.0 if damage > 0.0 else math.inf
+
+
+def starts(damage_per_pass: float, passes_per_start: float = 1.0) -> float:
+    """Return the starts until Miner's sum is 1 if each passes a resonance several times; inf without damage."""
+    if not passes_per_start > 0.0:
+        raise InputError(f"passes_per_start: expected a positive number, not {passes_per_start:g}")
+    return 1.0 / (damage_per_pass * passes_per_start) if damage_per_pass > 0.0 else math.inf

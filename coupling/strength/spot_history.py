@@ -1,0 +1,58 @@
+"""Histories of the stress that counts at hot spots, kept as turning points while a motion advances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vanedamp.coupling.response.spot_stress import SCALARS
+from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles, turning_points
+from vanedamp.coupling.strength.material import Fatigue
+from vanedamp.coupling.strength.multiaxial import largest_principal
+from vanedamp.coupling.strength.stress import scalar_stresses, signs
+
+
+class SpotHistories:
+    """Turning points of the criterion's stress at s spots, about the mean of the samples that came first.
+
+    It counts as tensile where the stress goes with the largest one of these samples, if that is tensile. Spots without
+    a curve of stress and life have no history.
+    """
+
+    def __init__(self, materials: Sequence[Fatigue | None]) -> None:
+        self._rows = {
+            place: SCALARS.index(material.criterion)
+            for place, material in enumerate(materials)
+            if material is not None and material.exponent is not None
+        }
+        self._mean, self._reference = np.zeros(0), np.zeros(0)
+        self._points: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {place: [] for place in self._rows}
+
+    def add(self, begin: int, stress: np.ndarray) -> None:
+        """Add samples (s, 6, t) of stress, Pa, of which the first has the number `begin`."""
+        if not self._rows or not stress.shape[-1]:
+            return
+        if not self._mean.size:
+            self._mean = stress.mean(axis=-1)
+        about = np.moveaxis(stress - self._mean[..., None], 1, 0)
+        scalars = scalar_stresses(about)
+        if not self._reference.size:
+            worst = scalars[0].argmax(axis=-1)
+            largest = np.take_along_axis(about, worst[None, :, None], axis=-1)
+            self._reference = np.copysign(1.0, largest_principal(largest)) * largest
+        signed = signs(about, self._reference) * scalars
+        for place, row in self._rows.items():
+            kept = turning_points(signed[row, place])
+            self._points[place].append((begin + kept, signed[row, place, kept]))
+
+    def cycles(self, place: int, first: int = 0, repeats: bool = False) -> Cycles | None:
+        """Return the cycles of a spot from a sample on; None without any sample, or a curve.
+
+        repeats: the motion repeats what is counted (counting.rainflow_cycles).
+        """
+        if not self._points.get(place):
+            return None
+        numbers, values = (np.concatenate(arrays) for arrays in zip(*self._points[place], strict=True))
+        values = values[numbers >= first]
+        return rainflow_cycles(values, repeats) if values.size else None

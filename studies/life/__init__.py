@@ -1,0 +1,1 @@
+"""Life of a damper: wear opens its cavities, and the response changes, over thousands of hours."""

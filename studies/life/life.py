@@ -1,0 +1,173 @@
+"""How long a damper damps: wear opens its cavities, and the response is computed anew until the reduction is lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import tables
+from vanedamp.studies.life.fast import Found, Runs
+from vanedamp.studies.life.record import LifeRecord, sentence_of
+from vanedamp.studies.life.slow import Moment, Steps, between, integrate
+from vanedamp.studies.life.study import LifeStudy, Wearing
+
+#: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
+_CLOSE = 0.01
+
+
+def life(
+    study: LifeStudy,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    checkpoint: str | Path | None = None,
+) -> LifeRecord:
+    """Integrate the wear of a damper over the hours of its study, or until the reduction is lost with certainty.
+
+    progress: called with the hours done and all; checkpoint: a file to which finished runs are written and from which
+    an interrupted life resumes; the caller removes it once the result is safe (files.checkpoint_file.clear).
+    Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
+    """
+    started = time.perf_counter()
+    with Runs(checkpoint, study, executor, provenance or {}) as runs:
+        first = runs.at(study.scene)
+        wearing = study.wearing(runs.contacts)
+        moments = list(_moments(_Course(study, wearing, runs, first), progress))
+    return _record(study, wearing, runs, moments, dict(provenance or {}), time.perf_counter() - started)
+
+
+class _Course:
+    """Rates by volumes of wear, and the scales of these."""
+
+    def __init__(self, study: LifeStudy, wearing: Wearing, runs: Runs, first: Found) -> None:
+        self.study, self.wearing, self._runs = study, wearing, runs
+        self._new: Found | None = first
+
+    def rates(self, volume: np.ndarray) -> Found:
+        """Return what is found with some wear."""
+        if self._new is not None:  # the first runs have told the contacts
+            found, self._new = self._new, None
+            return found
+        return self._runs.at(self.wearing.worn(volume))
+
+    def scale(self, volume: np.ndarray) -> np.ndarray:
+        """Return the volumes (c,), m^3, by which contacts together open gap or play by as much as it is.
+
+        inf for those that do not.
+        """
+        scale = np.full(len(volume), np.inf)
+        for travel, matrix in (
+            (self.wearing.gaps(volume), self.wearing.gap), (self.wearing.plays(volume), self.wearing.play)
+        ):  # fmt: skip
+            opens = matrix > 0.0
+            own = np.nan_to_num(travel, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
+            scale = np.minimum(
+                scale, np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0)
+            )
+        return scale
+
+
+def _moments(course: _Course, progress: Callable[[int, int], None] | None) -> Iterator[Moment[Found]]:
+    """Yield the moments, those between two steps as well where the threshold is passed."""
+    table, before, damped = course.study.table, None, False
+    steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
+    start = np.zeros(course.wearing.gap.shape[1])
+    for now in integrate(course.rates, start, table.hours, steps):
+        if before is not None and _passes(before, now, table.threshold):
+            yield from _halved(course, before, now)
+        yield now
+        if progress is not None:
+            progress(round(now.time), round(table.hours))
+        damped = damped or now.found.reduction >= table.threshold
+        if damped and now.found.reduction + now.found.reduction_confidence < table.threshold:
+            return
+        before = now
+
+
+def _passes(before: Moment[Found], after: Moment[Found], threshold: float) -> bool:
+    return (before.found.reduction >= threshold) != (after.found.reduction >= threshold)
+
+
+def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Iterator[Moment[Found]]:
+    """Yield moments between two, until the time at which the reduction passes the threshold is known well enough.
+
+    It is, too, where reductions differ by less than their confidence.
+    """
+    table, first, last, found = course.study.table, before, after, list[Moment[Found]]()
+    while last.time - first.time > _CLOSE * table.hours:
+        change = abs(last.found.reduction - first.found.reduction)
+        if change < max(last.found.reduction_confidence, first.found.reduction_confidence):
+            break
+        middle = (first.time + last.time) / 2
+        volume, band = between(before, after, middle)
+        moment = Moment(middle, volume, course.rates(volume), band, after.error)
+        found.append(moment)
+        first, last = (first, moment) if _passes(first, moment, table.threshold) else (moment, last)
+    yield from sorted(found, key=lambda moment: moment.time)
+
+
+def _record(
+    study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], provenance: dict[str, Any],
+    took: float,
+) -> LifeRecord:  # fmt: skip
+    """Return the record of moments in the order of their times."""
+    volume = np.array([moment.state for moment in moments])
+    band, error = (np.array([getattr(moment, name) for moment in moments]) for name in ("band", "error"))
+    rate, confidence = (np.array([getattr(m.found, name) for m in moments]) for name in ("rate", "confidence"))
+    area = np.array([one.area for one in runs.contacts])
+    gap_rate = rate @ wearing.gap.T
+    shift = np.sqrt(band**2 @ wearing.gap.T**2) + error @ wearing.gap.T
+    travel = {
+        name: np.array([of(state) for state in volume]) for name, of in (("gap", wearing.gaps), ("play", wearing.plays))
+    }
+    values = {
+        "time": np.array([moment.time for moment in moments]),
+        "depth": volume / area, "depth_band": band / area, "depth_error": error / area,
+        "depth_rate": rate / area, "depth_rate_confidence": confidence / area,
+        "gap": travel["gap"], "gap_band": shift, "play": travel["play"],
+        "lost": np.array([wearing.lost(state) for state in volume]),
+        "reduction": np.array([moment.found.reduction for moment in moments]),
+        "reduction_band": np.array([moment.found.reduction_confidence for moment in moments]),
+        "amplitude": np.array([moment.found.amplitude for moment in moments]),
+    }  # fmt: skip
+    late = np.divide(shift, gap_rate, out=np.zeros_like(shift), where=gap_rate > 0.0).max(axis=1)
+    hours = _hours(values["time"], values["reduction"], values["reduction_band"], late, study.table.threshold)
+    return LifeRecord(
+        study={"life": tables(study.table), "scene": study.scene.to_dict()},
+        reference=study.reference, frequency=study.frequencies, contacts=tuple(runs.contacts),
+        **{name: frozen(array) for name, array in values.items()},
+        hours=hours, runs=runs.asked, trouble=runs.trouble, wall_time_s=took,
+        sentence=sentence_of(hours, study.table, values), provenance=provenance,
+    )  # fmt: skip
+
+
+def _hours(
+    time: np.ndarray, reduction: np.ndarray, band: np.ndarray, late: np.ndarray, threshold: float
+) -> tuple[float | None, float | None, float | None]:
+    """Return when the reduction is lost: of its curve, at the earliest and at the latest; None: not within the time.
+
+    0 where it is never kept. late (n,): h by which the depths of wear may be early or late.
+    """
+    lost, early, last = (_lost(time, reduction - threshold + side * band) for side in (0.0, -1.0, 1.0))
+    if early is not None:
+        early = max(early - float(np.interp(early, time, late)), 0.0)
+    return lost, early, None if last is None else last + float(np.interp(last, time, late))
+
+
+def _lost(time: np.ndarray, above: np.ndarray) -> float | None:
+    """Return the first time at which a curve that has been above zero falls below it."""
+    kept = np.flatnonzero(above >= 0.0)
+    if len(kept) == 0:
+        return 0.0
+    below = np.flatnonzero(above[kept[0] :] < 0.0)
+    if len(below) == 0:
+        return None
+    after = kept[0] + below[0]
+    part = above[after - 1] / (above[after - 1] - above[after])
+    return float(time[after - 1] + part * (time[after] - time[after - 1]))

@@ -1,0 +1,124 @@
+"""Integration of rates that are known with a confidence: what wears over hours, by means of a fast motion.
+
+The pair of P. Bogacki and L. F. Shampine (Appl. Math. Lett. 2, 321, 1989), third order with an embedded second. A
+library's integrator (scipy's RK23 is the same pair) takes the scatter of such rates for the error of its step: scatter
+falls with the step itself, and not with its cube, so that steps shrink until the integration stops; nor does it return
+how far the scatter has carried the result. Here only what exceeds the scatter's own confidence counts as error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+#: stages, their weights, and the difference of both orders
+_STAGES = ((0.5,), (0.0, 0.75), (2 / 9, 1 / 3, 4 / 9))
+_WEIGHTS = np.array(_STAGES[-1])
+_ERROR = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
+#: growth of a step at most and at least, and by how much it stays below what its error allows
+_GROWTH, _SHRINK, _SAFETY = 3.0, 0.2, 0.85
+#: shortest step over the whole time: a jump of the rates is passed by it
+_SHORTEST = 1e-3
+
+
+class Rated(Protocol):
+    """Rates at a state: (k,) per unit of time, and half widths of their 95 % confidence intervals."""
+
+    @property
+    def rate(self) -> np.ndarray:
+        """Rates (k,)."""
+
+    @property
+    def confidence(self) -> np.ndarray:
+        """Half widths (k,)."""
+
+
+Found = TypeVar("Found", bound=Rated)
+
+
+class Moment(NamedTuple, Generic[Found]):
+    """A state (k,) at a time, what was found there, and how well it is known.
+
+    band: (k,) half widths of 95 % intervals, by the confidence of the rates; error: (k,) bound of the steps' errors, as
+    estimated by the second order.
+    """
+
+    time: float
+    state: np.ndarray
+    found: Found
+    band: np.ndarray
+    error: np.ndarray
+
+
+class Steps(NamedTuple):
+    """Control of the steps.
+
+    tolerance: of the error at the end, over the scale; reach: growth in a step at most, over the scale; scale: of a
+    state (k,), that of its errors and growth (inf: none); fixed: number of equal steps in place of the control.
+    """
+
+    tolerance: float
+    reach: float
+    scale: Callable[[np.ndarray], np.ndarray]
+    fixed: int | None = None
+
+
+def integrate(
+    rates: Callable[[np.ndarray], Found], state: np.ndarray, end: float, steps: Steps
+) -> Iterator[Moment[Found]]:
+    """Yield the moments from time 0 to the end, the first and the last included."""
+    zero = np.zeros(len(state))
+    now: Moment[Found] = Moment(0.0, state, rates(state), zero, zero)
+    yield now
+    step = _longest(now, end, steps) if steps.fixed is None else end / steps.fixed
+    while now.time < end * (1.0 - 1e-12):
+        step = min(step, end - now.time)
+        if steps.fixed is None:
+            step = min(step, _longest(now, end, steps))
+            if end - now.time < 1.5 * step < 1.5 * (end - now.time):
+                step = (end - now.time) / 2  # no short remainder
+        tried, excess = _step(rates, now, step)
+        allowed = steps.tolerance * steps.scale(now.state) * step / end
+        over = float(np.max(excess / allowed, initial=0.0))
+        if steps.fixed is None and over > 1.0 and step > _SHORTEST * end:
+            step = max(step * max(_SHRINK, _SAFETY / np.sqrt(over)), _SHORTEST * end)
+            continue
+        now = tried
+        yield now
+        if steps.fixed is None:
+            step *= min(_GROWTH, _SAFETY / np.sqrt(max(over, 1e-9)))
+            step = max(step, _SHORTEST * end)
+
+
+def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return state and band (k,) at a time between two moments: the cubic by both rates, and between the bands."""
+    span = after.time - before.time
+    s = (time - before.time) / span
+    change = after.state - before.state
+    bend = (1 - s) * (span * before.found.rate - change) - s * (span * after.found.rate - change)
+    state = before.state + s * change + s * (1 - s) * bend
+    return state, (1 - s) * before.band + s * after.band
+
+
+def _longest(now: Moment[Found], end: float, steps: Steps) -> float:
+    """Return the step in which no state grows by more than its reach."""
+    fastest = float(np.max(np.abs(now.found.rate) / steps.scale(now.state), initial=0.0))
+    return min(end, steps.reach / fastest) if fastest > 0.0 else end
+
+
+def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float) -> tuple[Moment[Found], np.ndarray]:
+    """Return the moment after a step, and by how much its error exceeds the confidence of the rates (k,)."""
+    found = [now.found]
+    for weights in _STAGES:
+        slope = sum(weight * one.rate for weight, one in zip(weights, found, strict=True))
+        state = now.state + step * slope
+        found.append(rates(state))
+    rate, scatter = (np.array([getattr(one, name) for one in found]) for name in ("rate", "confidence"))
+    error = step * np.abs(_ERROR @ rate)
+    excess = np.maximum(error - step * np.sqrt(_ERROR**2 @ scatter**2), 0.0)
+    # what shifts the motion in time goes on with its rate, which solves the linearised equation
+    kept = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
+    band = np.sqrt((kept * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
+    return Moment(now.time + step, state, found[-1], band, np.abs(kept) * now.error + excess), excess

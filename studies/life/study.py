@@ -1,0 +1,201 @@
+"""The study of a life: a scene with [wear], and a [life] table of hours, frequencies and the reduction to keep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.response.contact_work import contact_name
+from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed
+from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.files.key_tables import documented
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
+from vanedamp.studies.band import UNITS, Band, drive, placed, reference_amplitude, scene_in
+
+_Ratio = Annotated[Real, Field(gt=0, lt=1)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Life(Band):
+    """Hours of operation, the excitation over them, and what the damper must keep."""
+
+    TABLE: ClassVar[str] = "life"
+    hours: Positive = 10_000.0
+    """hours of operation [h]"""
+    dwell: Literal["uniform", "peak"] | tuple[NonNegative, ...] = "uniform"
+    """time spent at the points of the band: "uniform"; "peak", all at the one with the largest amplitude; or a list of
+    weights [-]"""
+    threshold: _Ratio = 0.5
+    """reduction of the amplitude without bodies below which the damper is lost [-]"""
+    measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
+    """amplitude of a run that counts: mean of the peaks of its periods, or largest; without static deflection"""
+    over_band: Literal["worst", "mean"] = "worst"
+    """what counts of the band's amplitudes"""
+    tolerance: _Ratio = 0.02
+    """error of the depths of wear by the steps over the hours, relative to the gap [-]"""
+    reach: _Ratio = 0.15
+    """growth of a gap in a step at most, relative to it [-]"""
+    steps: Annotated[Whole, Field(gt=0, le=10_000)] | None = None
+    """number of equal steps (default: as many as tolerance and reach need)"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.dwell, str):
+            if len(self.dwell) != self.count:
+                raise ValueError(f"dwell: {len(self.dwell)} weights for {self.count} points of the band; give as many")
+            if not any(self.dwell):
+                raise ValueError("dwell: all weights are 0; give at least one point of the band some time")
+
+
+@documented
+@dataclass(frozen=True, config=STRICT, repr=False)
+class LifeFile(Scene):
+    """A scene with [wear], and how long it is to damp."""
+
+    life: Life = field(kw_only=True)
+    """hours of operation and the reduction to keep"""
+
+
+class Contact(NamedTuple):
+    """A contact that wears: body, side and corner as of an Event; patch, m^2 (nan: unknown); share of the cavity."""
+
+    damper: int
+    side: str
+    corner: int
+    area: float
+    share: float
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return contact_name(self.damper, self.side, self.corner)
+
+
+class LifeStudy(NamedTuple):
+    """A scene, its [life] table, and what its curves refer to.
+
+    frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m.
+    """
+
+    scene: Scene
+    table: Life
+    frequencies: np.ndarray
+    reference: float
+
+    @classmethod
+    def load(cls, path: str | Path) -> LifeStudy:
+        """Read the study in a TOML file. Raises InputError."""
+        return cls.of(read_toml(path), path)
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> LifeStudy:
+        """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
+        data = dict(tables)
+        if "life" not in data:
+            raise InputError(f"{path}: life: missing; give hours and a band in a [life] table (docs/wear.md)")
+        given = data["life"]
+        if isinstance(given, dict) and not set(UNITS) & set(given):
+            raise InputError(
+                f"{path}: life.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
+            )
+        file = LifeFile.of(data, path)
+        try:
+            scene, band = placed(scene_in(file), file.life)
+            _check(scene)
+            assemble(scene)
+            reference = reference_amplitude(scene, band, file.life.over_band)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        if reference == 0.0:
+            raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
+        return cls(replace(scene, sweep={}), file.life, frozen(band), reference)
+
+    def wearing(self, contacts: Sequence[Contact]) -> Wearing:
+        """Return how the scene wears at its contacts.
+
+        Raises InputError for a contact that opens a gap and whose patch is not known.
+        """
+        scene = self.scene
+        gap, play = opening(scene, [(one.damper, one.side) for one in contacts])
+        area = np.array([one.area for one in contacts])
+        for contact in np.flatnonzero(np.isnan(area) & np.any(gap + play > 0.0, axis=0)):
+            damper, side, *_ = contacts[contact]
+            extent = "height" if side in ALONG else "length"
+            raise InputError(
+                f"wear.width: the patch of damper {damper} at {side} is not known; give wear.width and the {extent} of "
+                "the body (damper or wear), or wear.area, m^2"
+            )
+        area = np.where(np.isnan(area), 1.0, area)
+        return Wearing(scene, gap / area, play / area, body_shares(scene, contacts))
+
+    def points(self, scene: Scene) -> list[Scene]:
+        """Return a scene at the frequencies of the band."""
+        made = Points(scene)
+        return [made.scene(drive(scene, float(frequency))) for frequency in self.frequencies]
+
+
+class Wearing(NamedTuple):
+    """How volumes of wear (c,), m^3, change a scene: gaps and plays by matrices (cavities, c), 1/m^2.
+
+    shares: (bodies, c) of the volumes that the bodies lose.
+    """
+
+    scene: Scene
+    gap: np.ndarray
+    play: np.ndarray
+    shares: np.ndarray
+
+    def gaps(self, volume: np.ndarray) -> np.ndarray:
+        """Return the free travel of the cavities, m."""
+        return np.array([cavity.gap for cavity in self.scene.cavity]) + self.gap @ volume
+
+    def plays(self, volume: np.ndarray) -> np.ndarray:
+        """Return the play of the cavities, m; nan without."""
+        return np.array([cavity.play or np.nan for cavity in self.scene.cavity]) + self.play @ volume
+
+    def lost(self, volume: np.ndarray) -> np.ndarray:
+        """Return the fraction of each body that is worn away; nan where its size is not known."""
+        return self.shares @ volume / body_volumes(self.scene)
+
+    def worn(self, volume: np.ndarray) -> Scene:
+        """Return the scene with its gaps, plays and masses after some wear."""
+        changes: dict[str, Any] = {}
+        for cavity, gap, play in zip(self.scene.cavity, self.gaps(volume), self.plays(volume), strict=True):
+            changes[f"cavity.{cavity.name}.gap"] = float(gap)
+            if cavity.play is not None:
+                changes[f"cavity.{cavity.name}.play"] = float(play)
+        for number, (damper, lost) in enumerate(zip(self.scene.damper, self.lost(volume), strict=True)):
+            if np.isfinite(lost):
+                changes[f"damper.{number}.mass"] = damper.mass * (1.0 - float(lost))
+        return self.scene.replace(changes)
+
+
+def _check(scene: Scene) -> None:
+    if scene.wear is None:
+        raise InputError("wear: missing; give rates of wear in a [wear] table (docs/wear.md)")
+    rates = [scene.wear, *scene.wear.pair]
+    if not any(rate.sliding_rate or rate.impact_rate for rate in rates):
+        raise InputError(
+            "wear: nothing wears; give rate (1/Pa), coefficient with hardness (Pa), or impact_rate (m^3/J^n)"
+        )
+    if isinstance(scene.structure, Prescribed):
+        raise InputError('structure: a prescribed motion is not damped; take model = "rigid" or "rom"')
+    for number in scene.ranges:
+        raise InputError(f"{number}: a range is for `vanedamp run` and `vanedamp sweep`; give one number")
+    if leaves_open(scene):
+        raise InputError('structure.modes, damper.shape: "auto" may change with the wear; name a number and a shape')
+    if not scene.damper:
+        raise InputError("damper: missing; a life is that of loose bodies")
+    if scene.solver.method != "exact":
+        raise InputError('solver.method: wear is accumulated by the exact engine only; take method = "exact"')

@@ -1,0 +1,66 @@
+"""The figures of a life: reduction, gaps and depths of wear over hours, and wear rates of the contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from vanedamp.studies.life.record import LifeRecord
+from vanedamp.studies.report.charts import COLOURS
+
+_PALE = "rgba({}, {}, {}, 0.18)"
+
+
+def life_figure(record: LifeRecord) -> go.Figure:
+    """Draw reduction, free travel and depth of wear over hours, with their 95 % bands."""
+    scene, table = record.study["scene"], record.study["life"]
+    figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    _curve(figure, 1, record.time, 100 * record.reduction, 100 * record.reduction_band, "reduction", 0)
+    figure.add_hline(y=100 * table["threshold"], line={"dash": "dot", "color": "#64748b"}, row=1, col=1)
+    for place, cavity in enumerate(scene["cavity"]):
+        gap, band = 1e6 * record.gap[:, place], 1e6 * record.gap_band[:, place]
+        _curve(figure, 2, record.time, gap, band, f"gap of {cavity['name']}", 1 + place)
+    for place, contact in enumerate(record.contacts):
+        depth = 1e6 * record.depth[:, place]
+        if np.isfinite(depth).all():
+            band = 1e6 * (record.depth_band + record.depth_error)[:, place]
+            _curve(figure, 3, record.time, depth, band, contact.name, 2 + place)
+    for row, title in enumerate(("reduction, %", "gap, µm", "depth of wear, µm"), 1):
+        figure.update_yaxes(title_text=title, rangemode="tozero", row=row, col=1)
+    figure.update_xaxes(title_text="hours", row=3, col=1)
+    for hours, dash in zip(record.hours, ("solid", "dash", "dash"), strict=True):
+        if hours:
+            figure.add_vline(x=hours, line={"dash": dash, "color": "#be185d", "width": 1})
+    return figure
+
+
+def wear_figure(names: Sequence[str], depth_rate: Sequence[float], spread: Sequence[float]) -> go.Figure:
+    """Draw the depths of wear per hour of contacts, m/h, with half widths of their 95 % intervals."""
+    figure = go.Figure(
+        go.Bar(
+            x=list(names), y=[1e9 * rate for rate in depth_rate], marker={"color": COLOURS[0]},
+            error_y={"array": [1e9 * half for half in spread], "color": COLOURS[1]},
+            hovertemplate="%{x}<br>%{y:.4g} nm/h<extra></extra>",
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title_text="contact")
+    figure.update_yaxes(title_text="depth of wear, nm/h", rangemode="tozero", exponentformat="power")
+    return figure
+
+
+def _curve(
+    figure: go.Figure, row: int, x: np.ndarray, y: np.ndarray, band: np.ndarray, name: str, colour: int
+) -> None:  # fmt: skip
+    """Add a curve over its band to a row of panels."""
+    colour_name = COLOURS[colour % len(COLOURS)]
+    rgb = (int(colour_name[place : place + 2], 16) for place in (1, 3, 5))
+    figure.add_scatter(
+        x=np.concatenate([x, x[::-1]]), y=np.concatenate([y + band, (y - band)[::-1]]), mode="lines", fill="toself",
+        fillcolor=_PALE.format(*rgb), line={"width": 0}, hoverinfo="skip", showlegend=False, row=row, col=1,
+    )  # fmt: skip
+    figure.add_scatter(
+        x=x, y=y, mode="lines+markers", name=name, line={"color": colour_name}, marker={"size": 5}, row=row, col=1
+    )

@@ -1,0 +1,273 @@
+"""The life of a damper that is known in closed form, its bands, its record, and how it resumes."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.integrate import solve_ivp
+
+from tests.studies.life.damper import GAP, HOURS, LOST, SCENE, Damper, gap_after
+from vanedamp.coupling.response.response import Status
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.commands import life as command
+from vanedamp.studies.life import fast
+from vanedamp.studies.life.life import life
+from vanedamp.studies.life.record import LifeRecord
+from vanedamp.studies.life.study import LifeStudy
+from vanedamp.studies.report.life_charts import life_figure
+
+
+def study(**changes):
+    data = copy.deepcopy(SCENE)
+    data["life"] |= changes
+    return LifeStudy.of(data)
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """A function that runs a study with a damper, of some options."""
+
+    def run(case=None, **options):
+        monkeypatch.setattr(fast, "simulate", damper := Damper(**options))
+        return life(case or study()), damper
+
+    return run
+
+
+def test_gap_and_hours_in_closed_form(found):
+    record, _ = found()
+    assert record.gap[:, 0] == pytest.approx([gap_after(hours) for hours in record.time], rel=1e-3)
+    lost, early, late = record.hours
+    assert lost == pytest.approx(LOST, rel=2e-3)
+    assert early <= lost <= late and late - early < 0.02 * LOST
+    assert record.reduction == pytest.approx(1 - 0.3 * record.gap[:, 0] / GAP, abs=1e-9)
+    # the floor wears by a tenth of a wall, and opens nothing
+    assert record.depth[-1, 0] == pytest.approx(record.depth[-1, 1] / 10)
+    assert record.gap[-1, 0] - GAP == pytest.approx(record.depth[-1, 1:].sum())
+    assert f"damps for {lost:.0f} h ({early:.0f} to {late:.0f} h)" in record.sentence
+    assert record.time[-1] < 1.2 * LOST  # it ends where nothing is left to find out
+    assert record.trouble == 0 and record.runs % 2 == 0
+
+
+@pytest.mark.parametrize("count", [6, 12])
+def test_twice_the_steps_change_as_little_as_is_said(found, count):
+    ends = [found(study(steps=steps, hours=900.0))[0] for steps in (count, 2 * count)]
+    assert len(ends[0].time) == count + 1
+    gaps, said = ([getattr(record, name)[-1, 0] for record in ends] for name in ("gap", "gap_band"))
+    assert 0.0 < abs(gaps[0] - gaps[1]) < said[0]
+    assert abs(gaps[0] - gap_after(900.0)) < said[0]
+    assert said[1] == pytest.approx(said[0] / 4, rel=0.3)  # of the second order, over all steps
+
+
+def test_steps_follow_the_tolerance(found):
+    wide, narrow = (found(study(tolerance=tolerance, reach=0.9)) for tolerance in (1e-2, 1e-5))
+    assert wide[1].calls < narrow[1].calls
+    assert abs(narrow[0].gap[-1, 0] / gap_after(narrow[0].time[-1]) - 1) < 1e-5
+
+
+def test_bands_of_scattering_runs_hold_the_hours(found):
+    inside = []
+    for seed in range(60):
+        lost, early, late = found(scatter=0.05, seed=seed)[0].hours
+        inside.append(early <= LOST <= (np.inf if late is None else late))
+        assert early <= lost
+    assert np.mean(inside) > 0.9
+
+
+def test_a_damper_that_lasts_and_one_that_never_damps(found):
+    record, _ = found(study(hours=500.0))
+    assert record.hours == (None, None, None)
+    assert record.sentence.startswith("damps for all 500 h: the reduction is 70%")
+    assert record.time[-1] == pytest.approx(500.0)
+    never, _ = found(study(hours=500.0), share=0.6)
+    assert never.hours[0] == 0.0 and "does not damp by 50%" in never.sentence
+
+
+def test_dwell_weighs_the_points_of_the_band(found, monkeypatch):
+    """Of two frequencies only one wears: uniform dwell takes half of its rate, a list what it says."""
+    damper = Damper()
+
+    def one_wears(scene):
+        response = damper(scene)
+        if scene.frequency > 2410.0:
+            response.wear = tuple(copy.copy(one) for one in response.wear)
+            for one in response.wear:
+                object.__setattr__(one, "volume_rate", 0.0)
+            response.amplitude_mean_dynamic *= 0.5
+        return response
+
+    monkeypatch.setattr(fast, "simulate", one_wears)
+    rates = [
+        life(study(hours=1.0, dwell=dwell)).depth_rate[0, 1] for dwell in ("uniform", "peak", (1.0, 0.0), (1.0, 3.0))
+    ]
+    assert rates == pytest.approx([rates[1] / 2, GAP / HOURS / 2, rates[1], rates[1] / 4])
+
+
+def test_failed_runs_damp_nothing_and_are_reported(found):
+    record, _ = found(study(hours=10.0), status=Status.DIVERGED)
+    assert record.trouble == record.runs and record.reduction == pytest.approx(0.0)
+    unsure, _ = found(study(hours=10.0), status=Status.UNCERTAIN)
+    assert unsure.trouble == unsure.runs and unsure.reduction[0] == pytest.approx(0.7)
+
+
+def test_resumes_after_an_interrupt_at_any_run(monkeypatch, tmp_path):
+    case, kept = study(), tmp_path / "life.h5.partial"
+    monkeypatch.setattr(fast, "simulate", Damper())
+    whole = life(case)
+    for fail in (1, 2, 7, 20):
+        monkeypatch.setattr(fast, "simulate", stopped := Damper(fail=fail))
+        with pytest.raises(KeyboardInterrupt):
+            life(case, checkpoint=kept)
+        monkeypatch.setattr(fast, "simulate", rest := Damper())
+        record = life(case, checkpoint=kept)
+        assert stopped.calls - 1 + rest.calls == whole.runs
+        assert record.hours == whole.hours and np.array_equal(record.gap, whole.gap)
+        kept.unlink()
+    monkeypatch.setattr(fast, "simulate", Damper(fail=9))
+    with pytest.raises(KeyboardInterrupt):
+        life(case, checkpoint=kept)
+    with pytest.raises(InputError, match="checkpoint of another study"):
+        life(study(threshold=0.4), checkpoint=kept)
+
+
+def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(fast, "simulate", Damper())
+    monkeypatch.setattr(command, "compile_engine", lambda *_: None)
+    path, out = tmp_path / "life.toml", tmp_path / "life.h5"
+    path.write_text(tomli_w.dumps(SCENE))
+    assert main(["life", str(path), "-o", str(out), "--workers", "1", "--json", str(tmp_path / "life.json")]) == 0
+    told = capsys.readouterr().out
+    record = LifeRecord.load(out)
+    assert record.sentence in told and "reduction, %" in told
+    assert not list(tmp_path.glob("*.partial"))
+    data = json.loads((tmp_path / "life.json").read_text())
+    assert data["hours"] == pytest.approx(list(record.hours))
+    assert [one["side"] for one in data["contacts"]] == ["floor", "left", "right"]
+    assert main(["info", str(out)]) == 0
+    assert record.sentence in capsys.readouterr().out
+    assert main(["report", str(out), "-o", str(tmp_path / "page.html")]) == 0
+    page = (tmp_path / "page.html").read_text()
+    assert record.sentence[1:] in page and "left of body 0" in page
+    figure = life_figure(record)
+    curves = {trace.name: trace for trace in figure.data if trace.name}
+    assert np.allclose(curves["reduction"].y, 100 * record.reduction)
+
+
+def test_the_body_loses_its_share(found):
+    data = copy.deepcopy(SCENE)
+    data["wear"] |= {"width": 0.01, "length": 0.005, "height": 0.005}
+    record, _ = found(LifeStudy.of(data))
+    volume = record.depth[-1] * 5e-5
+    assert record.lost[-1, 0] == pytest.approx(0.5 * volume.sum() / (0.01 * 0.005 * 0.005))
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "said"),
+    [
+        ("wear", {"rate": -1e-14}, "wear.rate"),
+        ("wear", {"rate": None, "coefficient": 1e-4}, "hardness: missing"),
+        ("wear", {"rate": None, "hardness": 2e9}, "coefficient: missing"),
+        ("wear", {"coefficient": 1e-4, "hardness": 2e9}, "give one of rate"),
+        ("wear", {"rate": None, "coefficient": -1e-4, "hardness": 2e9}, "wear.coefficient"),
+        ("wear", {"rate": None, "impact_rate": None}, "nothing wears"),
+        ("wear", {"impact_exponent": 0.0}, "wear.impact_exponent"),
+        ("wear", {"share": 1.5}, "wear.share"),
+        ("wear", {"pair": [{"rate": 1e-14}]}, "damper, side: both missing"),
+        ("wear", {"pair": [{"side": "flor", "rate": 1e-14}]}, "side"),
+        ("life", {"threshold": 1.0}, "life.threshold"),
+        ("life", {"threshold": -0.1}, "life.threshold"),
+        ("life", {"hours": 0.0}, "life.hours"),
+        ("life", {"dwell": [1.0]}, "1 weights for 2 points"),
+        ("life", {"dwell": [0.0, 0.0]}, "all weights are 0"),
+        ("life", {"band": None}, "life.band: missing"),
+        ("structure", {"model": "prescribed"}, "structure"),
+        ("solver", {"method": "moreau"}, "exact"),
+        (None, {"wear": None}, "wear: missing"),
+        (None, {"life": None}, "life"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, table, change, said):
+    data = copy.deepcopy(SCENE)
+    if table == "structure":
+        data["structure"] = {"model": "prescribed", "displacement_amplitude": 1e-5}
+        data["excitation"] = {"frequency": 2412.0}
+    else:
+        part = data if table is None else data.setdefault(table, {})
+        for key, value in change.items():
+            if value is None:
+                part.pop(key, None)
+            else:
+                part[key] = value
+    path = tmp_path / "life.toml"
+    path.write_text(tomli_w.dumps(data))
+    assert main(["life", str(path)]) == BAD_INPUT
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1 and said in told.err and not told.out
+
+
+def test_a_patch_that_is_not_known_is_asked_for(monkeypatch):
+    data = copy.deepcopy(SCENE)
+    del data["wear"]["area"]
+
+    class Bare(Damper):
+        def __call__(self, scene):
+            response = super().__call__(scene)
+            for one in response.wear:
+                object.__setattr__(one, "area", None)
+            return response
+
+    monkeypatch.setattr(fast, "simulate", Bare())
+    with pytest.raises(InputError, match=r"wear.width: the patch of damper 0 at left is not known; give wear.width"):
+        life(LifeStudy.of(data))
+
+
+# the engine
+
+RESTITUTION, LIGHT = 0.7, 1e-7
+
+
+def impact_speed(gap, amplitude, omega):
+    """Relative speed of both impacts per period of a light body between walls that move by a sine (Theurich and Krack).
+
+    Its path is a triangle of the amplitude theta G, G half the gap: it meets walls at 4 omega theta G/(pi (1 + e)).
+    """
+    rho = 2 / np.pi * (1 - RESTITUTION) / (1 + RESTITUTION)
+    half = gap / 2
+    theta = (1 + np.sqrt((1 + rho**2) * (amplitude / half) ** 2 - rho**2)) / (1 + rho**2)
+    return 4 * omega * theta * half / (np.pi * (1 + RESTITUTION))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_a_gap_whose_impacts_follow_the_1_to_1_regime(exponent):
+    """Against its own equation: two impacts per period, whose speed is known as a function of the gap."""
+    amplitude, frequency, area, gap = 1e-5, 100.0, 1e-6, 3.2e-5
+    omega, hours = 2 * np.pi * frequency, 2000.0
+    hourly = 2 * frequency * 3600
+
+    def energies(gap):
+        return (0.5 * LIGHT * impact_speed(gap, amplitude, omega) ** 2) ** exponent
+
+    rate = 1e-8 * area / (hourly * energies(gap))  # as new, 10 nm/h
+    stiffness, ratio = 4 * omega**2, 0.05
+    force = amplitude * abs(stiffness - omega**2 + 2j * ratio * np.sqrt(stiffness) * omega)
+    case = LifeStudy.of({
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": stiffness, "damping_ratio": ratio},
+        "excitation": {"frequency": frequency, "force": float(force)}, "gravity": {"acceleration": 0.0},
+        "cavity": [{"name": "c", "gap": gap}],
+        "damper": [{"cavity": "c", "mass": LIGHT, "restitution": RESTITUTION, "velocity": 0.01}],
+        "wear": {"impact_rate": rate, "impact_exponent": exponent, "area": area},
+        "time": {"periods": 200, "transient": 160},
+        "life": {"band": [frequency], "hours": hours, "tolerance": 1e-3, "reach": 0.5},
+    })  # fmt: skip
+    record = life(case)
+    exact = solve_ivp(
+        lambda _, y: hourly * rate / area * energies(y), (0.0, hours), [gap], rtol=1e-10, atol=1e-16, t_eval=record.time
+    ).y[0]
+    assert record.gap[-1, 0] > 1.4 * gap
+    off = np.abs(record.gap[:, 0] - exact)
+    assert np.all(off <= record.gap_band[:, 0] + 1e-6 * exact)  # the light body moves the structure by 1e-7
+    assert record.gap_band[-1, 0] < 2e-3 * exact[-1]
+    assert record.hours[0] == 0.0  # so light a body damps nothing

@@ -1,0 +1,54 @@
+"""Figures of strength: what they show, by their lines and labels."""
+
+import math
+
+import numpy as np
+
+from vanedamp.coupling.strength.material import Fatigue
+from vanedamp.studies.report.strength_charts import SpotLife, SpotPoint, haigh_figure, lives_figure
+
+GOODMAN = Fatigue(strength=4e8, tensile_strength=1e9, yield_strength=8e8, exponent=8.0, knee=1e7, scatter=4.0)
+GERBER = Fatigue(strength=3e8, tensile_strength=9e8, mean_stress="gerber")
+
+
+def titles(figure):
+    return figure.layout.xaxis.title.text, figure.layout.yaxis.title.text
+
+
+def labels(figure):
+    return [text for trace in figure.data for text in trace.text or ()]
+
+
+def test_haigh_diagram_in_mpa():
+    points = [
+        SpotPoint("hot1", 1.2e8, 4e8, GOODMAN.completed(None)),
+        SpotPoint("hot2", 3e8, -2e8, GOODMAN.completed(None)),
+        SpotPoint("hot3", 1e8, 1e9, GERBER),
+    ]
+    figure = haigh_figure(points)
+    assert titles(figure) == ("mean stress, MPa", "stress amplitude, MPa")
+    assert labels(figure) == ["hot1: 0.50", "hot2: 0.75", "hot3: beyond the line"]
+    lines = {trace.name: (trace.x, trace.y) for trace in figure.data if trace.mode == "lines"}
+    assert list(lines) == ["Goodman (hot1, hot2)", "yield (hot1, hot2)", "Gerber (hot3)"]
+    for label, corners in (
+        ("Goodman (hot1, hot2)", [(-200.0, 400.0), (0.0, 400.0), (1000.0, 0.0)]),
+        ("yield (hot1, hot2)", [(0.0, 800.0), (800.0, 0.0)]),
+    ):
+        at = np.interp([x for x, _ in corners], *lines[label])
+        np.testing.assert_allclose(at, [y for _, y in corners], atol=4.0)
+
+
+def test_haigh_diagram_without_a_line():
+    figure = haigh_figure([SpotPoint("hot1", 1e8, 9e8, Fatigue(strength=4e8, mean_stress="none"))])
+    assert labels(figure) == ["hot1: 0.25"]
+    assert set(figure.data[0].y) == {400.0}
+
+
+def test_lives_with_their_scatter():
+    lives = [SpotLife("hot1", 1000.0, GOODMAN), SpotLife("hot2", math.inf, GOODMAN), SpotLife("hot3", 0.0, GOODMAN)]
+    figure = lives_figure(lives, "starts")
+    assert titles(figure) == ("life, starts (median; bars from 10 % to 90 % failure)", "hot spot")
+    (bar,) = figure.data
+    np.testing.assert_allclose([bar.x[0] - bar.error_x.arrayminus[0], bar.x[0] + bar.error_x.array[0]], [500, 2000])
+    assert [note.text for note in figure.layout.annotations] == ["no damage", "fails at once"]
+    assert figure.layout.yaxis.categoryarray == ("hot3", "hot2", "hot1")
