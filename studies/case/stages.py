@@ -295,8 +295,8 @@ class ModalAnalysis:
             }
         if self.first_bending is not None and self.functional is not None and self.rigid is not None:
             shape = self.modes.shapes[self.first_bending]
-            stress = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
-            variables["von_mises"] = Variable(stress, ("node",), "Pa/m")
+            field = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
+            variables["von_mises"] = Variable(field, ("node",), "Pa/m")
         if self.fatigue is not None:
             stress, places, groups = zip(*self.fatigue.peaks, strict=True)
             variables |= {

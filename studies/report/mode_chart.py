@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
+from scipy.spatial import cKDTree
 
 from vanedamp.studies.report.charts import FONT
 
@@ -16,6 +17,7 @@ _MOST_MODES = 12
 _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
+_NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
 _EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -147,7 +149,7 @@ def _dressed(figure: go.Figure, view: np.ndarray) -> go.Figure:
     )  # fmt: skip
 
 
-def stress_figure(
+def spots_figure(
     values: Mapping[str, np.ndarray], of: Surface, mode: int, spots: Mapping[str, Mapping[str, Any]]
 ) -> go.Figure:
     """Draw the structure at rest, in mm, coloured by the mode's von Mises stress, and hot spots on it.
@@ -168,11 +170,12 @@ def stress_figure(
         marker={"size": 6, "color": "#dc2626", "line": {"color": "#fff", "width": 1}}, textposition="top center",
         hovertemplate="%{text}: %{x:.2f}, %{y:.2f}, %{z:.2f} mm<extra></extra>",
     )  # fmt: skip
+    near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
     shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
-    return _dressed(figure, viewpoint(points, shape))
+    return _dressed(figure, viewpoint(points, np.where(near[:, None], shape, 0.0)))
 
 
-def stress_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
+def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
     """Yield x, y, z (m) and von Mises stress per displacement (Pa/m) at the nodes of the surface."""
     yield from np.column_stack([values["coordinates"][of.nodes], values["von_mises"][of.nodes]]).tolist()
 

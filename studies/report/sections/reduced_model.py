@@ -10,7 +10,7 @@ from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.hot_spots import spot_lines
 from vanedamp.studies.report.charts import Chart
-from vanedamp.studies.report.mode_chart import small_surface, stress_figure, stress_rows
+from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
@@ -58,6 +58,6 @@ def _picture(file: str, model: ReducedModel, spots: Mapping[str, Mapping[str, An
         same = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
         surface = small_surface(values) if same and "von_mises" in values else None
         if surface is not None:
-            figure = stress_figure(values, surface, int(attributes["first_bending"]), spots)
-            return page.chart("stress", figure, ("x", "y", "z", "stress"), stress_rows(values, surface), [file, modes])
+            figure = spots_figure(values, surface, int(attributes["first_bending"]), spots)
+            return page.chart("spots", figure, ("x", "y", "z", "stress"), spots_rows(values, surface), [file, modes])
     return None
