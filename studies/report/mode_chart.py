@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,15 +85,14 @@ def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
     return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
 
 
-def viewpoint(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
     """Return the direction (3,), of unit length, from which a mode's shape (n, 3) at points (n, 3) is best seen.
 
-    Of directions around z, a little above the horizon, that from which most of the motion is in sight, and across the
-    view: nothing that stands still hides it.
+    Of directions around z, at elevations above the horizon in degrees, that from which most of the motion is in sight,
+    and across the view: nothing that stands still hides it.
     """
-    angles = np.radians(_AZIMUTHS)
-    level, above = np.cos(np.radians(_ELEVATION)), np.sin(np.radians(_ELEVATION))
-    views = np.column_stack([level * np.cos(angles), level * np.sin(angles), np.full(len(angles), above)])
+    above, angles = (grid.ravel() for grid in np.meshgrid(np.radians(elevations), np.radians(_AZIMUTHS), indexing="ij"))
+    views = np.column_stack([np.cos(above) * np.cos(angles), np.cos(above) * np.sin(angles), np.sin(above)])
     scores = [_in_sight(points, shape, view) for view in views]
     # of views as good as each other, the first, whatever the last bit says
     best = int(np.flatnonzero(np.array(scores) >= 0.99 * max(scores))[0])
@@ -172,7 +171,7 @@ def spots_figure(
     )  # fmt: skip
     near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
     shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
-    return _dressed(figure, viewpoint(points, np.where(near[:, None], shape, 0.0)))
+    return _dressed(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
 
 
 def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
