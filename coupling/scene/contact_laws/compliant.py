@@ -113,10 +113,10 @@ def damping_ratio(restitution: float) -> float:
 
 
 def peak_over_mean(restitution: float) -> float:
-    """Return the largest force of a collision over its mean, impulse by duration; pi/2 without a dashpot.
+    """Return the largest force of a collision over the mean one, its impulse by its duration.
 
-    With sin a the damping ratio, m v omega exp(-(pi/2 - 3 a) tan a) after a while, or that of the dashpot at once from
-    a ratio of 1/2 on. Restitutions beyond 1 and below 1e-6 count as these.
+    With sin a the damping ratio it is m v omega exp(-(pi/2 - 3 a) tan a), or, from a ratio of 1/2 on, the dashpot's at
+    the first moment. Restitutions beyond 1 and below 1e-6 count as these.
     """
     left = min(max(restitution, 1e-6), 1.0)
     ratio = damping_ratio(left)
