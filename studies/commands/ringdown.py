@@ -13,6 +13,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
+from vanedamp.studies.commands.support.spots import strength_lines
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
@@ -51,6 +52,7 @@ def _summary(result: RingDown) -> Iterator[str]:
             f"{cycles.time[k]:12.6g} {cycles.amplitude[k]:14.6g} {frequency:14.8g} {cycles.damping_ratio[k]:14.6g} "
             f"{cycles.damping_ratio_energy[k]:12.6g}"
         )
+    yield from strength_lines(result.strength)
     if result.rest_time is not None:
         place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))
         yield f"at rest from {result.rest_time:.6g} s on, at {place:.6g} m"
