@@ -28,3 +28,14 @@ def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
             unit, factor = _UNITS.get(cause, _MPA)
             parts.append(f"{cause} {von_mises(np.array(values)) * factor:.4g} {unit}")
         yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
+
+
+def strength_lines(strengths: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a line for each hot spot with the strength of a motion that happens now and then (strength.assessment)."""
+    for name, found in strengths.items():
+        line = f"{name}: {found['amplitude'] / 1e6:.4g} MPa, utilisation {found['utilisation']:.3g}"
+        for kind, of in (("life_starts", "starts"), ("life_repeats", "times")):
+            if kind in found:
+                line += f", damage {found['damage']:.3g}: median life {found[kind]['50%']:.3g} {of}"
+                break
+        yield line

@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.coupling.response.spot_stress import MEASURES, SpotStress
 from vanedamp.rom.recovery import von_mises
 
-__all__ = ["MEASURES", "PeriodStress", "SpotStress", "StressSeries", "period_stress", "scalar_stresses", "signs"]
+__all__ = ["MEASURES", "PeriodStress", "SpotStress", "period_stress", "scalar_stresses", "signs"]
 
 _TINY = float(np.finfo(float).tiny)
 #: of a product of two symmetric tensors by their six components
@@ -70,36 +70,6 @@ def period_stress(stress: np.ndarray, each: int) -> PeriodStress:
     values = np.concatenate([about, sign * scalars])
     amplitude = 0.5 * (_tops(values, each) + _tops(-values, each))
     return PeriodStress(np.moveaxis(amplitude, (0, 1, 2), (2, 1, 0)), np.moveaxis(mean, -1, 0))
-
-
-class StressSeries:
-    """Takes the samples of stress (s, 6, each), Pa, period by period."""
-
-    #: periods that are evaluated together
-    _TOGETHER = 100
-
-    def __init__(self, each: int) -> None:
-        self.each = each
-        self._waiting, self._amplitudes = list[np.ndarray](), list[np.ndarray]()
-
-    def add(self, stress: np.ndarray) -> None:
-        """Take the next period."""
-        self._waiting.append(stress)
-        if len(self._waiting) > self._TOGETHER:
-            self._evaluate()
-
-    def amplitudes(self) -> np.ndarray:
-        """Return the amplitudes (p, s, 8) of MEASURES of all periods, of which there is at least one."""
-        self._evaluate()
-        return np.concatenate(self._amplitudes)
-
-    def _evaluate(self) -> None:
-        if not self._waiting:
-            return
-        stress = np.concatenate(self._waiting, axis=-1)
-        padded = np.concatenate([stress[..., :1], stress, stress[..., -1:]], axis=-1)
-        self._amplitudes.append(period_stress(padded, self.each).amplitude)
-        self._waiting.clear()
 
 
 def every_other(stress: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
-from vanedamp.coupling.strength.stress import StressSeries
+from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble, at_frequency
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (
@@ -170,9 +170,10 @@ class _Run:
         ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
         self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
-        self.spots, self.stress = spots_of(scene), StressSeries(0)
+        self.spots, self.stress = spots_of(scene), None
         if self.spots is not None:
-            self.stress.each = max(samples_of(end, assemble(end), self.spots) for end in ends)
+            each = max(samples_of(end, assemble(end), self.spots) for end in ends)
+            self.stress = StressSeries(self.spots, each)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
         # the energies without the work of the rotation, which is counted apart
         self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
@@ -204,7 +205,8 @@ class _Run:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
         solver: Any = self.scene.solver
         scene, system = self.scene, self.system
-        records = new_records(system, 1, self.stress.each, self.spots is not None, self.deflected)
+        each = 0 if self.stress is None else self.stress.each
+        records = new_records(system, 1, each, self.stress is not None, self.deflected)
         left = solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)
@@ -226,7 +228,7 @@ class _Run:
         self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
         self.ledger[k + 1, STORED] -= self.rotation
         self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
-        if self.spots is not None:
+        if self.spots is not None and self.stress is not None:
             self.stress.add(self.spots.stress(records.coordinates))
         self.dynamic[k] = about_mean(records, 0, 1, self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
@@ -255,8 +257,14 @@ class _Run:
             stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
             velocity=frozen(self.section[: p + 1, 1]),
             energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
-            stress=None if self.spots is None or not p else frozen(self.stress.amplitudes()),
+            **self._of_spots(),
         )  # fmt: skip
+
+    def _of_spots(self) -> dict[str, Any]:
+        """Return stress and strength of the periods done; the mean stress is that of the speed where it is largest."""
+        if self.spots is None or self.stress is None or not self.done:
+            return {}
+        return {"stress": frozen(self.stress.amplitudes()), "strength": self.stress.strengths([self.spots])}
 
 
 def _square(values: np.ndarray) -> float:

@@ -24,7 +24,7 @@ from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
-from vanedamp.coupling.strength.stress import StressSeries
+from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
@@ -43,7 +43,7 @@ _STILL = 1e-12
 #: the motion after a steady response that ended early
 _NO_MOTION: dict[str, Any] = {
     **dict.fromkeys(("time", "displacement", "energy", "structure_energy"), frozen(())), "impacts": frozen((), int),
-    "rest_time": None, "energies": {}, "energy_residual": 0.0, "stress": None,
+    "rest_time": None, "energies": {}, "energy_residual": 0.0,
 }  # fmt: skip
 
 
@@ -156,18 +156,18 @@ def _free_motion(
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
-    stress = None
+    of_spots: dict[str, Any] = {}
     if spots is not None and outcome.periods:
-        series = StressSeries(each)
+        series = StressSeries(spots, each)
         for samples in np.split(records.coordinates[: outcome.periods * each], outcome.periods):
             series.add(spots.stress(samples))
-        stress = frozen(series.amplitudes())
+        of_spots = {"stress": frozen(series.amplitudes()), "strength": series.strengths()}
     ledger = outcome.records.ledger[: outcome.periods + 1]
     parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
     return response.status, {
         "time": frozen(moments), "displacement": frozen(system.response[mode] * coordinate), "energy": frozen(energy),
         "structure_energy": frozen(structure), "impacts": frozen(np.diff(np.searchsorted(hit, moments)), int),
-        "stress": stress,
+        **of_spots,
         "rest_time": None if turning.rest is None else turning.rest.time,
         "energies": dict(zip(PARTS, map(float, parts), strict=True)), "energy_residual": response.energy_residual,
     }  # fmt: skip

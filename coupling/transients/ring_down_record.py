@@ -54,6 +54,7 @@ class RingDown(SceneRecord, Plotted):
     drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
     stress              (p, s, 8) Pa, amplitudes of stress in each of p periods of `duration` at s hot spots, by
                         response.spot_stress.MEASURES; None without any
+    strength            utilisation and damage of the motion, by hot spot (strength.assessment)
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """
 
@@ -77,6 +78,7 @@ class RingDown(SceneRecord, Plotted):
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     stress: np.ndarray | None = None
+    strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def table(self) -> RingDownTable:
@@ -138,6 +140,8 @@ class RingDown(SceneRecord, Plotted):
             }
         if self.table.bins:
             data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
+        if self.strength:
+            data["strength"] = {spot: dict(values) for spot, values in self.strength.items()}
         for name in ("estimate", "advice"):
             if (value := getattr(self, name)) is not None:
                 data[name] = value
@@ -180,6 +184,7 @@ class RingDown(SceneRecord, Plotted):
             "energies": self.energies, "energy_residual": self.energy_residual, "wall_time_s": self.wall_time_s,
         }  # fmt: skip
         open_ = {name: getattr(self, name) for name in ("rest_time", "drive", "estimate", "advice")}
+        attributes |= {"strength": dict(self.strength)} if self.strength else {}
         return attributes | {name: value for name, value in open_.items() if value is not None}
 
     @classmethod
@@ -189,6 +194,7 @@ class RingDown(SceneRecord, Plotted):
         given |= {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
         given |= {name: float(attributes[name]) for name in ("duration", "energy_residual", "wall_time_s")}
         given |= {name: json.loads(attributes.get(name, "null")) for name in ("drive", "estimate", "advice")}
+        given["strength"] = json.loads(attributes.get("strength", "{}"))
         linear, energies = (json.loads(attributes[name]) for name in ("linear", "energies"))
         return cls(
             status=Status(attributes["status"]), linear=LinearMode(**linear), impacts=frozen(values["impacts"], int),

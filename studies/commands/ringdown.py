@@ -14,6 +14,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
+from vanedamp.studies.commands.support.spots import strength_lines
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
@@ -56,6 +57,7 @@ def _summary(result: RingDown) -> Iterator[str]:
         begin, end = 1e-6 * result.stress[[0, -1], :, MEASURES.index("von_mises")]
         for spot, first, last in zip(result.provenance["hot_spots"], begin, end, strict=True):
             yield f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
+    yield from strength_lines(result.strength)
     if result.rest_time is not None:
         place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))
         yield f"at rest from {result.rest_time:.6g} s on, at {place:.6g} m"
