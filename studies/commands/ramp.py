@@ -14,7 +14,7 @@ from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
-from vanedamp.studies.commands.support.spots import strength_lines
+from vanedamp.studies.hot_spots import strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 

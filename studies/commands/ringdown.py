@@ -14,8 +14,8 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
-from vanedamp.studies.commands.support.spots import strength_lines
 from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.hot_spots import strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
