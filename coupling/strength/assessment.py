@@ -11,9 +11,10 @@ import numpy as np
 from vanedamp.coupling.response.spot_stress import SCALARS, SpotStress
 from vanedamp.coupling.strength.counting import Cycles
 from vanedamp.coupling.strength.haigh import equivalent_amplitude, utilisation, yield_utilisation
-from vanedamp.coupling.strength.life import damage, hours, quantiles
+from vanedamp.coupling.strength.life import damage, hours, quantiles, starts
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.multiaxial import largest_principal, signed_von_mises
+from vanedamp.coupling.strength.spectral import Moments, dirlik_damage, narrow_band_damage
 from vanedamp.files.toml_input import validate
 
 
@@ -28,13 +29,15 @@ def assessed(
     amplitudes: Mapping[str, float],
     static: np.ndarray,
     cycles: Cycles | None = None,
-    duration: float = 0.0,
+    duration: float | None = None,
 ) -> dict[str, Any]:
     """Return utilisation and life at a hot spot as plain data, Pa.
 
     amplitudes: by criterion, "von_mises" and "principal"; those with "_max", if there are any, give "utilisation_max"
     static: (6,) stress about which the motion vibrates; the criterion's number of it is the mean stress
-    cycles: counted about it over a duration, s; without them, or without a curve, there is no life
+    cycles: counted about it; without them, or without a curve, there is no life
+    duration: of what is counted, s, if it goes on so: then the life is "life_hours"; None: of a motion that happens now
+    and then, whose life is "life_repeats", how often
     """
     mean = mean_stress(fatigue, static)
     amplitude = amplitudes[fatigue.criterion]
@@ -48,24 +51,38 @@ def assessed(
     if (used := yield_utilisation(amplitude, mean, fatigue)) is not None:
         found["yield_utilisation"] = float(used)
     if cycles is not None and fatigue.exponent is not None:
-        total = damage(cycles, fatigue, mean)
-        median = hours(total, duration)
-        found["damage"] = total
-        found["damage_per_hour"] = 3600.0 * total / duration
-        found["life_hours"] = quantiles(median, fatigue)
+        found["damage"] = total = damage(cycles, fatigue, mean)
+        if duration is None:
+            found["life_repeats"] = quantiles(starts(total), fatigue)
+        else:
+            found["damage_per_hour"] = 3600.0 * total / duration
+            found["life_hours"] = quantiles(hours(total, duration), fatigue)
     return found
 
 
-def with_strength(stress: SpotStress, material: Fatigue | None, cycles: Cycles | None, duration: float) -> SpotStress:
+def with_strength(
+    stress: SpotStress,
+    material: Fatigue | None,
+    cycles: Cycles | None,
+    noise: Mapping[str, Moments],
+    duration: float,
+) -> SpotStress:
     """Return the stress of a spot with utilisation and life; cycles: counted over a duration, s.
 
-    Where static stresses are not known ("mean_known"), the mean stress is that of the motion.
+    Where static stresses are not known ("mean_known"), the mean stress is that of the motion. noise: spectral moments
+    of von Mises stress, by linear curve, whose damages per hour "noise" has.
     """
     if material is None:
         return stress
     amplitudes = {f"{name}{of}": getattr(stress, f"{name}{of}") for name in SCALARS for of in ("", "_max")}
     static = stress.mean if stress.static is None else stress.static
     found = {"mean_known": stress.static is not None} | assessed(material, amplitudes, static, cycles, duration)
+    if noise and material.exponent is not None:
+        rules = {"narrow_band": narrow_band_damage, "dirlik": dirlik_damage}
+        found["noise"] = {
+            curve: {f"{name}_per_hour": rule(of, 3600.0, material, found["mean"]) for name, rule in rules.items()}
+            for curve, of in noise.items()
+        }
     return replace(stress, strength=found)
 
 

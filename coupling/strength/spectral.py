@@ -102,6 +102,8 @@ def narrow_band_damage(found: Moments, duration: float, fatigue: Fatigue, mean: 
     With one exponent it is the closed form above. With a knee each side has its incomplete gamma function. Source:
     Miles (1954).
     """
+    if not found.l0 > 0.0:
+        return 0.0
     return found.crossings * duration * _rayleigh_damage(math.sqrt(found.l0), fatigue, mean)
 
 
@@ -111,7 +113,7 @@ def dirlik_damage(found: Moments, duration: float, fatigue: Fatigue, mean: float
     Source: Dirlik, Application of computers in fatigue analysis (thesis, Warwick 1985): an exponential and two Rayleigh
     densities of the amplitude over the standard deviation, fitted to simulated histories.
     """
-    irregularity = found.irregularity
+    irregularity = found.irregularity if found.l0 > 0.0 else 1.0
     if 1.0 - irregularity < _NARROW:
         return narrow_band_damage(found, duration, fatigue, mean)
     deviation = math.sqrt(found.l0)

@@ -22,11 +22,13 @@ from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.spot_stress import LINEAR, MEASURES, SCALARS, SpotStress, named
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.strength.assessment import with_strength
 from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spot_history import SpotHistories
 from vanedamp.coupling.strength.spots import Spots, samples_of, spots_of
 from vanedamp.coupling.strength.stress import PeriodStress, every_other, period_stress
+from vanedamp.coupling.strength.stress_spectrum import linear_moments
 from vanedamp.coupling.system.system import System
 
 #: fields of the records with a row for every sample
@@ -105,7 +107,10 @@ class StressWatch:
         found = spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
         repeats, duration = response.classification != "non-periodic", len(whole.mean) * self._period
         counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(found))]
-        return tuple(with_strength(*each, duration) for each in zip(found, self.spots.materials, counted, strict=True))
+        noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
+        spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(found))]
+        materials = self.spots.materials
+        return tuple(with_strength(*each, duration) for each in zip(found, materials, counted, spectra, strict=True))
 
     def _take(self, done: int) -> None:
         """Take the stress of the periods up to `done`, and give their samples back."""

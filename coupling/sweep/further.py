@@ -1,5 +1,5 @@
 """What a sweep keeps of a point besides its measures: Poincare sections and Lyapunov exponents if its table asks for
-them, and stresses of a model with hot spots."""
+them, stresses of a model with hot spots, and wear."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.exponents.lyapunov import Motion, lyapunov
+from vanedamp.coupling.response.contact_work import ContactWear
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.spot_stress import LINEAR, SCALARS, SpotStress
 from vanedamp.coupling.scene.scene import Scene
@@ -33,6 +34,9 @@ STRESSES = {
     **{f"stress_{name}{of}": "Pa" for name in SCALARS for of in ("", "_max", *(f"_{curve}" for curve in LINEAR))},
     "stress_amplitude": "Pa", "stress_static": "Pa", **STRENGTHS,
 }  # fmt: skip
+#: wear of a scene with [wear] and its units, each an array over the grid: largest depth rate of a contact, volume and
+#: work rate of all contacts
+WEARS = {"wear_depth_rate": "m/h", "wear_volume_rate": "m^3/h", "wear_work_rate": "W"}
 _OF_COMPONENTS = ("stress_amplitude", "stress_static")
 _WIDTH = len(STRESSES) + (len(COMPONENTS) - 1) * len(_OF_COMPONENTS)
 
@@ -57,6 +61,22 @@ def _columns(spot: SpotStress) -> list[float]:
         columns += [(getattr(spot, curve) or {name: np.nan})[name] for curve in LINEAR]
     static = np.full(len(COMPONENTS), np.nan) if spot.static is None else spot.static
     return [*columns, *spot.amplitude.values(), *static, *(spot.strength.get(name, np.nan) for name in STRENGTHS)]
+
+
+def put_wear(row: np.ndarray, found: Sequence[ContactWear] | None) -> None:
+    """Put the wear of a run into a row."""
+    if found:
+        depths = [contact.depth_rate for contact in found if contact.depth_rate is not None]
+        row[:] = (
+            max(depths, default=np.nan), sum(contact.volume_rate for contact in found),
+            sum(contact.work_rate for contact in found),
+        )  # fmt: skip
+
+
+def wear_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the wear of a grid from the columns (points, n) of its points."""
+    if values.shape[1]:
+        yield from ((name, frozen(column.reshape(shape))) for name, column in zip(WEARS, values.T, strict=True))
 
 
 def stresses_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:

@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WEARS, WORDS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Plotted, html_table
@@ -24,9 +24,12 @@ PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
-_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES
+_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES | WEARS
 #: columns of the table in a notebook, beside the axes, and its rows
-_SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
+_SHOWN = (
+    "amplitude_mean", "amplitude_mean_dynamic", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status",
+    "classification",
+)  # fmt: skip
 _MOST_ROWS = 20
 
 
@@ -57,6 +60,8 @@ class Sweep(SceneRecord, Plotted):
                           spots (response.spot_stress): amplitudes and the largest of a period, of the linear curves
                           too, of all components, and static stress; utilisation and damage per hour, nan without data
                           of the material (strength.assessment); empty without hot spots
+    wear                  by the names of WEARS, over the grid: fastest depth rate of a contact, volume and work rate of
+                          all; empty without [wear]
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
@@ -88,6 +93,7 @@ class Sweep(SceneRecord, Plotted):
     exponents: Mapping[str, np.ndarray] = field(default_factory=dict)
     sections: Mapping[str, np.ndarray] = field(default_factory=dict)
     stress: Mapping[str, np.ndarray] = field(default_factory=dict)
+    wear: Mapping[str, np.ndarray] = field(default_factory=dict)
     peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -124,7 +130,7 @@ class Sweep(SceneRecord, Plotted):
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
         notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
-        further = {**self.in_plane, **self.exponents, **self.stress, **self.peaks}
+        further = {**self.in_plane, **self.exponents, **self.stress, **self.wear, **self.peaks}
         units = self.units() | MEASURES | {name: _FURTHER[name] for name in further}
         return (
             {"axes": axes, "units": units}
@@ -145,7 +151,8 @@ class Sweep(SceneRecord, Plotted):
             variables[name] = Variable(getattr(self, name), dims, unit)
         for name, values in self.in_plane.items():
             variables[name] = Variable(values, (*dims, "damper"), IN_PLANE[name])
-        variables |= {name: Variable(values, dims, _FURTHER[name]) for name, values in self.exponents.items()}
+        plain = {**self.exponents, **self.wear}
+        variables |= {name: Variable(values, dims, _FURTHER[name]) for name, values in plain.items()}
         for name, values in self.sections.items():
             own = (*dims, "section", "damper")
             variables[name] = Variable(values, own[: values.ndim], SECTIONS[name])
@@ -184,6 +191,7 @@ class Sweep(SceneRecord, Plotted):
             },
             sections={name: frozen(values[name]) for name in SECTIONS if name in values},
             stress={name: frozen(values[name]) for name in STRESSES if name in values},
+            wear={name: frozen(values[name]) for name in WEARS if name in values},
             **given,
         )
 

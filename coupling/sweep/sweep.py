@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of
+from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
@@ -121,6 +121,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         exponents=dict(exponents_of(parts["exponents"], grid.shape)),
         sections=dict(sections_of(parts["sections"], grid.shape, len(grid.base.damper))),
         stress=dict(stresses_of(parts["stress"], grid.shape)),
+        wear=dict(wear_of(parts["wear"], grid.shape)),
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})

@@ -21,10 +21,12 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.further import (
+    WEARS,
     exponent_width,
     put_exponents,
     put_sections,
     put_stresses,
+    put_wear,
     section_width,
     stress_width,
 )
@@ -134,11 +136,12 @@ def _status(code: int, figures: np.ndarray) -> Status:
 
 
 def parts_of(base: Scene) -> dict[str, slice]:
-    """Return the columns of a scene's points behind COLUMNS: "in_plane", "exponents", "sections" and "stress"."""
+    """Return the columns of a point behind COLUMNS: "in_plane", "exponents", "sections", "wear" and "stress"."""
     in_plane = len(IN_PLANE) * len(base.damper) if base.planar else 0
-    widths = in_plane, exponent_width(base), section_width(base), stress_width(base)
+    wear = len(WEARS) if base.wear is not None else 0
+    widths = in_plane, exponent_width(base), section_width(base), wear, stress_width(base)
     ends = np.cumsum([len(COLUMNS), *widths]).tolist()
-    names = ("in_plane", "exponents", "sections", "stress")
+    names = ("in_plane", "exponents", "sections", "wear", "stress")
     return {name: slice(*between) for name, between in zip(names, itertools.pairwise(ends), strict=True)}
 
 
@@ -225,6 +228,7 @@ def _run(
     section = np.hstack([response.section, response.slip, response.slip_velocity])
     put_sections(row[parts["sections"]], section[response.transient :])
     put_stresses(row[parts["stress"]], maker.base, response.stress)
+    put_wear(row[parts["wear"]], response.wear)
     return response.final, (response.status.value, response.classification)
 
 

@@ -198,6 +198,12 @@ def _kind_of_material(table: Any) -> str:
     )
 
 
+def without_strengths(materials: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables below [material] of a case without fatigue strengths and fatigue data."""
+    kept = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
+    return {name: {key: kept[name][key] for key in kept[name] if not key.startswith("fatigue")} for name in kept}
+
+
 def _one_kind(table: Any) -> Any:
     """Reject a table that is a material and fatigue data."""
     if isinstance(table, Mapping) and table.keys() & _MATERIAL_KEYS and (stray := table.keys() & _FATIGUE_KEYS):

@@ -13,37 +13,42 @@ import numpy as np
 from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import ListProgress, run_list
-from vanedamp.coupling.sweep.worker import COLUMNS, SweepTable
+from vanedamp.coupling.sweep.worker import SweepTable, width_of
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import tables
+from vanedamp.studies.optimisation.measures import counted
 from vanedamp.studies.optimisation.study import Study
+
+#: of a run: what counts, without bodies, excess over limits, whether it is ok
+_COLUMNS = 4
 
 
 class Checkpoint(SceneCheckpoint):
     """Runs that were asked for so far, in memory and in a file (path None: in memory only).
 
-    Each has measures (columns) and whether its status is ok, as a last column.
+    Each has what it counts by (measures.counted) and whether its status is ok, as a last column.
     """
 
-    def __init__(self, path: str | Path | None, study: Study, measures: Sequence[str], provenance: Mapping[str, Any]):
+    def __init__(self, path: str | Path | None, study: Study, provenance: Mapping[str, Any]):
         """Take up the file's runs. Raises InputError for a file of another study, or one that cannot be read."""
         of_table = {"optimise": ("study", json.loads(json.dumps(tables(study.table))))}
         super().__init__(path, "optimise-checkpoint", study.scene, provenance, of_table)
-        self._columns = [COLUMNS.index(name) for name in measures]
-        self._runs, self._asked = np.empty((0, len(measures) + 1)), 0
+        self._table = study.table
+        self._runs, self._asked = np.empty((0, _COLUMNS)), 0
         self._list: SweepTable | None = None
+        self._base = study.scene
         if (found := self.read()) is not None:
             self._runs = found[0]["runs"]
 
     def run(
         self, base: Scene, points: Sequence[Mapping[str, Any]], executor: Executor | None, progress: ListProgress
     ) -> np.ndarray:
-        """Return the measures (p, m + 1) of scenes that differ from `base` in some values (sweep.run_list)."""
+        """Return the columns (p, 4) of scenes that differ from `base` in some values (sweep.run_list)."""
         first, self._asked = self._asked, self._asked + len(points)
         if missing := points[len(self._runs[first : self._asked]) :]:
             known = len(points) - len(missing)
-            finished = SweepTable(len(missing))
-            self._list = finished
+            finished = SweepTable(len(missing), width_of(base))
+            self._list, self._base = finished, base
 
             def told(done: int) -> None:
                 self.changed()
@@ -62,6 +67,7 @@ class Checkpoint(SceneCheckpoint):
         return {"runs": Variable(runs, ("run", "column"))}, {}, f"{len(runs)} runs are finished"
 
     def _of(self, table: SweepTable) -> np.ndarray:
-        """Return the measures (p, m + 1) of a list of runs, finished or not."""
+        """Return the columns (p, 4) of a list of runs, finished or not."""
         ok = table.text("status") == "ok" if table.count else np.zeros(len(table.done))
-        return np.column_stack([table.values[:, self._columns], ok.astype(float)])
+        found = counted(self._base, self._table.measure, self._table.limits, table.values)
+        return np.column_stack([found, ok.astype(float)])

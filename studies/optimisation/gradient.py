@@ -46,7 +46,8 @@ def descend(study: Study, tried: Tried, designs: Sequence[Design]) -> tuple[Desi
     """
     names = [name for name in _PATHS if len(set(getattr(study.table.variables, name))) > 1]
     how: dict[str, Any] = {"before": None, "after": None, "steps": 0, "taken": 0, "orbits": 0, "without": {}}
-    for start in _starts(study, names, designs) if names and study.table.gradient_steps else ():
+    follows = names and study.table.gradient_steps and study.table.by_amplitude
+    for start in _starts(study, names, designs) if follows else ():
         amplitude, response = tried(start)
         if how["before"] is None:
             how |= {"before": amplitude, "after": amplitude}

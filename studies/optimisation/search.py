@@ -24,6 +24,7 @@ from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.checkpoint import Checkpoint
 from vanedamp.studies.optimisation.gradient import descend
+from vanedamp.studies.optimisation.measures import SERVICE
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
 from vanedamp.studies.optimisation.tolerances import estimate
@@ -47,13 +48,8 @@ def optimise(
     written and from which an interrupted search resumes; the caller removes it once the result is safe
     (files.checkpoint_file.clear).
     """
-    with Checkpoint(checkpoint, study, _measures(study), provenance or {}) as kept:
+    with Checkpoint(checkpoint, study, provenance or {}) as kept:
         return _optimised(study, _Trial(study, executor, progress, deviations(study), kept), dict(provenance or {}))
-
-
-def _measures(study: Study) -> tuple[str, str]:
-    """Return the columns of a run that count: with the bodies and without."""
-    return f"{study.table.measure}_dynamic", "amplitude_undamped"
 
 
 def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
@@ -75,7 +71,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     tried_designs, tried_amplitudes, tried_robust = zip(*trial.history, strict=True)
     best = {"nominal": nominal.design, "robust": robust.design}
     responses = {name: trial.response(design) for name, design in best.items()}
-    headlines = {name: trial.headline(design, responses[name][0]) for name, design in best.items()}
+    curves = best if table.by_amplitude else {}
+    headlines = {name: trial.headline(design, responses[name][0]) for name, design in curves.items()}
     with stage("derivatives by tolerances"):
         estimates = {name: estimate(study, best[name], responses[name][0], trial.sample, trial.within) for name in best}
     took = time.perf_counter() - started
@@ -147,13 +144,13 @@ class _Trial:
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
         """Return the amplitudes (f,) of a design over the reference, nan where not ok, and those without bodies."""
-        damped, undamped = self._run([design], self.sample[:1])
+        damped, undamped, _ = self._run([design], self.sample[:1])
         return damped[0, 0], undamped[0, 0]
 
     def tried(self, design: Design) -> tuple[float, np.ndarray]:
         """Return the amplitude of a design as it is, and those at the frequencies (f,), nan where a run is not ok."""
-        damped, undamped = self._run([design], self.sample[:1])
-        amplitude = float(self._judged(damped, undamped)[0])
+        damped, undamped, excess = self._run([design], self.sample[:1])
+        amplitude = float(self._judged(damped, undamped, excess)[0])
         self.history.append((design, amplitude, False))
         return amplitude, damped[0, 0]
 
@@ -212,24 +209,33 @@ class _Trial:
         """Return the amplitudes (d,) of designs within the tolerances, or as they are."""
         return self._judged(*self._run(designs, self.sample if robust else self.sample[:1]))
 
-    def _judged(self, damped: np.ndarray, undamped: np.ndarray) -> np.ndarray:
-        """Return the amplitudes (d,) of what counts of runs (d, s, f)."""
+    def _judged(self, damped: np.ndarray, undamped: np.ndarray, excess: np.ndarray) -> np.ndarray:
+        """Return the amplitudes (d,) of what counts of runs (d, s, f).
+
+        Beyond a limit a design has damped nothing, and is the worse the farther it is beyond.
+        """
         table = self.study.table
         # a design with a run that is not ok has damped nothing
         bad = np.isnan(damped)
         damped = np.where(bad, np.fmax(undamped, 1.0), damped)
         band = damped.max(axis=2) if table.over_band == "worst" else damped.mean(axis=2)
         amplitudes = band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1)
-        return np.where(bad.any(axis=(1, 2)), np.fmax(amplitudes, 1.0), amplitudes)
+        beyond = np.fmax.reduce(excess, axis=(1, 2))
+        lost = bad.any(axis=(1, 2)) | (beyond > 0.0)
+        return np.where(lost, np.fmax(amplitudes, 1.0) * (1.0 + np.fmax(beyond, 0.0)), amplitudes)
 
-    def _run(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the amplitudes (d, s, f) over the reference at the same level, with the bodies and without.
+    def _run(
+        self, designs: Sequence[Design], sample: Sequence[_Deviation]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the amplitudes (d, s, f) over the reference at the same level, with the bodies and without, and by
+        how much runs exceed their limits.
 
         nan with the bodies where a run is not ok, and without them where it is no scene.
-        """
+        """  # fmt: skip
         shape = (len(designs), len(sample), len(self.study.frequencies))
-        damped, undamped = np.zeros(shape), np.zeros(shape)
-        levels = self.study.reference * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
+        damped, undamped, excess = np.zeros((3, *shape))
+        more = [deviation["excitation"] if self.study.table.linear else 0.0 for deviation in sample]
+        levels = self.study.reference * (1 + np.array(more))[:, None]
         for count in sorted({design.bodies for design in designs}):
             places = [place for place, design in enumerate(designs) if design.bodies == count]
             points = [
@@ -238,11 +244,12 @@ class _Trial:
             ]  # fmt: skip
             run = self._kept.run(self.study.with_bodies(count), points, self._executor, self._tell)
             self.scenes += len(points)
-            ok = run[:, 2] == 1.0
+            ok = run[:, 3] == 1.0
             self.trouble += int(np.count_nonzero(~ok))
             for amplitudes, values in ((damped, np.where(ok, run[:, 0], np.nan)), (undamped, run[:, 1])):
                 amplitudes[places] = values.reshape(len(places), *shape[1:]) / levels
-        return damped, undamped
+            excess[places] = run[:, 2].reshape(len(places), *shape[1:])
+        return damped, undamped, excess
 
     def _tell(self, done: int) -> None:
         """Show progress: the runs done of the list at hand."""
@@ -267,6 +274,8 @@ def _sentence(
     study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline], scenes: int, took: float
 ) -> str:
     table = study.table
+    if not table.by_amplitude:
+        return _measured_sentence(study, nominal, robust, scenes, took)
     if table.over_band == "mean":
         of = "the mean without bodies in the band"
     elif headlines["nominal"].undamped_at_edge:
@@ -284,6 +293,23 @@ def _sentence(
         )
     remarks = dict.fromkeys(remark for headline in headlines.values() for remark in headline.remarks)
     return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
+
+
+def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum, scenes: int, took: float) -> str:
+    """Return the answer where stress, life or wear counts."""
+    table = study.table
+    of = {
+        "stress": f"of the stress without bodies ({study.reference / 1e6:.4g} MPa)",
+        "life": f"of the worst hot spot's life used in {SERVICE:g} h",
+        "wear": f"of X worn off in {SERVICE:g} h",
+    }[table.measure]
+    text = f"{_format_design(nominal.design, study)}: {nominal.amplitude:.3g} {of}, {table.over_band} of the band"
+    if asdict(table.tolerances) != NO_DEVIATION:
+        text += (
+            f"; {nominal.amplitude_tolerances:.3g} within the tolerances; robust: "
+            f"{_format_design(robust.design, study)}: {robust.amplitude:.3g}, {robust.amplitude_tolerances:.3g} within"
+        )
+    return f"{text}. {scenes} scenes in {took:.0f} s."
 
 
 def _format_design(design: Design, study: Study) -> str:

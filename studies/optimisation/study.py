@@ -24,6 +24,7 @@ from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import UNITS, Band, drive, ends, placed, reference_amplitude, scene_in
+from vanedamp.studies.optimisation.measures import SERVICE, Limits, Measure, check_measured, reference_stress
 
 #: longest transient that is proposed, in periods
 _MOST_PERIODS = 10_000_000
@@ -104,8 +105,12 @@ class Optimise(Band):
     """what the design cannot hold (default: nothing)"""
     map: Map = field(default_factory=Map)
     """map over mass ratio and gap ratio"""
-    measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
-    """amplitude of a run that counts: mean of the peaks of its periods, or largest; without static deflection"""
+    limits: Limits = field(default_factory=Limits)
+    """what designs must keep (default: nothing)"""
+    measure: Measure = "amplitude_mean"
+    """what counts of a run: "amplitude_mean", the mean of the peaks of its periods, or "amplitude_max", both without
+    static deflection; "stress", the amplitude of von Mises stress at the worst hot spot; "life", Miner's sum of the
+    worst hot spot in 10,000 h; "wear", the depth at the contact that wears fastest in 10,000 h, over X"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"
@@ -118,6 +123,16 @@ class Optimise(Band):
     """designs by gradient that follow the best one as designed, at most; 0: none"""
     seed: Annotated[Whole, Field(ge=0)] = 1
     """seed of searches and samples"""
+
+    @property
+    def by_amplitude(self) -> bool:
+        """Whether an amplitude counts, which has derivatives and a resonance curve."""
+        return self.measure in ("amplitude_mean", "amplitude_max")
+
+    @property
+    def linear(self) -> bool:
+        """Whether what counts is over that without bodies at the same level."""
+        return self.by_amplitude or self.measure == "stress"
 
 
 class Design(NamedTuple):
@@ -142,8 +157,9 @@ class Study(NamedTuple):
 
     frequencies: (f,) Hz, of the band.
     resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
-    refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
-    damped amplitudes refer. doubts: what the file may not mean.
+    refer; reference: what the measure of damped runs refers to: the undamped amplitude (m) or stress (Pa) in the band,
+    its maximum or its mean as `over_band` says; damage (1/h) of 1, or depth of wear (m/h) of X, in 10,000 h.
+    doubts: what the file may not mean.
     """
 
     scene: Scene
@@ -184,7 +200,8 @@ class Study(NamedTuple):
             _check(scene)
             _check_settled(scene, band)
             force, resonance = excitation_force(scene), chosen_resonance(scene)
-            reference = reference_amplitude(scene, band, table.over_band)
+            check_measured(scene, table.measure, table.limits)
+            reference = _reference(scene, band, table, resonance, force * resonance.flexibility)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         if force == 0.0:
@@ -258,6 +275,17 @@ class Study(NamedTuple):
             "orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
         }
         return places | drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
+
+
+def _reference(scene: Scene, band: np.ndarray, table: Optimise, resonance: Resonance, amplitude: float) -> float:
+    """Return what the measure of damped runs refers to (Study.reference)."""
+    if table.by_amplitude:
+        return reference_amplitude(scene, band, table.over_band)
+    if table.measure == "stress":
+        within = table.over_band == "worst" and band[0] <= resonance.frequency <= band[-1]
+        frequencies = [*band.tolist(), *([resonance.frequency] if within else [])]
+        return reference_stress([scene.replace(drive(scene, frequency)) for frequency in frequencies], table.over_band)
+    return (amplitude if table.measure == "wear" else 1.0) / SERVICE
 
 
 def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:

@@ -29,10 +29,11 @@ def estimate(
     worst: with every deviation at the worse end of its width; run: what runs have there; mean: over the sample; by:
     [name, what its width adds to the worst], largest first; frequency_hz: of the worst, None for the mean of a band;
     without: number of responses without derivatives, by the reason: they stay as they are. Where one that may count has
-    none, its frequency and reason only. Empty without tolerances.
+    none, its frequency and reason only. Empty without tolerances, and where
+    no amplitude counts.
     """
     widths = {name: width for name in NO_DEVIATION if (width := getattr(study.table.tolerances, name)) > 0.0}
-    if not widths:
+    if not widths or not study.table.by_amplitude:
         return {}
     whole = study.table.over_band == "mean"
     slopes, without = np.zeros((len(response), len(widths))), Counter[str]()

@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, load
 from vanedamp.files.toml_input import InputError, read_toml
-from vanedamp.studies.case.tables import Case, check_interface
+from vanedamp.studies.case.tables import Case, check_interface, without_strengths
 from vanedamp.studies.pipeline.record import Inputs, plain
 from vanedamp.studies.pipeline.tables import (
     CALIBRATION,
@@ -189,8 +189,8 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's inputs without strengths, which no reduced model depends on, and the options."""
-        return _without_level(super().inputs()) | {"option": asdict(self.table)}
+        """Return the case's inputs and the options, without strengths, which a model has with its hot spots only."""
+        return _without_level(super().inputs(), self.table.hot_spots > 0) | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
@@ -384,13 +384,16 @@ class Report(Stage):
         return f"{len(files)} results on {self.outputs[0].name}"
 
 
-def _without_level(inputs: Inputs) -> dict[str, Any]:
-    """Return the inputs of a case's stage without those of the fatigue level, which concerns no mode."""
+def _without_level(inputs: Inputs, strengths: bool = False) -> dict[str, Any]:
+    """Return the inputs of a case's stage without those of the fatigue level, which concerns no mode.
+
+    strengths: keep the strengths and fatigue data of materials.
+    """
     found = copy.deepcopy(dict(inputs))
     for tables in (data for subject, data in found.items() if subject.startswith("case ")):
         tables.pop("calibration", None)
-        for material in tables.get("material", {}).values():
-            material.pop("fatigue_strength", None)
+        if not strengths and "material" in tables:
+            tables["material"] = without_strengths(tables["material"])
     return found
 
 

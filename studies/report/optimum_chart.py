@@ -6,11 +6,14 @@ import plotly.graph_objects as go
 
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
 
+#: measures that are no amplitude, and what they refer to
+_COUNTS = {"stress": "stress", "life": "damage of 1 in 10,000 h", "wear": "depth of X worn off in 10,000 h"}
+
 
 def optimisation_figure(record: Optimisation) -> go.Figure:
     """Draw contours of the reduction over mass ratio and gap, both optima marked."""
     table = record.study["optimise"]
-    of = f"{table['over_band']} amplitude in the band"
+    of = f"{table['over_band']} {_COUNTS.get(table['measure'], 'amplitude')} in the band"
     count = record.nominal.design.bodies
     figure = go.Figure(
         go.Contour(

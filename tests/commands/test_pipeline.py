@@ -169,6 +169,27 @@ def test_a_fatigue_strength_makes_no_modes_again(tmp_path, monkeypatch):
     assert "fatigue" not in load("out/modes.h5", "modes")[1]
 
 
+def test_hot_spots_have_the_fatigue_data_of_the_case(tmp_path, monkeypatch):
+    """Data of the material make no modes again, and a model only with hot spots."""
+    monkeypatch.chdir(tmp_path)
+    data = "[material.fatigue]\nexponent = 8.0\nknee = 1e7\n[material.default]"
+    Path("case.toml").write_text(changed(CASE.split("[calibration")[0], ("[material.default]", data)))
+    Path("pipeline.toml").write_text(
+        'case = "case.toml"\nfolder = "out"\n[modal]\n[reduce]\nmodes = 3\nhot_spots = 1\n'
+    )
+    vd.pipeline("pipeline.toml")
+    spot = vd.ReducedModel.load("out/rom.h5").provenance["hot_spots"]["hot1"]
+    assert spot["fatigue"]["strength"] == 4e8 and spot["fatigue"]["exponent"] == 8.0
+    replace_in(Path("case.toml"), "exponent = 8.0", "exponent = 6.0")
+    modal, reduce = vd.pipeline("pipeline.toml").stages
+    assert modal.found.startswith("modes kept") and reduce.status == "done"
+    assert vd.ReducedModel.load("out/rom.h5").provenance["hot_spots"]["hot1"]["fatigue"]["exponent"] == 6.0
+    replace_in(Path("pipeline.toml"), "hot_spots = 1", "")
+    vd.pipeline("pipeline.toml")
+    replace_in(Path("case.toml"), "exponent = 6.0", "exponent = 5.0")
+    assert vd.pipeline("pipeline.toml").stages[1].status == "kept"
+
+
 #: by the file, the change in it, the stages that depend on it, and what is told
 CHANGES = [
     ("case.toml", "young = 2e11", "young = 2e11  # as delivered", [], ""),

@@ -30,6 +30,7 @@ from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.identification.tables import IdentificationFile
+from vanedamp.studies.life.study import LifeStudy
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.pipeline.tables import PipelineFile
 
@@ -105,6 +106,8 @@ def completed(tables: dict, folder: Path) -> dict:
         "sweep",
         "continuation",
         "optimise",
+        "life",
+        "wear",
         "orbit",
         "ramp",
         "ring_down",
@@ -120,6 +123,8 @@ def completed(tables: dict, folder: Path) -> dict:
             folder / "rom.h5"
         )
         base["excitation"]["at"] = base["cavity"][0]["floor"] = "tip"
+    if "life" in tables:
+        base["wear"] = {"rate": 1e-14}
     for name in ("material", "modes"):
         if name in base and name in tables:
             tables[name] = base[name] | tables[name]
@@ -151,6 +156,10 @@ def test_files_are_read(example, tmp_path):
         assert Scene.load(path).contact.pair is not None
     elif "optimise" in tables:
         assert Study.load(path).table.variables.bodies == (1, 4)
+    elif "life" in tables:
+        assert LifeStudy.load(path).table.threshold == 0.5
+    elif "wear" in tables:
+        assert Scene.load(path).wear is not None
     elif "orbit" in tables:
         assert Scene.load(path).orbit is not None
     elif "ramp" in tables:
@@ -177,7 +186,9 @@ def test_example_files_are_read(path, tmp_path):
     if "[mesh]" in path.read_text():
         assert Case.load(path).campbell is not None
         return
-    scene = Study.load(path).scene if "[optimise]" in path.read_text() else Scene.load(path)
+    of_study = {"[optimise]": Study, "[life]": LifeStudy}
+    load = next((kind.load for table, kind in of_study.items() if table in path.read_text()), None)
+    scene = Scene.load(path) if load is None else load(path).scene
     assert scene.damper
 
 

@@ -1,0 +1,72 @@
+"""Spectral moments of von Mises stress at hot spots: of linear responses in closed form, of runs by Welch's method."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.response.spot_stress import LINEAR
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.spectral import (
+    Moments,
+    line_moments,
+    moments,
+    spectral_density,
+    von_mises_components,
+)
+from vanedamp.coupling.strength.spots import Spots, spots_of
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.files.toml_input import InputError
+
+
+def linear_moments(scene: Scene, spots: Spots | None = None) -> dict[str, list[Moments]]:
+    """Return the moments of the structure without bodies and with every body fixed, by the names of LINEAR, per spot.
+
+    The excitation is a sum of sines of open phases, such as a multi-sine; constant loads are left out, and so is a
+    curve with a sine at a resonance without damping. spots: the scene's. Raises InputError for a scene without hot
+    spots, or another excitation.
+    """
+    spots = spots or _spots(scene)
+    if scene.excitation.signal is not None:
+        raise InputError(f'excitation.waveform: no spectrum of "{scene.excitation.signal.shape}"; take a multi-sine')
+    found = {}
+    for name, response in zip(LINEAR, linear_responses(scene), strict=True):
+        try:
+            motion = response.motion(scene.frequency)
+        except np.linalg.LinAlgError:
+            continue
+        lines = von_mises_components(np.moveaxis(spots.stress(motion), 1, 0))
+        hertz = scene.frequency * response.order
+        found[name] = [line_moments(hertz, lines[:, place].T) for place in range(len(spots.rows))]
+    return found
+
+
+def run_moments(scene: Scene, samples_per_period: int, highest_hz: float | None = None) -> list[Moments]:
+    """Return the moments of a run over its evaluated periods, per hot spot.
+
+    highest_hz: up to which the spectrum counts (default: half the sampling frequency). Impacts leave jumps of velocity,
+    whose l4 grows with that frequency. Raises InputError for a scene without hot spots, or a method that keeps no modal
+    coordinates.
+    """
+    scene = choose(scene).scene
+    spots = _spots(scene)
+    response = respond(scene, samples_per_period=samples_per_period)
+    if response.coordinates is None:
+        raise InputError(f"solver.method: {scene.solver.method} keeps no samples of modal coordinates")
+    kept = response.coordinates[response.transient * samples_per_period :]
+    stress = von_mises_components(np.moveaxis(spots.stress(kept), 1, 0))
+    rate = 1.0 / float(response.time[1] - response.time[0])
+    found = []
+    for place in range(len(spots.rows)):
+        hertz, density = spectral_density(stress[:, place], rate)
+        below = hertz <= (highest_hz or np.inf)
+        found.append(moments(hertz[below], density[below]))
+    return found
+
+
+def _spots(scene: Scene) -> Spots:
+    spots = spots_of(scene)
+    if spots is None:
+        raise InputError("structure: no hot spots; take a reduced model with them (vanedamp reduce --hot-spots 3)")
+    return spots

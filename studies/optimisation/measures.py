@@ -1,0 +1,106 @@
+"""What a design's runs count by: amplitude, stress, life or wear, and the limits that they must keep."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Literal
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.linear_stress import linear_stresses
+from vanedamp.coupling.strength.spots import Spots, spots_of
+from vanedamp.coupling.sweep.further import stresses_of, wear_of
+from vanedamp.coupling.sweep.worker import COLUMNS, parts_of
+from vanedamp.files.toml_input import STRICT, InputError, Positive
+
+Measure = Literal["amplitude_mean", "amplitude_max", "stress", "life", "wear"]
+#: hours of operation that damage and wear refer to
+SERVICE = 10_000.0
+#: place of the amplitude of von Mises stress in linear_stresses
+_VON_MISES = 6
+
+
+@dataclass(frozen=True, config=STRICT)
+class Limits:
+    """What every run of a design must keep, at all frequencies and within the tolerances."""
+
+    amplitude: Positive | None = None
+    """largest mean amplitude, without static deflection [m]"""
+    stress: Positive | None = None
+    """largest amplitude of von Mises stress at a hot spot [Pa]"""
+    utilisation: Positive | None = None
+    """largest utilisation of the fatigue strength at a hot spot, its mean stress included [-]"""
+    life: Positive | None = None
+    """shortest median life of a hot spot [h]"""
+    wear: Positive | None = None
+    """fastest growth of the depth of wear at a contact [m/h]"""
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The limits that are given, by name."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+def check_measured(scene: Scene, measure: Measure, limits: Limits) -> None:
+    """Raise InputError where runs of a scene do not have what counts or is limited."""
+    spots = spots_of(scene)
+    for name, key in [(measure, "measure"), *((name, f"limits.{name}") for name in limits.given)]:
+        if name in ("stress", "utilisation", "life") and spots is None:
+            raise InputError(
+                f'optimise.{key}: stress is that of a reduced model with hot spots; take structure.model = "rom" and '
+                "`vanedamp reduce --hot-spots 3`"
+            )
+        materials = [] if spots is None else spots.materials
+        if name == "utilisation" and None in materials:
+            raise InputError(f"optimise.{key}: a hot spot has no fatigue strength; give [material.fatigue] in the case")
+        if name == "life" and any(one is None or one.exponent is None for one in materials):
+            raise InputError(
+                f"optimise.{key}: a hot spot has no curve of stress and life; give [material.fatigue] exponent and knee"
+            )
+        if name == "wear" and scene.wear is None:
+            raise InputError(f"optimise.{key}: wear is not counted; give the scene a [wear] table")
+
+
+def reference_stress(scenes: list[Scene], over_band: str) -> float:
+    """Return the amplitude of von Mises stress without bodies, Pa: its maximum over scenes, or their mean."""
+    spots = spots_of(scenes[0])
+    assert spots is not None
+    found = np.array([_undamped(scene, spots) for scene in scenes])
+    return float(found.max() if over_band == "worst" else found.mean())
+
+
+def _undamped(scene: Scene, spots: Spots) -> float:
+    linear = linear_stresses(scene, spots)
+    if linear is None:
+        raise InputError("excitation.waveform: a stress without bodies is that of a sum of sines; give harmonics")
+    return float(linear["undamped"][:, _VON_MISES].max())
+
+
+def counted(base: Scene, measure: Measure, limits: Limits, values: np.ndarray) -> np.ndarray:
+    """Return of runs in a sweep's columns (p, c) what counts, the same without bodies, and by how much they exceed
+    their limits (p, 3): the largest relative excess, 0 within all limits. nan: not known.
+    """  # fmt: skip
+    parts = {name: values[:, columns] for name, columns in parts_of(base).items()}
+    stress = {name: found for name, found in stresses_of(parts["stress"], (len(values),)) if found.ndim == 2}
+    largest = {name: found.max(axis=1) for name, found in stress.items()}
+    wear = dict(wear_of(parts["wear"], (len(values),))).get("wear_depth_rate", np.full(len(values), np.nan))
+    amplitude = {name: values[:, COLUMNS.index(f"{name}_dynamic")] for name in ("amplitude_mean", "amplitude_max")}
+    none = np.full(len(values), np.nan)
+    damage = largest.get("damage_per_hour", none)
+    undamped = values[:, COLUMNS.index("amplitude_undamped")]
+    pairs = {
+        "amplitude_mean": (amplitude["amplitude_mean"], undamped),
+        "amplitude_max": (amplitude["amplitude_max"], undamped),
+        "stress": (largest.get("stress_von_mises", none), largest.get("stress_von_mises_undamped", none)),
+        "life": (damage, none), "wear": (wear, none),
+    }  # fmt: skip
+    used = {
+        "amplitude": amplitude["amplitude_mean"], "stress": pairs["stress"][0],
+        "utilisation": largest.get("utilisation", none), "wear": wear,
+    }  # fmt: skip
+    excess = [damage * limit if name == "life" else used[name] / limit for name, limit in limits.given.items()]
+    over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(len(values))
+    return np.column_stack([*pairs[measure], over])
