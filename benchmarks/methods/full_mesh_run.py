@@ -27,7 +27,8 @@ from vanedamp.rom.interface import Interface
 class ExplicitRun:
     """Steps in a period, CPU seconds a step, largest |x| (m) and impacts of each period.
 
-    size: free DOFs; highest: angular frequency of the mesh, rad/s.
+    size: free DOFs; highest: angular frequency of the mesh, rad/s; swing: (periods, k, 2) largest and smallest of k
+    outputs in each period.
     """
 
     steps: int
@@ -36,6 +37,7 @@ class ExplicitRun:
     impacts: np.ndarray
     size: int
     highest: float
+    swing: np.ndarray
 
     def curve_seconds(self, periods: int, frequencies: int) -> float:
         """Return the extrapolated CPU seconds of a forced response: frequencies, with periods each."""
@@ -43,13 +45,19 @@ class ExplicitRun:
 
 
 def explicit_run(
-    matrices: SystemMatrices, interface: Interface, scene: Scene, first: float, periods: int, share: float = 0.9
+    matrices: SystemMatrices,
+    interface: Interface,
+    scene: Scene,
+    first: float,
+    periods: int,
+    share: float = 0.9,
+    outputs: np.ndarray | None = None,
 ) -> ExplicitRun:
     """Run a scene of a reduced model on the mesh it was made from, from rest.
 
     One body without friction and gravity on a cavity whose walls move with its floor; compliant contact. first: angular
     frequency (rad/s) of the mode whose damping is right, as damping is in proportion to mass; share: of the stable
-    step.
+    step; outputs: (k, N) functionals of the displacements that are followed.
     Raises InputError for another scene.
     """
     if scene.excitation.distributed:
@@ -69,17 +77,20 @@ def explicit_run(
     h, load, half = 2 * math.pi / omega / steps, excitation_force(scene), scene.cavity[0].gap / 2
     start, peak = np.array([scene.damper[0].position, scene.damper[0].velocity]), np.zeros(periods)
     contact = np.array([half, system.spring[0], system.dashpot[0], scene.damper[0].mass])
+    rows = np.zeros((0, len(free))) if outputs is None else np.ascontiguousarray(outputs[:, free])
+    reach = np.flatnonzero(rows.any(axis=0))
     arrays = (stiffness.indptr, stiffness.indices, stiffness.data, mass, *_sparse(response), *_sparse(wall))
     angle = 2 * np.pi * np.arange(steps) / steps
     phase = load * sum((share * np.exp(1j * order * angle)).imag for order, share in scene.excitation.shares.items())
     impacts = np.zeros(periods, np.int64)
-    _march(*arrays, phase, h, damping, contact, start, np.zeros(0), impacts)  # compiles
+    swing, near = np.tile([-np.inf, np.inf], (periods, len(rows), 1)), np.ascontiguousarray(rows[:, reach])
+    _march(*arrays, phase, h, damping, contact, start, np.zeros(0), impacts, reach, near, swing)  # compiles
     started = time.thread_time()
-    _march(*arrays, phase, h, damping, contact, start, peak, impacts)
+    _march(*arrays, phase, h, damping, contact, start, peak, impacts, reach, near, swing)
     spent = time.thread_time() - started
     if not np.isfinite(peak).all():
         raise InputError(f"share: steps of {share} of the stable one let the motion grow without bound")
-    return ExplicitRun(steps, spent / (steps * periods), peak, impacts, len(free), highest)
+    return ExplicitRun(steps, spent / (steps * periods), peak, impacts, len(free), highest, swing)
 
 
 def lumped(matrices: SystemMatrices) -> SystemMatrices:
@@ -122,9 +133,10 @@ def _sparse(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _march(
-    pointer, column, value, mass, at, share, wall_at, wall_share, load, h, damping, contact, start, peak, impacts
-):
-    """Step over len(peak) periods from rest; sets peaks and numbers of impacts (periods,)."""
+    pointer, column, value, mass, at, share, wall_at, wall_share, load, h, damping, contact, start, peak, impacts,
+    reach, rows, swing,
+):  # fmt: skip
+    """Step over len(peak) periods from rest; sets peaks and numbers of impacts (periods,), and the rows' swing."""
     half, spring, dashpot, body = contact
     size, steps, pushed = len(mass), len(load), False
     u, v = np.zeros(size), np.zeros(size)
@@ -161,6 +173,12 @@ def _march(
             for j in range(len(at)):
                 here += share[j] * u[at[j]]
             peak[period] = max(peak[period], abs(here))
+            for k in range(len(rows)):
+                output = 0.0
+                for j in range(len(reach)):
+                    output += rows[k, j] * u[reach[j]]
+                swing[period, k, 0] = max(swing[period, k, 0], output)
+                swing[period, k, 1] = min(swing[period, k, 1], output)
 
 
 def _highest(stiffness: sparse.csr_matrix, mass: np.ndarray) -> float:

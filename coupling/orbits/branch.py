@@ -12,6 +12,7 @@ from vanedamp.coupling.orbits.border import Border, borders_of
 from vanedamp.coupling.orbits.border import variables as border_variables
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
@@ -133,7 +134,9 @@ class Branches(SceneRecord, Plotted):
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
     were found; iterations: of Newton's method; warnings: to be read before results are used; provenance: versions and
-    further data of the caller (JSON-able); borders: of special points over `second`.
+    further data of the caller (JSON-able); borders: of special points over `second`; stress: (points, s, 8) Pa,
+    amplitudes of stress at s hot spots, by response.spot_stress.MEASURES, of the points of all branches one after the
+    other; None without hot spots.
     """
 
     KIND: ClassVar[str] = "orbits"
@@ -145,6 +148,7 @@ class Branches(SceneRecord, Plotted):
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     borders: tuple[Border, ...] = ()
+    stress: np.ndarray | None = None
 
     @property
     def second(self) -> str:
@@ -208,8 +212,15 @@ class Branches(SceneRecord, Plotted):
             "special_state": Variable(states, ("special", "coordinate")),
             **{name: Variable(values, ("special",)) for name, values in of_special.items()},
             **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
+            **self._stress_variables(),
             **border_variables(self.borders, (unit, unit_of(self.second)), len(self.names)),
         }
+
+    def _stress_variables(self) -> dict[str, Variable]:
+        if self.stress is None:
+            return {}
+        dims = ("point", "hot_spot", "stress_measure")
+        return stress_axes(list(self.provenance["hot_spots"])) | {"stress": Variable(self.stress, dims, "Pa")}
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
@@ -239,5 +250,6 @@ class Branches(SceneRecord, Plotted):
             )  # fmt: skip
         return cls(
             names=tuple(values["coordinate"]), scale=frozen(values["scale"]), branches=tuple(branches),
-            iterations=int(attributes["iterations"]), borders=borders_of(values), **cls.common(attributes, path),
+            iterations=int(attributes["iterations"]), borders=borders_of(values),
+            stress=frozen(values["stress"]) if "stress" in values else None, **cls.common(attributes, path),
         )  # fmt: skip

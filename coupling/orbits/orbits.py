@@ -19,6 +19,7 @@ from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.orbit_stress import orbit_stresses
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
 from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart import at_speed_of
@@ -27,6 +28,7 @@ from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.rotation import FREQUENCY, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -109,7 +111,9 @@ def orbits(
         if borders is not None:
             points = sum(len(branch.parameter) for branch in diagram.branches)
             borders.follow(diagram.branches, lambda done, total: changed(points + done, points + total))
-    return found()
+    spots = hot_spots_in_file(search.first.structure)
+    known = replace(found(), stress=orbit_stresses(search.map, diagram.branches))
+    return replace(known, provenance=data | {"hot_spots": spots}) if spots else known
 
 
 def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> Orbit:

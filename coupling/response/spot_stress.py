@@ -102,6 +102,14 @@ def named(components: np.ndarray) -> dict[str, float]:
     return dict(zip(COMPONENTS, map(float, components), strict=False))
 
 
+def stress_axes(names: Sequence[str]) -> dict[str, Variable]:
+    """Return the variables of a file with the names along the dimensions "hot_spot" and "stress_measure"."""
+    return {
+        "hot_spot": Variable(np.array(list(names), object), ("hot_spot",)),
+        "stress_measure": Variable(np.array(MEASURES, object), ("stress_measure",)),
+    }
+
+
 def variables(spots: Sequence[SpotStress]) -> dict[str, Variable]:
     """Return the variables of a file for the spots of a run, Pa."""
     unknown = np.full(6, np.nan)

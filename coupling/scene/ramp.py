@@ -42,6 +42,8 @@ class Ramp:
     """run from `to` to `from` as well"""
     start: Literal["rest", "steady"] = "rest"
     """"rest": with the state that the scene begins with; "steady": after a run of the scene at the first value"""
+    passes: Positive = 1.0
+    """how often a start passes the ramp, for lives in starts [-]"""
 
     def __post_init__(self) -> None:
         if (self.rate is None) == (self.periods is None):

@@ -11,7 +11,7 @@ import numpy as np
 from vanedamp.coupling.response.spot_stress import SCALARS, SpotStress
 from vanedamp.coupling.strength.counting import Cycles
 from vanedamp.coupling.strength.haigh import equivalent_amplitude, utilisation, yield_utilisation
-from vanedamp.coupling.strength.life import damage, hours, quantiles
+from vanedamp.coupling.strength.life import damage, hours, quantiles, starts
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.multiaxial import largest_principal, signed_von_mises
 from vanedamp.coupling.strength.spectral import Moments, dirlik_damage, narrow_band_damage
@@ -29,13 +29,15 @@ def assessed(
     amplitudes: Mapping[str, float],
     static: np.ndarray,
     cycles: Cycles | None = None,
-    duration: float = 0.0,
+    duration: float | None = None,
 ) -> dict[str, Any]:
     """Return utilisation and life at a hot spot as plain data, Pa.
 
     amplitudes: by criterion, "von_mises" and "principal"; those with "_max", if there are any, give "utilisation_max"
     static: (6,) stress about which the motion vibrates; the criterion's number of it is the mean stress
-    cycles: counted about it over a duration, s; without them, or without a curve, there is no life
+    cycles: counted about it; without them, or without a curve, there is no life
+    duration: of what is counted, s, if it goes on so: then the life is "life_hours"; None: of a motion that happens now
+    and then, whose life is "life_repeats", how often
     """
     mean = mean_stress(fatigue, static)
     amplitude = amplitudes[fatigue.criterion]
@@ -49,11 +51,12 @@ def assessed(
     if (used := yield_utilisation(amplitude, mean, fatigue)) is not None:
         found["yield_utilisation"] = float(used)
     if cycles is not None and fatigue.exponent is not None:
-        total = damage(cycles, fatigue, mean)
-        median = hours(total, duration)
-        found["damage"] = total
-        found["damage_per_hour"] = 3600.0 * total / duration
-        found["life_hours"] = quantiles(median, fatigue)
+        found["damage"] = total = damage(cycles, fatigue, mean)
+        if duration is None:
+            found["life_repeats"] = quantiles(starts(total), fatigue)
+        else:
+            found["damage_per_hour"] = 3600.0 * total / duration
+            found["life_hours"] = quantiles(hours(total, duration), fatigue)
     return found
 
 

@@ -47,6 +47,13 @@ def damage(cycles: Cycles, fatigue: Fatigue, static: float = 0.0) -> float:
     return float(np.sum(cycles.counts * damage_per_cycle(equivalent, fatigue)))
 
 
+def damage_rate(
+    amplitude: np.ndarray | float, frequency: float, fatigue: Fatigue, mean: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Return Miner's sum per second of a motion with one cycle of an amplitude, Pa, per period; frequency: Hz."""
+    return frequency * damage_per_cycle(equivalent_amplitude(amplitude, mean, fatigue), fatigue)
+
+
 def life_at(median: float, fatigue: Fatigue, probability: float) -> float:
     """Return the life by which a fraction of parts has failed, in the unit of the median life.
 

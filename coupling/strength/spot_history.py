@@ -20,24 +20,29 @@ class SpotHistories:
     a curve of stress and life have no history.
     """
 
+    #: (s, 6) Pa, that mean; empty before the first sample
+    mean: np.ndarray
+
     def __init__(self, materials: Sequence[Fatigue | None]) -> None:
         self._rows = {
             place: SCALARS.index(material.criterion)
             for place, material in enumerate(materials)
             if material is not None and material.exponent is not None
         }
-        self._mean, self._reference = np.zeros(0), np.zeros(0)
+        self.mean, self._reference = np.zeros(0), np.zeros(0)
         self._points: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {place: [] for place in self._rows}
 
     def add(self, begin: int, stress: np.ndarray) -> None:
         """Add samples (s, 6, t) of stress, Pa, of which the first has the number `begin`."""
-        if not self._rows or not stress.shape[-1]:
+        if not stress.shape[-1]:
             return
-        if not self._mean.size:
-            self._mean = stress.mean(axis=-1)
-        about = np.moveaxis(stress - self._mean[..., None], 1, 0)
+        if not self.mean.size:
+            self.mean = stress.mean(axis=-1)
+        if not self._rows:
+            return
+        about = np.moveaxis(stress - self.mean[..., None], 1, 0)
         scalars = scalar_stresses(about)
-        if not self._reference.size:
+        if not self._reference.any():
             worst = scalars[0].argmax(axis=-1)
             largest = np.take_along_axis(about, worst[None, :, None], axis=-1)
             self._reference = np.copysign(1.0, largest_principal(largest)) * largest

@@ -18,7 +18,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import COMPONENTS, hot_spots
 
 #: samples per period of the highest harmonic, and of any motion; impacts take up to so many
-_OF_HARMONIC, _LEAST, _MOST = 16, 48, 192
+OF_HARMONIC, _LEAST, _MOST = 16, 48, 192
 #: fraction of the amplitude of stress that samples may miss by estimate (`samples_of`)
 _MISSED = 0.01
 
@@ -86,7 +86,7 @@ def samples_of(scene: Scene, system: System, spots: Spots, asked: int = 0) -> in
     phase advances by h between samples: the mean over the places of its peak between two samples. The contribution is
     that of an impact which reverses the velocity of the excited mode at a contact.
     """
-    wanted = max(_LEAST, _OF_HARMONIC * int(system.order.max(initial=1)))
+    wanted = max(_LEAST, OF_HARMONIC * int(system.order.max(initial=1)))
     share, omega = _impact_shares(system, spots), np.sqrt(np.maximum(spots.squares, 0.0))
     while wanted < _MOST:
         missed = share * np.minimum((omega * system.period / wanted) ** 2 / 24.0, 1.0)

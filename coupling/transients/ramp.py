@@ -31,6 +31,8 @@ from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.strength.spots import samples_of, spots_of
+from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble, at_frequency
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (
@@ -40,6 +42,7 @@ from vanedamp.coupling.system.linear_response import (
     linear_peaks,
     linear_responses,
 )
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
 from vanedamp.coupling.transients.ramp_record import CURVES, WORKS, Ramp, RampRun
@@ -115,7 +118,9 @@ def ramp(
             runs.append(run.result())
             kept.changed()
     curves, tops = _stationary(first, table)
-    return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), dict(provenance or {}))
+    spots = hot_spots_in_file(scene.structure)
+    data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
+    return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), data)
 
 
 def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, list[str]]:
@@ -165,6 +170,10 @@ class _Run:
         ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
         self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
+        self.spots, self.stress = spots_of(scene), None
+        if self.spots is not None:
+            each = max(samples_of(end, assemble(end), self.spots) for end in ends)
+            self.stress = StressSeries(self.spots, each)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
         # the energies without the work of the rotation, which is counted apart
         self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
@@ -187,6 +196,7 @@ class _Run:
         if self.over_speed:
             self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
             self.system = seen_only(assemble(self.scene))
+            self.spots = self.spots and spots_of(self.scene)
             if self.state is not None:
                 state = at_speed_of(self.scene, self.state)
                 # fewer modes than the model has may not hold the motion: their loss is no work of the rotation
@@ -195,7 +205,9 @@ class _Run:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
         solver: Any = self.scene.solver
         scene, system = self.scene, self.system
-        records, left = new_records(system, 1, 0, deflected=self.deflected), solver.max_events - self.events
+        each = 0 if self.stress is None else self.stress.each
+        records = new_records(system, 1, each, self.stress is not None, self.deflected)
+        left = solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)
         reuse_subsystems(run, self.run)
@@ -216,6 +228,8 @@ class _Run:
         self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
         self.ledger[k + 1, STORED] -= self.rotation
         self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
+        if self.spots is not None and self.stress is not None:
+            self.stress.add(self.spots.stress(records.coordinates))
         self.dynamic[k] = about_mean(records, 0, 1, self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
@@ -243,7 +257,14 @@ class _Run:
             stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
             velocity=frozen(self.section[: p + 1, 1]),
             energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
+            **self._of_spots(),
         )  # fmt: skip
+
+    def _of_spots(self) -> dict[str, Any]:
+        """Return stress and strength of the periods done; the mean stress is that of the speed where it is largest."""
+        if self.spots is None or self.stress is None or not self.done:
+            return {}
+        return {"stress": frozen(self.stress.amplitudes()), "strength": self.stress.strengths([self.spots])}
 
 
 def _square(values: np.ndarray) -> float:

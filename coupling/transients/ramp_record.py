@@ -11,6 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
@@ -46,6 +47,9 @@ class RampRun:
     displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
     energy           J by the names of WORKS, over the run
     energy_residual  imbalance of the run's energies, relative to the largest term
+    stress           (p, s, 8) Pa, amplitudes of stress in it at s hot spots, by response.spot_stress.MEASURES; None
+                     without any
+    strength         utilisation and damage of the run, by hot spot (strength.assessment); those without data left out
     """
 
     rate: float
@@ -61,6 +65,8 @@ class RampRun:
     velocity: np.ndarray
     energy: Mapping[str, float]
     energy_residual: float
+    stress: np.ndarray | None = None
+    strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def direction(self) -> str:
@@ -131,13 +137,32 @@ class Ramp(SceneRecord, Plotted):
                 "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
                 "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
                 "energy": dict(run.energy), "energy_residual": run.energy_residual,
-            }
+            } | ({} if run.stress is None else {"stress": self.tops_of_stress(run), "strength": self.strength(run)})
             for run in self.runs
         ]  # fmt: skip
         return {
             "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
             "warnings": list(self.warnings),
         }  # fmt: skip
+
+    def tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
+        """Return the largest amplitudes of von Mises and principal stress of a run, Pa, by hot spot if it has any."""
+        if run.stress is None:
+            return {}
+        tops = run.stress.max(axis=0)
+        return {
+            spot: {name: float(tops[place, MEASURES.index(name)]) for name in SCALARS}
+            for place, spot in enumerate(self.provenance["hot_spots"])
+        }
+
+    def strength(self, run: RampRun) -> dict[str, dict[str, Any]]:
+        """Return the strength of a run by hot spot, with the life in starts that pass the ramp `table.passes` times."""
+        found = {spot: dict(values) for spot, values in run.strength.items()}
+        for values in found.values():
+            if "life_repeats" in values:
+                passes = self.table.passes
+                values["life_starts"] = {name: life / passes for name, life in values["life_repeats"].items()}
+        return found
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
@@ -164,20 +189,26 @@ class Ramp(SceneRecord, Plotted):
             "energy": Variable([[run.energy[name] for name in WORKS] for run in runs], ("run", "work"), "J"),
             **{f"linear_{name}": Variable(self.curves[name], ("linear",), units) for name, units in CURVES.items()},
         }
+        if any(run.stress is not None for run in runs):
+            spots, dims = list(self.provenance["hot_spots"]), ("period", "hot_spot", "stress_measure")
+            none = np.zeros((0, len(spots), len(MEASURES)))
+            stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
+            found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
         if dampers:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        return super().attributes() | {"tops": dict(self.tops)}
+        strength = {str(number): run.strength for number, run in enumerate(self.runs) if run.strength}
+        return super().attributes() | {"tops": dict(self.tops)} | ({"strength": strength} if strength else {})
 
     @classmethod
     def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ramp:
         """Return the record in the variables and attributes of a file."""
         given = cls.common(attributes, path)
         values.setdefault("amplitude_dynamic", values["amplitude"])  # all that earlier files have
-        runs = []
+        runs, strength = [], json.loads(attributes.get("strength", "{}"))
         for number, rate in enumerate(values["rate"]):
             inside, starts = values["run_of_period"] == number, values["run_of_start"] == number
             stuck = values["stuck"][inside] if given["scene"].damper else np.zeros((np.count_nonzero(inside), 0))
@@ -186,6 +217,8 @@ class Ramp(SceneRecord, Plotted):
                     rate=float(rate), status=str(values["status"][number]), stuck=frozen(stuck, bool),
                     energy=dict(zip(WORKS, values["energy"][number].tolist(), strict=True)),
                     energy_residual=float(values["energy_residual"][number]),
+                    stress=frozen(values["stress"][inside]) if "stress" in values and inside.any() else None,
+                    strength=strength.get(str(number), {}),
                     **{name: frozen(values[name][inside]) for name in SERIES},
                     **{name: frozen(values[name][starts]) for name in STATES},
                 )

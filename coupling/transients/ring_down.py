@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -22,9 +23,12 @@ from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
+from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import Followed, TurningPoint, TurningPoints, without_rebounds
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
@@ -70,11 +74,12 @@ def ring_down(
             free, system, start, mode, lambda done: progress and progress(before + done, before + periods)
         )
         status = ended if status is Status.OK else status
+    spots = hot_spots_in_file(free.structure)
     return RingDown(
         scene=scene, status=status, linear=_linear(system, mode), duration=periods * system.period, **motion,
         drive=None if drive is None else _of_drive(drive), wall_time_s=time.perf_counter() - began,
         estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene),
-        provenance=dict(provenance or {}),
+        provenance=dict(provenance or {}) | ({"hot_spots": spots} if spots else {}),
     )  # fmt: skip
 
 
@@ -135,7 +140,10 @@ def _free_motion(
     """Return how the free motion from a state ended, and the fields of RingDown that describe it."""
     began, periods = time.perf_counter(), free.time.simulated
     options: Any = free.solver
-    records = new_records(system, periods, 0, deflected=deflects(free, system))
+    spots = spots_of(free)
+    own = np.sqrt(system.of_structure.stiffness[mode]) / system.omega
+    each = 0 if spots is None else max(samples_of(free, system, spots), OF_HARMONIC * math.ceil(own))
+    records = new_records(system, periods, each, spots is not None, deflects(free, system))
     begun = start_of(free, system, start)
     run = engine_run(system, begun, records, True, options.max_events, options.linearisation)
     walk, turning, done = Walk(run, periods), TurningPoints(), 0
@@ -148,11 +156,18 @@ def _free_motion(
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
+    of_spots: dict[str, Any] = {}
+    if spots is not None and outcome.periods:
+        series = StressSeries(spots, each)
+        for samples in np.split(records.coordinates[: outcome.periods * each], outcome.periods):
+            series.add(spots.stress(samples))
+        of_spots = {"stress": frozen(series.amplitudes()), "strength": series.strengths()}
     ledger = outcome.records.ledger[: outcome.periods + 1]
     parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
     return response.status, {
         "time": frozen(moments), "displacement": frozen(system.response[mode] * coordinate), "energy": frozen(energy),
         "structure_energy": frozen(structure), "impacts": frozen(np.diff(np.searchsorted(hit, moments)), int),
+        **of_spots,
         "rest_time": None if turning.rest is None else turning.rest.time,
         "energies": dict(zip(PARTS, map(float, parts), strict=True)), "energy_residual": response.energy_residual,
     }  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
@@ -51,6 +52,9 @@ class RingDown(SceneRecord, Plotted):
     energies            J over the free motion: initial, viscous, friction, impact, contact and left
     energy_residual     imbalance of the energies, relative to its largest term
     drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
+    stress              (p, s, 8) Pa, amplitudes of stress in each of p periods of `duration` at s hot spots, by
+                        response.spot_stress.MEASURES; None without any
+    strength            utilisation and damage of the motion, by hot spot (strength.assessment)
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """
 
@@ -73,6 +77,8 @@ class RingDown(SceneRecord, Plotted):
     advice: dict[str, Any] | None = None
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    stress: np.ndarray | None = None
+    strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def table(self) -> RingDownTable:
@@ -127,8 +133,15 @@ class RingDown(SceneRecord, Plotted):
                 "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_j": whole.loss.tolist(),
             },
         }  # fmt: skip
+        if self.stress is not None:
+            data["stress_pa"] = {
+                spot: {name: self.stress[:, place, MEASURES.index(name)].tolist() for name in SCALARS}
+                for place, spot in enumerate(self.provenance["hot_spots"])
+            }
         if self.table.bins:
             data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
+        if self.strength:
+            data["strength"] = {spot: dict(values) for spot, values in self.strength.items()}
         for name in ("estimate", "advice"):
             if (value := getattr(self, name)) is not None:
                 data[name] = value
@@ -152,6 +165,10 @@ class RingDown(SceneRecord, Plotted):
             "damping_ratio_energy": Variable(whole.damping_ratio_energy, ("cycle",)),
             "energy_loss": Variable(whole.loss, ("cycle",), "J"),
         }
+        if self.stress is not None:
+            dims = ("period", "hot_spot", "stress_measure")
+            found |= stress_axes(list(self.provenance["hot_spots"])) | {"stress": Variable(self.stress, dims, "Pa")}
+            found["period_time"] = Variable(np.arange(len(self.stress)) / self.scene.frequency, ("period",), "s")
         if self.table.bins:
             for name, each in self.bins.items():
                 units = {"low": "m", "high": "m", "number": "1"}
@@ -167,6 +184,7 @@ class RingDown(SceneRecord, Plotted):
             "energies": self.energies, "energy_residual": self.energy_residual, "wall_time_s": self.wall_time_s,
         }  # fmt: skip
         open_ = {name: getattr(self, name) for name in ("rest_time", "drive", "estimate", "advice")}
+        attributes |= {"strength": dict(self.strength)} if self.strength else {}
         return attributes | {name: value for name, value in open_.items() if value is not None}
 
     @classmethod
@@ -176,9 +194,11 @@ class RingDown(SceneRecord, Plotted):
         given |= {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
         given |= {name: float(attributes[name]) for name in ("duration", "energy_residual", "wall_time_s")}
         given |= {name: json.loads(attributes.get(name, "null")) for name in ("drive", "estimate", "advice")}
+        given["strength"] = json.loads(attributes.get("strength", "{}"))
         linear, energies = (json.loads(attributes[name]) for name in ("linear", "energies"))
         return cls(
             status=Status(attributes["status"]), linear=LinearMode(**linear), impacts=frozen(values["impacts"], int),
+            stress=frozen(values["stress"]) if "stress" in values else None,
             rest_time=float(attributes["rest_time"]) if "rest_time" in attributes else None,
             # a file has them in the order of their names
             energies={name: energies[name] for name in PARTS if name in energies},

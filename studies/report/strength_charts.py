@@ -1,23 +1,22 @@
-"""Figures of strength: a Haigh diagram, and lives of hot spots with their scatter."""
+"""Figures of strength: stress over a sweep, a Haigh diagram, and lives of hot spots with their scatter."""
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import plotly.graph_objects as go
 
 from vanedamp.coupling.strength.haigh import permissible_amplitude, utilisation
 from vanedamp.coupling.strength.life import life_at
 from vanedamp.coupling.strength.material import Fatigue
-from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, VIOLET, draw_grid, subplots
+from vanedamp.studies.report.charts import COLOURS
 
-_COLOURS = (BLUE, RED, GREEN, GOLD, VIOLET)
 _MPA = 1e-6
+#: curves of stress and how they are drawn
+CURVES = {"with the bodies": "solid", "without bodies": "dot", "bodies fixed": "dash"}
 
 
 class SpotPoint(NamedTuple):
@@ -37,73 +36,93 @@ class SpotLife(NamedTuple):
     fatigue: Fatigue
 
 
-def haigh_diagram(points: Sequence[SpotPoint]) -> Figure:
+def stress_figure(x: np.ndarray, title: str, curves: Mapping[str, Mapping[str, np.ndarray]]) -> go.Figure:
+    """Draw amplitudes of von Mises stress (n,), Pa, over an axis with its title: by hot spot, by names of CURVES."""
+    figure = go.Figure()
+    for place, (name, own) in enumerate(curves.items()):
+        for curve, values in own.items():
+            figure.add_scatter(
+                x=x, y=_MPA * values, mode="lines", name=f"{name} {curve}", legendgroup=name,
+                line={"color": COLOURS[place % len(COLOURS)], "dash": CURVES[curve]},
+                hovertemplate=f"{name}, {curve}: %{{y:.4g}} MPa<extra></extra>",
+            )  # fmt: skip
+    figure.update_xaxes(title_text=title)
+    figure.update_yaxes(title_text="amplitude of von Mises stress, MPa", rangemode="tozero")
+    return figure
+
+
+def lines_figure(x: np.ndarray, title: str, values: np.ndarray, names: Sequence[str], label: str) -> go.Figure:
+    """Draw named columns (n, k) over an axis with its title; label: of the values, with their unit."""
+    figure = go.Figure()
+    for place, (name, column) in enumerate(zip(names, values.T, strict=True)):
+        colour = COLOURS[place % len(COLOURS)]
+        figure.add_scatter(x=x, y=column, mode="lines", name=name, line={"color": colour}, showlegend=len(names) > 1)
+    figure.update_xaxes(title_text=title)
+    figure.update_yaxes(title_text=label, rangemode="tozero", exponentformat="power")
+    return figure
+
+
+def haigh_figure(points: Sequence[SpotPoint]) -> go.Figure:
     """Draw permissible amplitudes over the mean stress and the hot spots, each with its utilisation.
 
     Materials that differ have a line each; where a yield strength is known, that of yield is dashed.
     """
-    figure, axes = subplots(size=(8.0, 5.0))
+    figure = go.Figure()
     materials: dict[Fatigue, None] = dict.fromkeys(point.fatigue for point in points)
-    for material, colour in zip(materials, _COLOURS * len(materials), strict=False):
-        own = [point for point in points if point.fatigue == material]
+    for place, material in enumerate(materials):
+        own, colour = [point for point in points if point.fatigue == material], COLOURS[place % len(COLOURS)]
         which = "" if len(materials) == 1 else f" ({', '.join(point.name for point in own)})"
-        _draw_lines(axes, material, own, colour, which)
-        for point in own:
-            used = float(utilisation(point.amplitude, point.mean, material))
-            axes.plot(_MPA * point.mean, _MPA * point.amplitude, "o", color=colour)
-            axes.annotate(
-                f"{point.name}: {used:.2f}" if math.isfinite(used) else f"{point.name}: beyond the line",
-                (_MPA * point.mean, _MPA * point.amplitude), (6, 6), textcoords="offset points",
-            )  # fmt: skip
-    axes.axvline(0.0, color=GREY, linewidth=0.8)
-    axes.set_xlabel("mean stress, MPa")
-    axes.set_ylabel("stress amplitude, MPa")
-    axes.set_ylim(bottom=0.0)
-    draw_grid(axes)
-    axes.legend(frameon=False)
+        _add_lines(figure, material, own, colour, which)
+        used = [float(utilisation(point.amplitude, point.mean, material)) for point in own]
+        labels = [f"{value:.2f}" if math.isfinite(value) else "beyond the line" for value in used]
+        figure.add_scatter(
+            x=[_MPA * point.mean for point in own], y=[_MPA * point.amplitude for point in own], mode="markers+text",
+            text=[f"{point.name}: {label}" for point, label in zip(own, labels, strict=True)], showlegend=False,
+            textposition="top right", marker={"color": colour, "size": 9}, hoverinfo="text",
+        )  # fmt: skip
+    figure.update_xaxes(title_text="mean stress, MPa", zeroline=True, zerolinecolor="#64748b")
+    figure.update_yaxes(title_text="stress amplitude, MPa", rangemode="tozero")
     return figure
 
 
-def _draw_lines(axes: Axes, material: Fatigue, points: Sequence[SpotPoint], colour: str, which: str) -> None:
-    """Draw the lines of a material, from the lowest mean stress of its points to the end of its line."""
+def _add_lines(figure: go.Figure, material: Fatigue, points: Sequence[SpotPoint], colour: str, which: str) -> None:
+    """Add the lines of a material, from the lowest mean stress of its points to the end of its line."""
     assert material.strength is not None
     end = material.limit if math.isfinite(material.limit) else 2.0 * material.strength
     low = min(0.0, *(point.mean for point in points)) - 0.1 * end
     high = max(end, *(1.1 * point.mean for point in points))
     mean = np.union1d(np.linspace(low, high, 301), [0.0, min(end, high)])
     label = "fatigue strength" if material.mean_stress == "none" else str(material.mean_stress).capitalize()
-    axes.plot(_MPA * mean, _MPA * permissible_amplitude(mean, material), color=colour, label=f"{label}{which}")
+    lines = {label: (permissible_amplitude(mean, material), "solid")}
     if material.yield_strength is not None:
-        axes.plot(
-            _MPA * mean, _MPA * np.maximum(material.yield_strength - np.abs(mean), 0.0),
-            color=colour, linestyle="--", linewidth=0.9, label=f"yield{which}",
+        lines["yield"] = np.maximum(material.yield_strength - np.abs(mean), 0.0), "dash"
+    for name, (amplitude, dash) in lines.items():
+        figure.add_scatter(
+            x=_MPA * mean, y=_MPA * amplitude, mode="lines", name=name + which, line={"color": colour, "dash": dash},
+            hoverinfo="skip",
         )  # fmt: skip
 
 
-def life_chart(lives: Sequence[SpotLife], unit: str = "h") -> Figure:
+def lives_figure(lives: Sequence[SpotLife], unit: str = "h") -> go.Figure:
     """Draw the median lives of hot spots with their quantiles from 10 % to 90 % failure; unit: "h", "starts" ...
 
     Hot spots without damage are named as such.
     """
-    figure, axes = subplots(size=(8.0, 1.6 + 0.5 * len(lives)))
-    for height, spot in enumerate(lives):
+    figure = go.Figure()
+    for spot in lives:
         if math.isfinite(spot.life) and spot.life > 0.0:
             early, late = (life_at(spot.life, spot.fatigue, chance) for chance in (0.1, 0.9))
-            axes.plot([early, late], [height, height], color=BLUE, linewidth=4.0, alpha=0.4, solid_capstyle="butt")
-            axes.plot(spot.life, height, "o", color=BLUE)
+            figure.add_scatter(
+                x=[spot.life], y=[spot.name], mode="markers", showlegend=False, marker={"color": COLOURS[0], "size": 9},
+                error_x={"symmetric": False, "array": [late - spot.life], "arrayminus": [spot.life - early]},
+                hovertemplate=f"{spot.name}: %{{x:.4g}} {unit}<extra></extra>",
+            )  # fmt: skip
         else:
             text = "no damage" if spot.life > 0.0 else "fails at once"
-            axes.annotate(text, (0.5, height), xycoords=("axes fraction", "data"), ha="center", va="center")
-    axes.set_xscale("log")
-    axes.set_yticks(range(len(lives)), [spot.name for spot in lives])
-    axes.set_ylim(len(lives) - 0.5, -0.5)
-    axes.set_xlabel(f"life, {unit} (median; bars from 10 % to 90 % failure)")
-    draw_grid(axes)
+            figure.add_annotation(x=0.5, xref="paper", y=spot.name, text=text, showarrow=False)
+    figure.update_xaxes(title_text=f"life, {unit} (median; bars from 10 % to 90 % failure)", type="log")
+    figure.update_yaxes(
+        title_text="hot spot", type="category", categoryorder="array",
+        categoryarray=[spot.name for spot in reversed(lives)],
+    )  # fmt: skip
     return figure
-
-
-def png(figure: Figure) -> bytes:
-    """Return a figure as PNG."""
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=120, format="png")
-    return picture.getvalue()

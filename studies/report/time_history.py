@@ -30,6 +30,8 @@ from vanedamp.studies.report.plane_history import (
 
 _MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
+#: results of a run that are nested data
+_NESTED = ("stress", "strength", "wear")
 #: distance of lines of impacts below the displacement, over its range
 _TICKS = 0.07
 
@@ -64,6 +66,7 @@ class History:
         values, attributes = load(path, "response")
         provenance = json.loads(attributes.pop("provenance", "{}"))
         energy = json.loads(attributes.pop("energy", "{}"))
+        strength = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
         begin = attributes.get("transient", 0) / attributes["frequency"]
         scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
         return cls(
@@ -73,7 +76,7 @@ class History:
             plane=samples_in_plane(values),
             hits=hits_in(values),
             by_place=impacts_by_place(values, begin, scene),
-            measures=attributes | {"energy": energy},
+            measures=attributes | strength | {"energy": energy},
             provenance=provenance,
             scene=scene,
         )

@@ -20,6 +20,7 @@ from tests.tools.processes import RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.contact_numbers import ContactFile
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
@@ -96,10 +97,11 @@ OSCILLATOR = changed(SCENE, ("stiffness = 1e4", "stiffness = 2.26e8"), ("frequen
 
 def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
-    if {"matrices", "numbers"} & tables.keys():
+    if {"matrices", "numbers", "pair"} & tables.keys():
         return tables
     scene = {
         "structure",
+        "contact",
         "excitation",
         "sweep",
         "continuation",
@@ -111,6 +113,11 @@ def completed(tables: dict, folder: Path) -> dict:
         "ring_down",
     } & tables.keys()
     base = tomllib.loads(OSCILLATOR if scene else CLUSTER)
+    contact = tables.get("contact", {})
+    if contact.get("law") == "hertz":
+        del base["damper"][0]["restitution"]
+    if contact.get("stiffness") == "patch":
+        tables["structure"] = {"model": "rom", "file": "rom.h5"}
     if "structure" in tables:
         ReducedModel.from_matrices(np.eye(2), np.diag([2.26e8, 1e10]), {"tip": [1.0, 0.5]}, damping_ratio=0.01).save(
             folder / "rom.h5"
@@ -143,6 +150,10 @@ def test_files_are_read(example, tmp_path):
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "numbers" in tables:
         assert len(validate(IdentificationFile, tables, "study").numbers) == 2
+    elif "pair" in tables:
+        assert validate(ContactFile, tables, "pair").pair.contact is not None
+    elif "contact" in tables:
+        assert Scene.load(path).contact.pair is not None
     elif "optimise" in tables:
         assert Study.load(path).table.variables.bodies == (1, 4)
     elif "life" in tables:

@@ -214,3 +214,17 @@ def test_materials_that_are_refused(tmp_path, capsys, material, message):
     assert main(["modal", str(path)]) == 2
     printed = capsys.readouterr().err
     assert message in printed and printed.count("\n") == 1
+
+
+def test_stress_of_a_held_beam(mesh):
+    """-E alpha T along a beam that is held at both ends, Poisson's ratio 0; nothing in one that can expand."""
+    held = Solid(mesh, {"default": STEEL}, temperature=uniform(30.0, 20.0))
+    held.assemble(HELD, 0.0)
+    points = np.arange(0, len(held.stress_points()), 7)
+    stress = held.static_stresses(points)
+    assert list(stress) == ["temperature"] and stress["temperature"].shape == (6, len(points))
+    assert stress["temperature"][0] == pytest.approx(-YOUNG * EXPANSION * 10.0, rel=1e-9)
+    assert np.abs(stress["temperature"][1:]).max() < 1e-6 * YOUNG * EXPANSION * 10.0
+    free = Solid(mesh, {"default": STEEL}, temperature=uniform(30.0, 20.0))
+    free.assemble(FREE_TO_EXPAND, 0.0)
+    assert np.abs(free.static_stresses(points)["temperature"]).max() < 1e-6 * YOUNG * EXPANSION * 10.0

@@ -12,7 +12,7 @@ from vanedamp import Scene, simulate
 from vanedamp.coupling.output_histories import histories
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import factorize, solve_modes
+from vanedamp.modal.eigen import factorize, solve_modes, static_shape
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.rotating import UnstableError
 from vanedamp.rom.bases.projection import ReductionError
@@ -214,6 +214,13 @@ def test_stresses_at_a_speed_are_those_of_modal_superposition(tmp_path):
     assert np.abs(own - known).max() < 0.01 * np.abs(known).max()
     standing = histories(turning.replace({"rotation.speed": 0.0}), ["hot1.xx"], 50).values
     assert np.abs(standing - known).max() > 0.1 * np.abs(known).max()
+    # static stress of the rotation, as of the linear static solution
+    (spot,) = simulate(turning).stress
+    pulled = structure.solid.stress_components(
+        static_shape(structure.rotating.standing, structure.rotating.load), [place]
+    )[:, 0]
+    assert spot.static - spot.mean == pytest.approx(speed**2 * pulled, rel=1e-6, abs=1e-6 * np.abs(known).max())
+    assert spot.static[0] > 1e6
 
 
 def test_a_scene_without_a_speed_is_warned(tmp_path):

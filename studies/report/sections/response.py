@@ -16,6 +16,7 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.strength import contacts_shown, spots_shown
 from vanedamp.studies.report.time_history import History, history_figure
 
 ORDER = 60
@@ -39,8 +40,13 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
     largest = max(map(abs, energies.values()), default=0.0)
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
     shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
+    shown["static"] = history.measures.get("static_deflection", 0.0)  # earlier files have none
     shown |= {"hits": bool(history.hits), "note": body_note(history.measures, history.scene)}
-    shown |= dict.fromkeys(("chart", "motion", "player", "impacts"))
+    shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear"))
+    if stress := history.measures.get("stress"):
+        shown["stress"] = spots_shown(file, stress, history.measures.get("strength", {}), page)
+    if wear := history.measures.get("wear"):
+        shown["wear"] = contacts_shown(file, wear, page)
     if len(history.time):
         late = history.late()
         shown["chart"] = page.chart("history", history_figure(late), late.header(), late.rows(), [file])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles
-from vanedamp.coupling.strength.life import cycles_to_failure, damage, hours, life_at, quantiles, starts
+from vanedamp.coupling.strength.life import cycles_to_failure, damage, damage_rate, hours, life_at, quantiles, starts
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.toml_input import InputError
 
@@ -28,6 +28,7 @@ def test_damage_of_a_sine_is_its_cycles_over_those_to_failure():
     expected = 40.0 / (2e6 * (600.0 / 400.0) ** -5)
     assert damage(rainflow_cycles(history, repeats=True), curve, static=500e6) == pytest.approx(expected, rel=1e-12)
     assert cycles_to_failure(300e6, curve, mean=500e6) == pytest.approx(40.0 / expected, rel=1e-12)
+    assert 0.4 * damage_rate(300e6, 100.0, curve, mean=500e6) == pytest.approx(expected, rel=1e-12)
 
 
 def test_miners_sum_by_hand():

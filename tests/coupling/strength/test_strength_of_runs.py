@@ -1,18 +1,26 @@
 """Utilisation and life of runs and sweeps of a reduced model: closed forms, and counts of dense histories."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from tests.coupling.strength.test_stressed_runs import FIRST, MASS, STIFFNESS, STRESS, scene
 from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.strength.counting import rainflow_cycles
+from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles
 from vanedamp.coupling.strength.life import damage
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.spectral import dirlik_damage, narrow_band_damage
 from vanedamp.coupling.strength.stress_spectrum import linear_moments, run_moments
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.transients.ramp import ramp
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.coupling.transients.ring_down import ring_down
+from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
@@ -24,11 +32,11 @@ FACTS = {
 }
 
 
-def saved(path, facts):
+def saved(path, facts, **fields):
     made = ReducedModel.from_matrices(
         MASS, STIFFNESS, {"root": 0, "tip": 2}, damping_ratio=0.01, provenance={"hot_spots": facts}
     )
-    with_stresses(made, STRESS).save(path)
+    with_stresses(replace(made, **fields), STRESS).save(path)
     return str(path)
 
 
@@ -113,6 +121,14 @@ def test_moments_of_a_linear_response_to_noise_are_those_of_its_run(file):
         assert estimated.crossings == pytest.approx(exact.crossings, rel=0.01)
 
 
+def test_moments_of_a_motion_with_rigid_impacts_grow_with_the_band(file):
+    """A jump of velocity leaves a density of omega^-4: l4 grows in proportion to the band, l0 has a limit."""
+    made = scene(file, contact={"law": "newton"}, time={"periods": 440, "transient": 40})
+    narrow, wide = (run_moments(made, 2000, highest_hz)[0] for highest_hz in (50e3, 100e3))
+    assert wide.l4 / narrow.l4 == pytest.approx(2.0, abs=0.4)
+    assert wide.l0 / narrow.l0 == pytest.approx(1.0, abs=1e-6)
+
+
 def test_noise_has_the_damage_of_its_spectrum(file):
     """One draw of the phases against the mean of all, and the closed form of the spectrum in the result."""
     made = noise(file, cavity=[], damper=[])
@@ -132,3 +148,54 @@ def test_a_spectrum_needs_hot_spots_and_sines(file, tmp_path):
     ReducedModel.from_matrices(MASS, STIFFNESS, {"root": 0, "tip": 2}, damping_ratio=0.01).save(bare)
     with pytest.raises(InputError, match=r"^structure: no hot spots; take a reduced model with them"):
         linear_moments(noise(str(bare)))
+
+
+def one_mode(file, **changes):
+    return scene(file, **{"structure.natural": True, "structure.modes": 1, "excitation.frequency": FIRST} | changes)
+
+
+def test_damage_of_a_ring_down_is_a_geometric_series(tmp_path):
+    """Half cycles from one turning point to the next: amplitude A q^n (1 + q) / 2, q the decay of half a period."""
+    facts = {"hot1": FACTS["hot1"] | {"fatigue": CURVE | {"mean_stress": "none", "exponent": 8.0}}}
+    table = {"start": "displacement", "displacement": 1e-4, "periods": 120}
+    made = one_mode(saved(tmp_path / "rom.h5", facts), cavity=[], damper=[], ring_down=table)
+    found = ring_down(made)
+    shape = eigh(STIFFNESS, MASS)[1][:, 0]
+    first = 1e-4 * abs(STRESS["hot1"][0] @ shape / shape[2])
+    q = np.exp(-np.pi * 0.01 / np.sqrt(1.0 - 0.01**2))
+    expected = 0.5 / 1e7 * (0.5 * first * (1.0 + q) / 400e6) ** 8 / (1.0 - q**8)
+    strength = found.strength["hot1"]
+    assert strength["damage"] == pytest.approx(expected, rel=0.02)
+    assert strength["life_repeats"]["50%"] == pytest.approx(1.0 / strength["damage"])
+    assert strength["mean"] == pytest.approx(5e8, rel=0.05)
+    found.save(tmp_path / "ring_down.h5")
+    assert RingDown.load(tmp_path / "ring_down.h5").strength == found.strength
+    assert found.to_json()["strength"]["hot1"] == strength
+
+
+def test_damage_of_a_pass_is_that_of_its_periods(file, tmp_path):
+    """A slow ramp through the resonance: a cycle per period, of the period's amplitude, at the mean of 500 MPa."""
+    table = {"from": 0.95 * FIRST, "to": 1.05 * FIRST, "rate": 10.0, "passes": 4.0}
+    found = ramp(one_mode(file, cavity=[], damper=[], ramp=table))
+    (run,) = found.runs
+    material = Fatigue(**CURVE).completed(None)
+    amplitudes = run.stress[:, 0, MEASURES.index("von_mises")]
+    whole = Cycles(2.0 * amplitudes, np.zeros(len(amplitudes)), np.ones(len(amplitudes)))
+    strength = found.to_json()["runs"][0]["strength"]
+    assert strength["hot1"]["damage"] == pytest.approx(damage(whole, material, static=5e8), rel=0.02)
+    assert strength["hot1"]["utilisation"] == pytest.approx(2.0 * amplitudes.max() / 400e6, rel=0.01)
+    assert strength["hot1"]["life_starts"]["50%"] == pytest.approx(0.25 / strength["hot1"]["damage"])
+    assert "damage" not in strength["hot2"]  # no curve
+    found.save(tmp_path / "ramp.h5")
+    assert Ramp.load(tmp_path / "ramp.h5").runs[0].strength == run.strength
+
+
+def test_a_pass_over_the_speed_has_the_mean_stress_of_its_fastest_end(tmp_path):
+    facts = {"hot1": FACTS["hot1"] | {"static": {"rotation": [2e4] + 5 * [0.0]}}}
+    table = {"quantity": "speed", "from": 60.0, "to": 100.0, "periods": 30}
+    file = saved(tmp_path / "rom.h5", facts, centrifugal_stiffness=np.zeros((3, 3)), greatest_speed=200.0)
+    force = {"frequency": FIRST, "force": 100.0, "at": "tip"}
+    made = scene(file, cavity=[], damper=[], rotation={"speed": 60.0}, ramp=table, excitation=force)
+    (run,) = ramp(made).runs
+    fastest = run.speed.max()
+    assert run.strength["hot1"]["mean"] == pytest.approx(2e4 * fastest**2, rel=0.02)

@@ -5,12 +5,19 @@ import pytest
 from scipy.linalg import eigh
 
 from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.orbits.orbits import orbits
+from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.transients.ramp import ramp
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.coupling.transients.ring_down import ring_down
+from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.recovery import COMPONENTS, with_stresses
 from vanedamp.rom.reduced import ReducedModel
@@ -142,3 +149,54 @@ def test_stress_of_a_sweep_is_that_of_its_runs(file, tmp_path):
     table = again.to_xarray()
     assert table.stress_amplitude.dims == ("excitation_frequency", "damper_0_mass", "hot_spot", "stress_component")
     assert table.stress_amplitude.units == "Pa" and tuple(table.stress_component.values) == COMPONENTS
+
+
+def one_mode(file, **changes):
+    return scene(file, **{"structure.natural": True, "structure.modes": 1, "excitation.frequency": FIRST} | changes)
+
+
+def test_stress_rings_down_by_the_damping_of_the_mode(file, tmp_path):
+    table = {"start": "displacement", "displacement": 1e-4, "periods": 12}
+    found = ring_down(one_mode(file, cavity=[], damper=[], ring_down=table))
+    assert found.stress.shape == (12, 2, 8)
+    damped = np.sqrt(1.0 - 0.01**2)
+    decay = np.exp(-2 * np.pi * 0.01)
+    for spot, measure in ((0, "xx"), (0, "von_mises"), (1, "principal")):
+        amplitude = found.stress[:, spot, MEASURES.index(measure)]
+        assert amplitude[1:] / amplitude[:-1] == pytest.approx(decay, rel=2e-3)
+    # of the first mode: the stress at its displacement, which has decayed by half a period when it is opposite
+    shape = eigh(STIFFNESS, MASS)[1][:, 0]
+    per_displacement = abs(STRESS["hot1"][0] @ shape / shape[2])
+    swing = 0.5 * (1.0 + np.exp(-np.pi * 0.01 / damped)) * 1e-4
+    assert found.stress[0, 0, 0] == pytest.approx(swing * per_displacement, rel=2e-3)
+    found.save(tmp_path / "ring_down.h5")
+    again = RingDown.load(tmp_path / "ring_down.h5")
+    assert np.array_equal(again.stress, found.stress) and list(again.provenance["hot_spots"]) == ["hot1", "hot2"]
+
+
+def test_stress_of_a_ramp_follows_the_displacement_of_one_mode(file, tmp_path):
+    found = ramp(one_mode(file, ramp={"from": 0.95 * FIRST, "to": 1.05 * FIRST, "rate": 10.0}))
+    (run,) = found.runs
+    assert run.impacts.sum() > 10 and run.stress.shape == (len(run.time), 2, 8)
+    shape = eigh(STIFFNESS, MASS)[1][:, 0]
+    expected = run.amplitude * abs(STRESS["hot1"][0] @ shape / shape[2])
+    largest = expected.max()
+    # the displacement's is the larger of both sides of a period, the stress's half of its range
+    assert np.abs(run.stress[:, 0, 0] - expected).max() < 0.1 * largest
+    assert run.stress[:, 0, 0].max() == pytest.approx(largest, rel=0.03)
+    assert found.to_json()["runs"][0]["stress"]["hot1"]["von_mises"] == run.stress[:, 0, 6].max()
+    found.save(tmp_path / "ramp.h5")
+    assert np.array_equal(Ramp.load(tmp_path / "ramp.h5").runs[0].stress, run.stress)
+
+
+def test_stress_of_orbits_at_rest_on_the_floor_is_that_of_fixed_bodies(file, tmp_path):
+    table = {"from": 0.9 * FIRST, "to": 0.92 * FIRST, "start": "linear", "max_points": 4}
+    made = one_mode(file, **{"cavity.c.gap": 1.0, "damper.0.friction": 100.0, "orbit": table})
+    found = orbits(made)
+    (branch,) = found.branches
+    assert found.stress.shape == (len(branch.parameter), 2, 8)
+    for parameter, stress in zip(branch.parameter, found.stress, strict=True):
+        fixed = simulate(made.replace({"excitation.frequency": float(parameter), "orbit": None})).stress[0].fixed
+        assert stress[0, MEASURES.index("von_mises")] == pytest.approx(fixed["von_mises"], rel=1e-3)
+    found.save(tmp_path / "orbits.h5")
+    assert np.array_equal(Branches.load(tmp_path / "orbits.h5").stress, found.stress)

@@ -17,8 +17,9 @@ _MPA = ("MPa", 1e-6)
 def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     """Yield a line for each hot spot (rom.recovery.hot_spots): place, stress of the first mode, static stresses."""
     for name, facts in spots.items():
-        x, y, z = facts["coordinates"]
-        line = f"{name} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
+        line = name
+        if "coordinates" in facts:
+            line += " at ({:.4g}, {:.4g}, {:.4g}) m".format(*facts["coordinates"])
         line += f" in {facts['group']}" if facts.get("group") else ""
         parts = []
         if mode := facts.get("per_amplitude"):
@@ -27,3 +28,14 @@ def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
             unit, factor = _UNITS.get(cause, _MPA)
             parts.append(f"{cause} {von_mises(np.array(values)) * factor:.4g} {unit}")
         yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
+
+
+def strength_lines(strengths: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a line for each hot spot with the strength of a motion that happens now and then (strength.assessment)."""
+    for name, found in strengths.items():
+        line = f"{name}: {found['amplitude'] / 1e6:.4g} MPa, utilisation {found['utilisation']:.3g}"
+        for kind, of in (("life_starts", "starts"), ("life_repeats", "times")):
+            if kind in found:
+                line += f", damage {found['damage']:.3g}: median life {found[kind]['50%']:.3g} {of}"
+                break
+        yield line

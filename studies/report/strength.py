@@ -1,0 +1,128 @@
+"""What sections write of strength and life: tables and charts of hot spots, and of the contacts that wear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.strength.assessment import fatigue_of
+from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.rom.recovery import COMPONENTS, von_mises
+from vanedamp.studies.report.charts import Chart, axis_title, dressed
+from vanedamp.studies.report.life_charts import wear_figure
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.strength_charts import (
+    CURVES,
+    SpotLife,
+    SpotPoint,
+    haigh_figure,
+    lines_figure,
+    lives_figure,
+    stress_figure,
+)
+
+
+def spots_shown(file: str, stress: Mapping[str, Any], strength: Mapping[str, Any], page: Page) -> dict[str, Any]:
+    """Return table, Haigh diagram and lives of the hot spots of a run, from its plain data by name."""
+    rows = [_spot(name, facts, strength.get(name, {})) for name, facts in stress.items()]
+    points, lives = [], []
+    for name, found in strength.items():
+        material = fatigue_of(stress[name])
+        if material is None:
+            continue
+        points.append(SpotPoint(name, found["amplitude"], found["mean"], material))
+        if "life_hours" in found:
+            life = found["life_hours"]["50%"]
+            lives.append(SpotLife(name, math.inf if life is None else float(life), material))
+    haigh = lives_chart = None
+    if points:
+        table = [(point.name, point.amplitude, point.mean, strength[point.name]["utilisation"]) for point in points]
+        header = ("hot_spot", "amplitude", "mean", "utilisation")
+        haigh = page.chart("haigh", dressed(haigh_figure(points), height=420), header, table, [file])
+    if lives:
+        figure = dressed(lives_figure(lives), height=160 + 50 * len(lives))
+        lives_chart = page.chart("lives", figure, ("hot_spot", "hours"), [spot[:2] for spot in lives], [file])
+    return {"file": file, "spots": rows, "haigh": haigh, "lives": lives_chart}
+
+
+def _spot(name: str, facts: Mapping[str, Any], found: Mapping[str, Any]) -> dict[str, Any]:
+    static = facts.get("static")
+    level = None if static is None else float(von_mises(np.array([static[part] for part in COMPONENTS])))
+    linear = {curve: (facts.get(curve) or {}).get("von_mises") for curve in ("undamped", "fixed")}
+    return {"name": name, "facts": facts, "found": found, "static": level, "linear": linear}
+
+
+def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
+    """Return charts of stress, damage and wear along the axis of a sweep's resonance, or its first.
+
+    Other axes are held at their first values, which `held` names. The worst of the axis' points has the highest
+    utilisation, or without a strength the highest stress.
+    """
+    axis = resonance_axis(sweep.scene, sweep.axes)[0] or next(iter(sweep.axes))
+    line = tuple(slice(None) if path == axis else 0 for path in sweep.axes)
+    held = {path: values[0] for path, values in sweep.axes.items() if path != axis and len(values) > 1}
+    x, title = np.asarray(sweep.axes[axis], float), axis_title(axis, sweep.units()[axis])
+    shown: dict[str, Any] = {"file": file, "held": held, "axis": title, "charts": [], "worst": None}
+    if sweep.stress:
+        stress = {name: values[line] for name, values in sweep.stress.items()}
+        curves = _curves(stress, list(sweep.hot_spots))
+        rows = ([spot, *row] for spot, own in curves.items() for row in zip(x, *own.values(), strict=True))
+        figure = dressed(stress_figure(x, title, curves), height=460)
+        shown["charts"].append(page.chart("stress", figure, ("hot_spot", axis, *CURVES), rows, [file]))
+        shown["worst"] = _worst(x, stress, list(sweep.hot_spots))
+    quantities = {
+        "damage per hour, 1/h": sweep.stress.get("damage_per_hour"),
+        "depth of wear, nm/h": 1e9 * sweep.wear["wear_depth_rate"] if sweep.wear else None,
+    }
+    for place, (label, values) in enumerate(quantities.items()):
+        if values is None or not np.isfinite(values[line]).any():
+            continue
+        own = np.reshape(values[line], (len(x), -1))
+        names = list(sweep.hot_spots) if place == 0 else ["fastest contact"]
+        figure = dressed(lines_figure(x, title, own, names, label), height=360)
+        rows = ([name, *row] for name, column in zip(names, own.T, strict=True) for row in zip(x, column, strict=True))
+        kind, column = ("damage", "damage_per_hour") if place == 0 else ("wear", "depth_rate")
+        shown["charts"].append(page.chart(kind, figure, ("of", axis, column), rows, [file]))
+    return shown
+
+
+def _curves(stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
+    """Return the curves of a figure of stress, by hot spot and name of the curve, of stresses (n, spots)."""
+    names = dict(zip(CURVES, ("stress_von_mises", "stress_von_mises_undamped", "stress_von_mises_fixed"), strict=True))
+    return {spot: {curve: stress[name][:, place] for curve, name in names.items()} for place, spot in enumerate(spots)}
+
+
+def _worst(x: np.ndarray, stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str, Any] | None:
+    """Return where a sweep uses its hot spots most, of stresses (n, spots); None without a run that is known."""
+    used = stress["utilisation"]
+    measure = used if np.isfinite(used).any() else stress["stress_von_mises"]
+    if not np.isfinite(measure).any():
+        return None
+    at, spot = np.unravel_index(int(np.nanargmax(measure)), measure.shape)
+    return {
+        "at": float(x[at]), "spot": spots[int(spot)], "utilisation": float(used[at, spot]),
+        "stress": float(stress["stress_von_mises"][at, spot]),
+    }  # fmt: skip
+
+
+def contacts_shown(file: str, wear: Sequence[Mapping[str, Any]], page: Page) -> dict[str, Any]:
+    """Return the contacts of a run that wear, the fastest first, and the chart of their depths."""
+    rows = sorted((one for one in wear if one["volume_rate"]), key=lambda one: -one["volume_rate"])
+    known = [one for one in rows if one["depth_rate"] is not None]
+    chart: Chart | None = None
+    if known:
+        spread = [(one["volume_rate_confidence"] or 0.0) / one["area"] for one in known]
+        figure = wear_figure([_place(one) for one in known], [one["depth_rate"] for one in known], spread)
+        table = [(_place(one), one["depth_rate"], half) for one, half in zip(known, spread, strict=True)]
+        header = ("contact", "depth_rate", "confidence")
+        chart = page.chart("wear", dressed(figure, height=360), header, table, [file])
+    return {"file": file, "contacts": [{"place": _place(one)} | dict(one) for one in rows], "chart": chart}
+
+
+def _place(one: Mapping[str, Any]) -> str:
+    corner = "" if one["corner"] < 0 else f", corner {one['corner']}"
+    return f"{one['side']} of body {one['damper'] + 1}{corner}"
