@@ -12,6 +12,7 @@ from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.strength import contact_strength
 from vanedamp.coupling.strength.stress_watch import stressed
 
 
@@ -32,7 +33,10 @@ def simulate(
     started = time.perf_counter()
     scene = loaded(scene)
     chosen = choose(scene)
-    response = stressed(chosen.scene, events, samples_per_period, start or chosen.start, progress)
+    rounded = contact_strength.wanted(chosen.scene)
+    response = stressed(chosen.scene, events or rounded, samples_per_period, start or chosen.start, progress)
+    if rounded:
+        response = contact_strength.with_contacts(chosen.scene, response, events)
     took = time.perf_counter() - started
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice,

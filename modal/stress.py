@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vanedamp.modal import fenicsx
 from vanedamp.modal.algebra import first_largest
@@ -56,6 +57,14 @@ def corner_groups(solid: Solid) -> np.ndarray:
     groups = list(solid.domain.volumes)
     numbers = fenicsx.cell_functions(solid.domain, lambda name, places: np.full(len(places), groups.index(name)))
     return np.asarray(numbers.x.array.astype(int))
+
+
+def nodal_von_mises(solid: Solid, displacement: np.ndarray) -> np.ndarray:
+    """Return von Mises stresses (n,), Pa, at the nodes that are corners: the largest of their cells; 0 at others."""
+    nodes = fenicsx.node_coordinates(solid.space)
+    stress = np.zeros(len(nodes))
+    np.maximum.at(stress, cKDTree(nodes).query(solid.stress_points())[1], solid.von_mises(displacement))
+    return stress
 
 
 def hot_spot(

@@ -11,11 +11,12 @@ import numpy as np
 
 from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
-from vanedamp.coupling.ensembles.record import AT_POINTS, Ensemble
+from vanedamp.coupling.ensembles.record import AT_POINTS, STRENGTH, WEAR, Ensemble
 from vanedamp.coupling.scene.scene import Scene, loaded
+from vanedamp.coupling.sweep.further import stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.sweep import run_all
-from vanedamp.coupling.sweep.worker import COLUMNS, MEASURES, SweepTable
+from vanedamp.coupling.sweep.worker import COLUMNS, MEASURES, SweepTable, parts_of
 from vanedamp.files.store import frozen
 
 
@@ -38,20 +39,22 @@ def ensemble(
 def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -> Ensemble:
     shape, grid = (points.count, *points.grid.shape), points.grid
     found = {name: frozen(finished.values[:, COLUMNS.index(name)].reshape(shape)) for name in MEASURES}
+    found |= _further(points, finished, shape)
     status = finished.text("status").reshape(shape)
     ok = status == "ok"
-    results = {name: np.where(ok, found[name], np.nan) for name in AT_POINTS} | _of_curves(points, found, ok)
+    results = {name: np.where(ok, found[name], np.nan) for name in AT_POINTS if name in found}
+    of_curves = _of_curves(points, results)
+    # indices of all results at every point of a grid would take far longer than the runs
+    told = {"amplitude_mean_dynamic": results["amplitude_mean_dynamic"]} if grid.axes else results
     count, seed = len(points.samples), points.scene.sampled.seed
-    # those of every point of a grid of all results would take far longer than the runs
-    told = ("amplitude_mean_dynamic", "peak_amplitude", "reduction") if grid.axes else tuple(results)
     return Ensemble(
         scene=points.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
         samples=points.samples,
         members=found,
         status=frozen(status, object),
-        quantile={name: frozen(quantiles(values, count)) for name, values in results.items()},
-        indices={name: frozen(indices(results[name], count, seed)) for name in told},
+        quantile={name: frozen(quantiles(values, count)) for name, values in (results | of_curves).items()},
+        indices={name: frozen(indices(values, count, seed)) for name, values in (told | of_curves).items()},
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
@@ -59,13 +62,26 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
     )
 
 
-def _of_curves(points: Members, found: Mapping[str, np.ndarray], ok: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the highest mean along the frequency, m, and the reduction, of every curve of every sample."""
+def _further(points: Members, finished: SweepTable, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """Return strength, at the worst hot spot, and wear of all points, where the scene has any."""
+    parts = {name: finished.values[:, columns] for name, columns in parts_of(points.base).items()}
+    stress, wear = dict(stresses_of(parts["stress"], shape)), dict(wear_of(parts["wear"], shape))
+    worst = {name: np.fmax.reduce(stress[name], axis=-1) for name in STRENGTH if name in stress}
+    found = worst | {name: wear[name] for name in WEAR if name in wear}
+    return {name: frozen(values) for name, values in found.items() if np.isfinite(values).any()}
+
+
+def _of_curves(points: Members, results: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the highest mean, m, the reduction, and the highest strength and wear of every curve of every sample."""
     swept, _ = resonance_axis(points.base, points.grid.axes)
     along = () if swept is None else (1 + list(points.grid.axes).index(swept),)
-    peak = np.where(ok, found["amplitude_mean_dynamic"], -np.inf).max(axis=along)
-    peak = np.where(np.isfinite(peak), peak, np.nan)
-    undamped = points.peaks().get("undamped_peak", found["amplitude_undamped"].max(axis=along))
+
+    def highest(name: str) -> np.ndarray:
+        return np.asarray(np.fmax.reduce(results[name], axis=along))
+
+    peak = highest("amplitude_mean_dynamic")
+    undamped = points.peaks().get("undamped_peak", highest("amplitude_undamped"))
     usable = (undamped > 0.0) & np.isfinite(undamped)
     reduction = 1.0 - np.divide(peak, undamped, out=np.full(peak.shape, np.nan), where=usable)
-    return {"peak_amplitude": peak, "reduction": reduction}
+    further = {f"peak_{name}": highest(name) for name in (STRENGTH | WEAR) if name in results}
+    return {"peak_amplitude": peak, "reduction": reduction, **further}

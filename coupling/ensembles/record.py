@@ -12,17 +12,23 @@ from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.sweep.further import STRESSES, WEARS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import MEASURES
 from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, frozen
 
+#: of models with hot spots, of their worst one, and of scenes with [wear], and their units
+STRENGTH = {name: STRESSES[name] for name in ("stress_von_mises", "utilisation", "damage_per_hour")}
+WEAR = {name: WEARS[name] for name in ("wear_depth_rate", "wear_volume_rate")}
 #: results whose spread is told, and their units: at every point of the grid, and of the whole curve along its frequency
 AT_POINTS = {
     "amplitude_mean": "m", "amplitude_mean_dynamic": "m", "amplitude_max": "m", "amplitude_undamped": "m",
-    "impacts_per_period": "1", "attached_mass_fraction": "1",
+    "impacts_per_period": "1", "attached_mass_fraction": "1", **STRENGTH, **WEAR,
 }  # fmt: skip
-OF_CURVES = {"peak_amplitude": "m", "reduction": "1"}
+OF_CURVES = {
+    "peak_amplitude": "m", "reduction": "1", **{f"peak_{name}": unit for name, unit in (STRENGTH | WEAR).items()},
+}  # fmt: skip
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
 
@@ -34,12 +40,13 @@ class Ensemble(SceneRecord, Plotted):
     scene     the scene with its ranges
     axes      dotted path -> values, of its [sweep] table; empty for a run at one frequency
     samples   dotted path -> (s,) values of each range
-    members   by the names of coupling.sweep.worker.MEASURES, (s, *grid) results of all points, nan where none is
+    members   by the names of coupling.sweep.worker.MEASURES, (s, *grid) results of all points, nan where none is; and
+              by those of STRENGTH and WEAR, at the worst hot spot and of all contacts, where the scene has any
     status    (s, *grid) of every point, as in a Sweep
     quantile  (5, ...) quantiles QUANTILES over the samples by the names of AT_POINTS, over the grid, and of OF_CURVES,
               over its axes other than the frequency or the speed: `peak_amplitude`, the highest mean of a curve (m, as
-              amplitude_mean_dynamic), and `reduction`, what the bodies take of the maximum without bodies; of points
-              that are ok
+              amplitude_mean_dynamic), `reduction`, what the bodies take of the maximum without bodies, and the
+              highest strength and wear; of points that are ok
     indices   (4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a
               number causes by itself, and with others, and half widths of their 95 % confidence intervals; nan where
               nothing spreads
@@ -122,7 +129,8 @@ class Ensemble(SceneRecord, Plotted):
             found[_dimension(path)] = Variable(values, (_dimension(path),), unit_of(path))
         for path, values in self.samples.items():
             found[f"sample_{_dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
-        found |= {name: Variable(values, ("sample", *grid), MEASURES[name]) for name, values in self.members.items()}
+        for name, values in self.members.items():
+            found[name] = Variable(values, ("sample", *grid), (MEASURES | AT_POINTS)[name])
         for name, values in self.quantile.items():
             found[f"quantile_{name}"] = Variable(values, ("quantile", *dims[name]), units[name])
         for name, values in self.indices.items():
@@ -142,9 +150,9 @@ class Ensemble(SceneRecord, Plotted):
         return cls(
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
             samples={number: frozen(values[f"sample_{_dimension(number)}"]) for number in values["number"]},
-            members={name: frozen(values[name]) for name in MEASURES},
+            members={name: frozen(values[name]) for name in (*MEASURES, *STRENGTH, *WEAR) if name in values},
             status=frozen(values["status"], object),
-            quantile={name: frozen(values[f"quantile_{name}"]) for name in own},
+            quantile={name: frozen(values[key]) for name in own if (key := f"quantile_{name}") in values},
             indices={name: frozen(values[key]) for name in own if (key := f"indices_{name}") in values},
             **given,
         )

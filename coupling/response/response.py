@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.response.contact_strength import ContactStrength
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.spot_stress import SpotStress
@@ -226,6 +227,8 @@ class Response(Plotted):
     """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
     stress: tuple[SpotStress, ...] | None = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
+    contacts: tuple[ContactStrength, ...] | None = None
+    """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
 
@@ -256,6 +259,8 @@ class Response(Plotted):
         if self.stress is not None:
             data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
             data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
+        if self.contacts is not None:
+            data["contact_strength"] = [contact.to_json() for contact in self.contacts]
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
@@ -293,8 +298,8 @@ class Response(Plotted):
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}
-        if self.wear is not None:
-            attributes["wear"] = json.dumps(attributes["wear"])
+        for name in attributes.keys() & {"wear", "contact_strength"}:
+            attributes[name] = json.dumps(attributes[name])
         for name in attributes.keys() & _OF_BODIES:
             attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
         return variables, attributes

@@ -16,7 +16,7 @@ from vanedamp.files.toml_input import STRICT, InputError, Whole, dotted, lists_f
 T = TypeVar("T")
 
 #: tables whose numbers are no scene's: those of commands, and of the ensemble itself
-_OTHERS = ("sweep", "continuation", "orbit", "ramp", "ring_down", "optimise", "ranges", "ensemble")
+_OTHERS = ("sweep", "continuation", "orbit", "ramp", "ring_down", "optimise", "life", "ranges", "ensemble")
 
 Distribution = Literal["uniform", "log-uniform"]
 

@@ -26,7 +26,10 @@ PEAKS = {
 }  # fmt: skip
 _FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES | WEARS
 #: columns of the table in a notebook, beside the axes, and its rows
-_SHOWN = ("amplitude_mean", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status", "classification")
+_SHOWN = (
+    "amplitude_mean", "amplitude_mean_dynamic", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status",
+    "classification",
+)  # fmt: skip
 _MOST_ROWS = 20
 
 

@@ -137,7 +137,7 @@ class Ramp(SceneRecord, Plotted):
                 "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
                 "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
                 "energy": dict(run.energy), "energy_residual": run.energy_residual,
-            } | ({} if run.stress is None else {"stress": self._tops_of_stress(run), "strength": self.strength(run)})
+            } | ({} if run.stress is None else {"stress": self.tops_of_stress(run), "strength": self.strength(run)})
             for run in self.runs
         ]  # fmt: skip
         return {
@@ -145,9 +145,10 @@ class Ramp(SceneRecord, Plotted):
             "warnings": list(self.warnings),
         }  # fmt: skip
 
-    def _tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
-        """Return the largest amplitudes of von Mises and principal stress of a run, Pa, by hot spot."""
-        assert run.stress is not None
+    def tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
+        """Return the largest amplitudes of von Mises and principal stress of a run, Pa, by hot spot if it has any."""
+        if run.stress is None:
+            return {}
         tops = run.stress.max(axis=0)
         return {
             spot: {name: float(tops[place, MEASURES.index(name)]) for name in SCALARS}

@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneRecord
-from vanedamp.coupling.response.spot_stress import stress_axes
+from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
@@ -133,6 +133,11 @@ class RingDown(SceneRecord, Plotted):
                 "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_j": whole.loss.tolist(),
             },
         }  # fmt: skip
+        if self.stress is not None:
+            data["stress_pa"] = {
+                spot: {name: self.stress[:, place, MEASURES.index(name)].tolist() for name in SCALARS}
+                for place, spot in enumerate(self.provenance["hot_spots"])
+            }
         if self.table.bins:
             data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
         if self.strength:

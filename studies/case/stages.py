@@ -30,7 +30,7 @@ from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
-from vanedamp.modal.stress import HotSpot, PeakStress, corner_groups, hot_spot, peak_stresses
+from vanedamp.modal.stress import HotSpot, PeakStress, corner_groups, hot_spot, nodal_von_mises, peak_stresses
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis import BLOCKS, basis_ladder, basis_named
@@ -293,6 +293,10 @@ class ModalAnalysis:
                 "gyroscopic_shape_imaginary": Variable(complex_modes.shapes.imag, ("mode", "dof"), "kg^-0.5"),
                 "whirl": Variable(complex_modes.whirl, ("mode",)),
             }
+        if self.first_bending is not None and self.functional is not None and self.rigid is not None:
+            shape = self.modes.shapes[self.first_bending]
+            field = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
+            variables["von_mises"] = Variable(field, ("node",), "Pa/m")
         if self.fatigue is not None:
             stress, places, groups = zip(*self.fatigue.peaks, strict=True)
             variables |= {

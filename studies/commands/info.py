@@ -23,7 +23,7 @@ from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
-from vanedamp.studies.commands.support.spots import spot_lines
+from vanedamp.studies.hot_spots import spot_lines
 from vanedamp.studies.report.forced_response import best_first, forced_responses
 
 #: entries of a list that are shown
@@ -151,7 +151,8 @@ def _reduced(record: _Record) -> Iterator[Fact]:
     yield Fact("estimate", made.get("estimate", {}).get("sentence"))
     yield from _level(made.get("fatigue"))
     for line in spot_lines(hot_spots(ReducedModel.load(record.path))):
-        yield Fact(*line.split(" ", 1))
+        name, _, facts = line.partition(" ")
+        yield Fact(name, facts)
 
 
 def _response(record: _Record) -> Iterator[Fact]:

@@ -11,7 +11,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
-from vanedamp.studies.commands.support.spots import spot_lines
+from vanedamp.studies.hot_spots import spot_lines
 
 
 def run(arguments: Namespace, case: Case) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator
 
+from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.coupling.transients.ring_down_record import RingDown
@@ -13,8 +14,8 @@ from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
-from vanedamp.studies.commands.support.spots import strength_lines
 from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.hot_spots import strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
@@ -52,6 +53,10 @@ def _summary(result: RingDown) -> Iterator[str]:
             f"{cycles.time[k]:12.6g} {cycles.amplitude[k]:14.6g} {frequency:14.8g} {cycles.damping_ratio[k]:14.6g} "
             f"{cycles.damping_ratio_energy[k]:12.6g}"
         )
+    if result.stress is not None:
+        begin, end = 1e-6 * result.stress[[0, -1], :, MEASURES.index("von_mises")]
+        for spot, first, last in zip(result.provenance["hot_spots"], begin, end, strict=True):
+            yield f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
     yield from strength_lines(result.strength)
     if result.rest_time is not None:
         place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))

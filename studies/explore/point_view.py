@@ -100,7 +100,14 @@ def _summary(response: Response) -> str:
     parts = [
         f"{response.frequency:.6g} Hz: mean of peaks {1e6 * response.amplitude_mean:.4g} µm",
         f"maximum {1e6 * response.amplitude_max:.4g} µm",
-        *([f"of that static {1e6 * response.static_deflection:.4g} µm"] if response.static_deflection else []),
+        *(
+            [
+                f"of that static {1e6 * response.static_deflection:.4g} µm",
+                f"mean of peaks about it {1e6 * response.amplitude_mean_dynamic:.4g} µm",
+            ]
+            if response.static_deflection
+            else []
+        ),
         f"{response.impacts_per_period:.3g} impacts per period",
         response.classification,
         *([] if attached is None else [f"attached mass fraction {attached:z.3f}"]),

@@ -19,8 +19,8 @@ from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError, tables
 from vanedamp.studies.life.study import Contact, LifeStudy
 
-#: statuses whose figures count; those but the first are reported
-_USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
+#: statuses of runs that came to their end, whose figures count; those but the first are reported
+_USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
 #: columns of a run before the rates of its contacts and their confidence
 _AMPLITUDE, _CONFIDENCE, _OK, _RATES = range(4)
 
@@ -118,7 +118,8 @@ class Runs(SceneCheckpoint):
         ok = np.isfinite(found[:, _AMPLITUDE])
         amplitude = found[:, _AMPLITUDE] / self.study.reference
         spread = found[:, _CONFIDENCE] / self.study.reference
-        counted = np.where(ok, amplitude, np.fmax(amplitude, 1.0))  # a run that failed has damped nothing
+        # runs that failed say nothing of their frequencies; where all have, nothing is damped
+        counted = np.where(ok, amplitude, -np.inf) if ok.any() else np.ones(len(found))
         highest = int(np.argmax(counted))
         weights = np.ones(len(found))
         if table.dwell == "peak":
@@ -132,8 +133,8 @@ class Runs(SceneCheckpoint):
         known = np.where(ok, spread, 0.0)
         return Found(
             weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude, spread,
-            1.0 - float(counted[highest] if worst else counted.mean()),
-            float(known[highest] if worst else np.sqrt((known**2).sum()) / len(known)),
+            1.0 - float(counted[highest] if worst else counted[np.isfinite(counted)].mean()),
+            float(known[highest] if worst else np.sqrt((known**2).sum()) / max(ok.sum(), 1)),
         )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.ensembles.design import INDICES
-from vanedamp.coupling.ensembles.record import Ensemble
+from vanedamp.coupling.ensembles.record import OF_CURVES, Ensemble
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
@@ -21,8 +22,8 @@ Place = tuple[Any, ...]
 _BANDS = ((0, 4, "5 to 95 %", 0.18), (1, 3, "25 to 75 %", 0.3))
 _BLUE = "29, 79, 145"
 _WITHOUT = {"color": "#334155", "dash": "dot"}
-#: results whose indices are bars, in words
-_BARS = {"reduction": "reduction", "peak_amplitude": "highest mean"}
+#: panels of indices side by side
+_COLUMNS = 2
 
 
 def along(record: Ensemble) -> str | None:
@@ -77,20 +78,29 @@ def bands_figure(record: Ensemble, place: Place) -> go.Figure:
 
 
 def indices_figure(record: Ensemble, place: Place) -> go.Figure:
-    """Draw the indices of the reduction and of the highest mean of a curve, with their 95 % confidence."""
-    place = tuple(one for one in place if not isinstance(one, slice))
-    figure = make_subplots(rows=1, cols=len(_BARS), subplot_titles=list(_BARS.values()), shared_yaxes=True)
-    for col, name in enumerate(_BARS, 1):
+    """Draw the indices of the results of a curve, the reduction first, with their 95 % confidence."""
+    place, names = tuple(one for one in place if not isinstance(one, slice)), bar_names(record)
+    rows = math.ceil(len(names) / _COLUMNS)
+    titles = [name.replace("_", " ") for name in names]
+    figure = make_subplots(rows=rows, cols=_COLUMNS, subplot_titles=titles, shared_xaxes=True, shared_yaxes=True)
+    for number, name in enumerate(names):
+        row, col = number // _COLUMNS + 1, number % _COLUMNS + 1
         first, first_half, total, total_half = record.indices[name][(slice(None), slice(None), *place)]
         parts = (("first order", first, first_half, COLOURS[4]), ("total", total, total_half, COLOURS[0]))
         for label, values, half, colour in parts:
             figure.add_bar(
-                x=list(record.numbers), y=values, name=label, legendgroup=label, showlegend=col == 1,
-                marker={"color": colour}, error_y={"array": half, "thickness": 1.2}, row=1, col=col,
+                x=list(record.numbers), y=values, name=label, legendgroup=label, showlegend=number == 0,
+                marker={"color": colour}, error_y={"array": half, "thickness": 1.2}, row=row, col=col,
             )  # fmt: skip
-        figure.update_xaxes(title_text="number given as a range", row=1, col=col)
-    figure.update_yaxes(title_text="Sobol' index", row=1, col=1)
-    return dressed(figure, height=420)
+        if row == rows:
+            figure.update_xaxes(title_text="number given as a range", row=row, col=col)
+    figure.update_yaxes(title_text="Sobol' index", col=1)
+    return dressed(figure, height=180 + 240 * rows)
+
+
+def bar_names(record: Ensemble) -> list[str]:
+    """Return the results of a curve that have indices, the reduction first."""
+    return sorted((name for name in OF_CURVES if name in record.indices), key=lambda name: name != "reduction")
 
 
 def has_bars(record: Ensemble) -> bool:

@@ -46,7 +46,8 @@ def wear_figure(names: Sequence[str], depth_rate: Sequence[float], spread: Seque
             hovertemplate="%{x}<br>%{y:.4g} nm/h<extra></extra>",
         )
     )  # fmt: skip
-    figure.update_yaxes(title_text="depth of wear, nm/h", rangemode="tozero")
+    figure.update_xaxes(title_text="contact")
+    figure.update_yaxes(title_text="depth of wear, nm/h", rangemode="tozero", exponentformat="power")
     return figure
 
 

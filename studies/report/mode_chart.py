@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
+from scipy.spatial import cKDTree
 
 from vanedamp.studies.report.charts import FONT
 
@@ -16,6 +17,7 @@ _MOST_MODES = 12
 _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
+_NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
 _EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -83,15 +85,14 @@ def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
     return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
 
 
-def viewpoint(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
     """Return the direction (3,), of unit length, from which a mode's shape (n, 3) at points (n, 3) is best seen.
 
-    Of directions around z, a little above the horizon, that from which most of the motion is in sight, and across the
-    view: nothing that stands still hides it.
+    Of directions around z, at elevations above the horizon in degrees, that from which most of the motion is in sight,
+    and across the view: nothing that stands still hides it.
     """
-    angles = np.radians(_AZIMUTHS)
-    level, above = np.cos(np.radians(_ELEVATION)), np.sin(np.radians(_ELEVATION))
-    views = np.column_stack([level * np.cos(angles), level * np.sin(angles), np.full(len(angles), above)])
+    above, angles = (grid.ravel() for grid in np.meshgrid(np.radians(elevations), np.radians(_AZIMUTHS), indexing="ij"))
+    views = np.column_stack([np.cos(above) * np.cos(angles), np.cos(above) * np.sin(angles), np.sin(above)])
     scores = [_in_sight(points, shape, view) for view in views]
     # of views as good as each other, the first, whatever the last bit says
     best = int(np.flatnonzero(np.array(scores) >= 0.99 * max(scores))[0])
@@ -125,18 +126,57 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
-    eye = dict(zip("xyz", (_DISTANCE * viewpoint(points, shapes[list(chosen).index(mode)])).tolist(), strict=True))
-    axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
+    _dressed(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
     figure.update_layout(
-        height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
-        legend={"x": 0.0, "y": 0.0}, uirevision="kept", meta=points.T.astype(np.float32).round(4).tolist(),
+        meta=points.T.astype(np.float32).round(4).tolist(),
         updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
+    )
+    return figure
+
+
+def _dressed(figure: go.Figure, view: np.ndarray) -> go.Figure:
+    """Return a figure of a structure in mm with axes, seen from a direction (3,)."""
+    eye = dict(zip("xyz", (_DISTANCE * view).tolist(), strict=True))
+    axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
+    return figure.update_layout(
+        height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
+        legend={"x": 0.0, "y": 0.0}, uirevision="kept",
         scene={
             "aspectmode": "data", "xaxis": axis | {"title": "x, mm"}, "yaxis": axis | {"title": "y, mm"},
             "zaxis": axis | {"title": "z, mm"}, "camera": {"eye": eye},
         },
     )  # fmt: skip
-    return figure
+
+
+def spots_figure(
+    values: Mapping[str, np.ndarray], of: Surface, mode: int, spots: Mapping[str, Mapping[str, Any]]
+) -> go.Figure:
+    """Draw the structure at rest, in mm, coloured by the mode's von Mises stress, and hot spots on it.
+
+    values: of a record of `vanedamp modal` with "von_mises"; spots: by name (rom.recovery.hot_spots).
+    """
+    points, stress = 1e3 * values["coordinates"][of.nodes], 1e-12 * values["von_mises"][of.nodes]
+    (x, y, z), (i, j, k) = points.astype(np.float32).T, of.triangles.astype(np.int32).T
+    figure = go.Figure(go.Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, intensity=stress.astype(np.float32), colorscale="Viridis", flatshading=False,
+        colorbar={"title": {"text": "von Mises stress,<br>MPa per µm"}, "len": 0.7, "thickness": 16}, name="stress",
+        hovertemplate="%{intensity:.4g} MPa per µm<extra></extra>",
+        lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
+    ))  # fmt: skip
+    places = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
+    figure.add_scatter3d(
+        x=places[:, 0], y=places[:, 1], z=places[:, 2], mode="markers+text", text=list(spots), name="hot spots",
+        marker={"size": 6, "color": "#dc2626", "line": {"color": "#fff", "width": 1}}, textposition="top center",
+        hovertemplate="%{text}: %{x:.2f}, %{y:.2f}, %{z:.2f} mm<extra></extra>",
+    )  # fmt: skip
+    near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
+    shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
+    return _dressed(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
+
+
+def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
+    """Yield x, y, z (m) and von Mises stress per displacement (Pa/m) at the nodes of the surface."""
+    yield from np.column_stack([values["coordinates"][of.nodes], values["von_mises"][of.nodes]]).tolist()
 
 
 def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:

@@ -22,12 +22,14 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
 from vanedamp.studies.identification.record import Identification
+from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
 from vanedamp.studies.report.border_chart import borders_figure
 from vanedamp.studies.report.ensemble_charts import ensemble_figure
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.identification_charts import data_figure
+from vanedamp.studies.report.life_charts import life_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
 from vanedamp.studies.report.results import Result, Results, collect
 from vanedamp.studies.report.sections.calibration import frequencies_figure, response_figure
@@ -43,7 +45,7 @@ _MOST_CURVES = 8
 _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
     Branches: lambda found: (borders_figure if found.borders else branches_figure)(found),
     Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
-    Identification: data_figure, Ensemble: ensemble_figure,
+    Identification: data_figure, LifeRecord: life_figure, Ensemble: ensemble_figure,
 }  # fmt: skip
 
 
@@ -51,12 +53,12 @@ _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
 def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
 
-    A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a Response
-    its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and Campbell their
-    diagrams, Branches with borders the map of these; an Identification its measurements over the model; an Ensemble its
-    curve with bands, of one frequency its indices; a file of `vanedamp modal` its modes; one of `vanedamp calibrate`
-    the measured response with its fit, or else the tuned frequencies. Raises InputError for anything else, and for a
-    response without samples.
+    A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a
+    Response its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and
+    Campbell their diagrams, Branches with borders the map of these; an Identification its measurements over the
+    model; a LifeRecord its course over the hours; an Ensemble its curve with bands, of one frequency its indices; a
+    file of `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the
+    tuned frequencies. Raises InputError for anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
@@ -86,6 +88,7 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
 @plot.register(RingDown)
 @plot.register(Campbell)
 @plot.register(Identification)
+@plot.register(LifeRecord)
 @plot.register(Ensemble)
 def _(result: Any, scene: Scene | None = None) -> go.Figure:
     return _DIAGRAMS[type(result)](result)

@@ -58,7 +58,7 @@ def lines_figure(x: np.ndarray, title: str, values: np.ndarray, names: Sequence[
         colour = COLOURS[place % len(COLOURS)]
         figure.add_scatter(x=x, y=column, mode="lines", name=name, line={"color": colour}, showlegend=len(names) > 1)
     figure.update_xaxes(title_text=title)
-    figure.update_yaxes(title_text=label, rangemode="tozero")
+    figure.update_yaxes(title_text=label, rangemode="tozero", exponentformat="power")
     return figure
 
 

@@ -136,8 +136,10 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
 
 def _of_run(measures: Any) -> str:
     """Return a sentence on a run."""
+    about = measures.get("static_deflection", 0.0)
+    dynamic = f" ({1e6 * measures['amplitude_mean_dynamic']:.4g} µm about the static deflection)" if about else ""
     return (
         f"At {measures['frequency']:.6g} Hz the mean of the periods' peaks is {1e6 * measures['amplitude_mean']:.4g} "
-        f"µm, with {measures['impacts_per_period']:.3g} impacts per period ({measures['classification']}, status "
-        f"{measures['status']})."
+        f"µm{dynamic}, with {measures['impacts_per_period']:.3g} impacts per period ({measures['classification']}, "
+        f"status {measures['status']})."
     )

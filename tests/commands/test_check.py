@@ -231,6 +231,14 @@ def test_study(tmp_path, capfd):
     assert found["reference_amplitude"] == pytest.approx(found["resonance_amplitude"], rel=1e-6)
 
 
+def test_life(tmp_path, capfd):
+    tables = {"wear": {"coefficient": 1e-4, "hardness": 2e9}, "life": {"band": [2380.0, 2400.0], "hours": 500.0}}
+    found = checked(tmp_path, capfd, DAMPED | tables)
+    assert found["kind"] == "life" and found["commands"] == ["life"] and found["hours"] == 500.0
+    assert found["sliding_wear_rate"] == pytest.approx(5e-14)
+    assert found["reference_amplitude"] == pytest.approx(found["resonance_amplitude"], rel=1e-6)
+
+
 def test_case_of_a_generator(tmp_path, capfd):
     text = changed(BLOCK, ("count = 6", "max_frequency = 2e4"))
     found = checked(tmp_path, capfd, text)

@@ -20,6 +20,7 @@ from tests.tools.processes import RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.contact_numbers import ContactFile
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
@@ -29,6 +30,7 @@ from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.identification.tables import IdentificationFile
+from vanedamp.studies.life.study import LifeStudy
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.pipeline.tables import PipelineFile
 
@@ -95,24 +97,34 @@ OSCILLATOR = changed(SCENE, ("stiffness = 1e4", "stiffness = 2.26e8"), ("frequen
 
 def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
-    if {"matrices", "numbers"} & tables.keys():
+    if {"matrices", "numbers", "pair"} & tables.keys():
         return tables
     scene = {
         "structure",
+        "contact",
         "excitation",
         "sweep",
         "continuation",
         "optimise",
+        "life",
+        "wear",
         "orbit",
         "ramp",
         "ring_down",
     } & tables.keys()
     base = tomllib.loads(OSCILLATOR if scene else CLUSTER)
+    contact = tables.get("contact", {})
+    if contact.get("law") == "hertz":
+        del base["damper"][0]["restitution"]
+    if contact.get("stiffness") == "patch":
+        tables["structure"] = {"model": "rom", "file": "rom.h5"}
     if "structure" in tables:
         ReducedModel.from_matrices(np.eye(2), np.diag([2.26e8, 1e10]), {"tip": [1.0, 0.5]}, damping_ratio=0.01).save(
             folder / "rom.h5"
         )
         base["excitation"]["at"] = base["cavity"][0]["floor"] = "tip"
+    if "life" in tables:
+        base["wear"] = {"rate": 1e-14}
     for name in ("material", "modes"):
         if name in base and name in tables:
             tables[name] = base[name] | tables[name]
@@ -138,8 +150,16 @@ def test_files_are_read(example, tmp_path):
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "numbers" in tables:
         assert len(validate(IdentificationFile, tables, "study").numbers) == 2
+    elif "pair" in tables:
+        assert validate(ContactFile, tables, "pair").pair.contact is not None
+    elif "contact" in tables:
+        assert Scene.load(path).contact.pair is not None
     elif "optimise" in tables:
         assert Study.load(path).table.variables.bodies == (1, 4)
+    elif "life" in tables:
+        assert LifeStudy.load(path).table.threshold == 0.5
+    elif "wear" in tables:
+        assert Scene.load(path).wear is not None
     elif "orbit" in tables:
         assert Scene.load(path).orbit is not None
     elif "ramp" in tables:
@@ -166,7 +186,9 @@ def test_example_files_are_read(path, tmp_path):
     if "[mesh]" in path.read_text():
         assert Case.load(path).campbell is not None
         return
-    scene = Study.load(path).scene if "[optimise]" in path.read_text() else Scene.load(path)
+    of_study = {"[optimise]": Study, "[life]": LifeStudy}
+    load = next((kind.load for table, kind in of_study.items() if table in path.read_text()), None)
+    scene = Scene.load(path) if load is None else load(path).scene
     assert scene.damper
 
 

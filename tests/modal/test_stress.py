@@ -5,7 +5,7 @@ import pytest
 
 from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
-from vanedamp.modal.stress import hot_spot, peak_stresses
+from vanedamp.modal.stress import hot_spot, nodal_von_mises, peak_stresses
 
 STEEL = Material(young=2.0e11, poisson=0.25, density=8000.0)
 
@@ -29,6 +29,14 @@ def test_the_largest_stress_in_closed_form(solid, stretched):
     assert spot.stress == pytest.approx(2.0 * shear * 1e-3 * 2.0, rel=1e-9)
     assert spot.coordinates[0] == pytest.approx(2.0, abs=1e-12)
     assert (spot.group, spot.strength) == ("far", 4e8)
+
+
+def test_nodes_have_the_largest_stress_of_their_cells(solid, stretched):
+    nodes, stress = solid.assemble({}, 0.0).coordinates, nodal_von_mises(solid, stretched)
+    shear = 0.5 * STEEL.young / (1.0 + STEEL.poisson)
+    corners = stress > 0.0
+    assert stress[corners] == pytest.approx(2.0 * shear * 1e-3 * nodes[corners, 0], rel=1e-9)
+    assert np.isclose(nodes[corners, 0], 2.0).any() and not corners.all()
 
 
 def test_round_off_does_not_choose_between_equal_stresses(solid, stretched):

@@ -1,5 +1,7 @@
 """Displacements and stresses as outputs of a reduced model, and their histories in damped runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
@@ -121,6 +123,17 @@ def test_stress_history_of_a_damped_run_equals_modal_superposition(block, tmp_pa
     assert scale > 1e6
     assert np.abs(own.values - other.values).max() < 0.01 * scale
     assert np.abs(von_mises(own.values) - von_mises(other.values)).max() < 0.01 * scale
+
+
+def test_hot_spots_of_earlier_files_are_coordinates():
+    """Their provenance has a list by name; of other outputs, and of incomplete stresses, there is nothing."""
+    rows = {f"{name}.{part}": np.zeros(2) for name in ("hot1", "mine") for part in COMPONENTS}
+    model = ReducedModel.from_matrices(
+        np.eye(2), np.eye(2), {"tip": 0}, damping_ratio=0.1, provenance={"hot_spots": {"hot1": [1.0, 2.0, 3.0]}}
+    )
+    model = with_outputs(model, rows | {"tip.x": np.zeros(2), "part.xx": np.zeros(2)})
+    assert hot_spots(model) == {"hot1": {"coordinates": [1.0, 2.0, 3.0]}, "mine": {}}
+    assert hot_spots(replace(model, outputs=(), output_rows=None)) == {}
 
 
 def test_what_does_not_fit(block, tmp_path):

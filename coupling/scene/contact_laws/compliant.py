@@ -112,6 +112,21 @@ def damping_ratio(restitution: float) -> float:
     return float(brentq(lambda ratio: 2 * ratio * _turn(ratio) - loss, 0.0, 1 / math.sqrt(restitution), xtol=1e-15))
 
 
+def peak_over_mean(restitution: float) -> float:
+    """Return the largest force of a collision over the mean one, its impulse by its duration.
+
+    With sin a the damping ratio it is m v omega exp(-(pi/2 - 3 a) tan a), or, from a ratio of 1/2 on, the dashpot's at
+    the first moment. Restitutions beyond 1 and below 1e-6 count as these.
+    """
+    left = min(max(restitution, 1e-6), 1.0)
+    ratio = damping_ratio(left)
+    peak = 2 * ratio
+    if ratio < 0.5:
+        angle = math.asin(ratio)
+        peak = math.exp(-(math.pi / 2 - 3 * angle) * math.tan(angle))
+    return peak * 2 * _turn(ratio) / (1 + left)
+
+
 def _turn(ratio: float) -> float:
     """Return acos(z)/sqrt(1 - z^2) of a damping ratio z, or its continuation acosh(z)/sqrt(z^2 - 1) above 1.
 

@@ -67,5 +67,6 @@ def run_ensemble(arguments: Namespace, scene: Scene) -> None:
 def _at_one_frequency(result: Ensemble) -> Iterator[str]:
     yield f"{'':26} {'5 %':>12} {'25 %':>12} {'50 %':>12} {'75 %':>12} {'95 %':>12}"
     for name, values in result.quantile.items():
-        unit = (AT_POINTS | OF_CURVES)[name].replace("1", "")
+        unit = (AT_POINTS | OF_CURVES)[name]
+        unit = "" if unit == "1" else unit
         yield f"{name:26} {' '.join(f'{value:12.6g}' for value in values.tolist())} {unit}".rstrip()

@@ -11,7 +11,15 @@ import numpy as np
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
 from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, Ensemble
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.studies.report.ensemble_charts import along, bands_figure, has_bars, indices_figure, places, title
+from vanedamp.studies.report.ensemble_charts import (
+    along,
+    bands_figure,
+    bar_names,
+    has_bars,
+    indices_figure,
+    places,
+    title,
+)
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
@@ -46,7 +54,7 @@ def _ensemble(file: str, record: Ensemble, page: Page) -> dict[str, Any]:
         shown.append({"title": title(record, place), "bands": bands, "bars": bars})
     return {
         "file": file, "record": record, "curves": shown, "every": len(all_places), "quantiles": QUANTILES,
-        "ranges": [(path, unit_of(path).replace("1", ""), *record.scene.ranges[path]) for path in record.numbers],
+        "ranges": [(path, _shown(unit_of(path)), *record.scene.ranges[path]) for path in record.numbers],
         "sentences": list(record.sentences())[:_MOST], "rows": list(_quantile_rows(record)),
     }  # fmt: skip
 
@@ -64,7 +72,7 @@ def _curve_rows(record: Ensemble, place: tuple[Any, ...]) -> Iterator[list[Any]]
 
 def _index_rows(record: Ensemble, place: tuple[Any, ...]) -> Iterator[list[Any]]:
     at = tuple(one for one in place if not isinstance(one, slice))
-    for name in OF_CURVES:
+    for name in bar_names(record):
         found = record.indices[name][(slice(None), slice(None), *at)].T.tolist()
         yield from ([name, number, *values] for number, values in zip(record.numbers, found, strict=True))
 
@@ -73,6 +81,10 @@ def _quantile_rows(record: Ensemble) -> Iterator[tuple[str, str, list[float]]]:
     """Yield name, unit and quantiles of the results of a single curve, at one frequency of all results."""
     units = AT_POINTS | OF_CURVES if not record.axes else OF_CURVES
     for name, unit in units.items():
-        if record.quantile[name].ndim == 1:
+        if name in record.quantile and record.quantile[name].ndim == 1:
             factor = 1e6 if unit == "m" else 1.0
-            yield name, "µm" if unit == "m" else "", (factor * record.quantile[name]).tolist()
+            yield name, "µm" if unit == "m" else _shown(unit), (factor * record.quantile[name]).tolist()
+
+
+def _shown(unit: str) -> str:
+    return "" if unit == "1" else unit

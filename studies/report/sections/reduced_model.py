@@ -1,4 +1,4 @@
-"""Reduced models: frequencies, and the mass that an impact feels."""
+"""Reduced models: frequencies, the mass that an impact feels, and hot spots on the mesh."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.hot_spots import spot_lines
+from vanedamp.studies.report.charts import Chart
+from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
@@ -21,11 +25,15 @@ def load(path: Path) -> Result:
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
     """Return the tables of every model."""
-    return [_reduction(file, result.record) for file, result in results.items()]
+    return [_reduction(file, result.record, page) for file, result in results.items()]
 
 
-def _reduction(file: str, model: ReducedModel) -> dict[str, Any]:
+def _reduction(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
+    spots = hot_spots(model)
+    placed = {name: facts for name, facts in spots.items() if "coordinates" in facts}
     return {
+        "spots": list(spot_lines(spots)),
+        "picture": _picture(file, model, placed, page) if placed else None,
         "file": file,
         "interface": model.interface,
         "masses": [
@@ -40,3 +48,16 @@ def _reduction(file: str, model: ReducedModel) -> dict[str, Any]:
         "rotation": model.provenance.get("rotation", {}).get("sentence"),
         "damping_ratio": model.damping_ratio,
     }
+
+
+def _picture(file: str, model: ReducedModel, spots: Mapping[str, Mapping[str, Any]], page: Page) -> Chart | None:
+    """Return the hot spots on the mesh of the page's modes, with their first bending's stress; None without."""
+    mesh = model.provenance.get("matrices", {}).get("mesh_sha256")
+    for modes, result in page.results.kinds["modes"].items():
+        values, attributes = result.record
+        same = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
+        surface = small_surface(values) if same and "von_mises" in values else None
+        if surface is not None:
+            figure = spots_figure(values, surface, int(attributes["first_bending"]), spots)
+            return page.chart("spots", figure, ("x", "y", "z", "stress"), spots_rows(values, surface), [file, modes])
+    return None

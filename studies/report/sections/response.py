@@ -40,6 +40,7 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
     largest = max(map(abs, energies.values()), default=0.0)
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
     shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
+    shown["static"] = history.measures.get("static_deflection", 0.0)  # earlier files have none
     shown |= {"hits": bool(history.hits), "note": body_note(history.measures, history.scene)}
     shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear"))
     if stress := history.measures.get("stress"):

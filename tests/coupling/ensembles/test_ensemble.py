@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from tests.coupling.strength.test_strength_of_runs import FACTS, saved
+from tests.coupling.strength.test_stressed_runs import scene as rom_scene
 from tests.tools.input_files import OSCILLATOR, RESONANCE
 from tests.tools.sweep_processes import DATA
 from vanedamp.coupling.ensembles.design import QUANTILES
 from vanedamp.coupling.ensembles.ensemble import ensemble
-from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, Ensemble
+from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, STRENGTH, WEAR, Ensemble
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
@@ -20,6 +22,8 @@ LINEAR = OSCILLATOR | {
     "excitation": {"frequency": RESONANCE, "force": 2.0}, "cavity": [], "damper": [],
     "structure": OSCILLATOR["structure"] | {"damping_ratio": 0.1}, "time": {"periods": 60, "transient": 50},
 }  # fmt: skip
+#: results of models with hot spots, and of scenes with wear
+FURTHER = {name for part in (STRENGTH, WEAR) for one in part for name in (one, f"peak_{one}")}
 RANGES = {"damper.0.friction": (0.1, 0.5), "cavity.0.gap": (1e-4, 5e-4)}
 
 
@@ -119,7 +123,8 @@ def test_a_record_comes_back(result, tmp_path):
     result.save(tmp_path / "ensemble.h5")
     found = Ensemble.load(tmp_path / "ensemble.h5")
     assert found.scene == result.scene and found.numbers == result.numbers
-    for name in (*AT_POINTS, *OF_CURVES):
+    assert found.quantile.keys() == result.quantile.keys() == {*AT_POINTS, *OF_CURVES} - FURTHER
+    for name in found.quantile:
         np.testing.assert_array_equal(found.quantile[name], result.quantile[name])
     np.testing.assert_array_equal(found.indices["reduction"], result.indices["reduction"])
     assert found.to_json() == result.to_json() and found.to_json()["points_not_ok"] == 0
@@ -136,3 +141,47 @@ def test_bad_ensembles_are_one_line():
     with pytest.raises(InputError, match="position") as told:
         ensemble(damped().replace({"ranges": {k: list(v) for k, v in table.items()}}))
     assert "\n" not in str(told.value)
+
+
+def test_wear_is_in_proportion_to_its_rate():
+    table = {"wear": {"rate": 1e-15, "area": 1e-5}, "sweep": {}}
+    found = ensemble(scene(DATA, {"wear.rate": (1e-16, 1e-14)}, 8, **table))
+    assert found.not_ok == 0
+    volume = found.members["wear_volume_rate"] / found.samples["wear.rate"]
+    np.testing.assert_allclose(volume, volume[0], rtol=1e-12)
+    assert volume[0] > 0.0
+    np.testing.assert_array_equal(found.quantile["peak_wear_volume_rate"], found.quantile["wear_volume_rate"])
+    # the motion is the same
+    assert np.isnan(found.indices["amplitude_mean"]).all() and np.isfinite(found.indices["wear_volume_rate"]).all()
+
+
+def test_stress_of_a_reduced_model(tmp_path):
+    file = saved(tmp_path / "rom.h5", FACTS)
+    stressed = rom_scene(file, cavity=[], damper=[], time={"periods": 600, "transient": 500})
+    level, path = 1e-4, "excitation.resonance_amplitude"
+    found = ensemble(stressed.replace({path: [0.5 * level, 1.5 * level], "ensemble": {"samples": 4}}))
+    own = simulate(stressed)
+    # the linear structure answers in proportion
+    scale = found.samples[path] / level
+    worst = max(spot.von_mises for spot in own.stress)
+    np.testing.assert_allclose(found.members["stress_von_mises"], worst * scale, rtol=1e-6)
+    worst = max(spot.strength["utilisation"] for spot in own.stress)
+    np.testing.assert_allclose(found.members["utilisation"], worst * scale, rtol=1e-6)
+    found.save(tmp_path / "ensemble.h5")
+    again = Ensemble.load(tmp_path / "ensemble.h5")
+    np.testing.assert_array_equal(again.quantile["peak_utilisation"], found.quantile["utilisation"])
+
+
+def test_curves_over_other_axes():
+    table = {"damper.0.restitution": [0.3, 0.6], "excitation.frequency": [0.98 * RESONANCE, RESONANCE]}
+    found = ensemble(damped(sweep=table))
+    assert found.curves == ("damper.0.restitution",) and found.quantile["amplitude_max"].shape == (5, 2, 2)
+    assert found.quantile["reduction"].shape == (5, 2) and found.indices["reduction"].shape == (4, 2, 2)
+    assert [text.partition(":")[0] for text in found.sentences()] == [
+        "damper.0.restitution = 0.3", "damper.0.restitution = 0.6"
+    ]  # fmt: skip
+    without = ensemble(damped(sweep={"damper.0.restitution": [0.3, 0.6]}))
+    assert without.curves == ("damper.0.restitution",) and without.quantile["peak_amplitude"].shape == (5, 2)
+    np.testing.assert_array_equal(without.quantile["peak_amplitude"], without.quantile["amplitude_mean_dynamic"])
+    for record in (found, without):
+        assert record.plot().layout.xaxis2.title.text

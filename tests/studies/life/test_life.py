@@ -17,7 +17,7 @@ from vanedamp.studies.life import fast
 from vanedamp.studies.life.life import life
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.life.study import LifeStudy
-from vanedamp.studies.report.life_charts import life_figure
+from vanedamp.studies.report.plot import plot
 
 
 def study(**changes):
@@ -113,6 +113,20 @@ def test_failed_runs_damp_nothing_and_are_reported(found):
     assert unsure.trouble == unsure.runs and unsure.reduction[0] == pytest.approx(0.7)
 
 
+def test_runs_that_failed_say_nothing_of_their_frequencies(monkeypatch):
+    damper = Damper()
+
+    def one_fails(scene):
+        response = damper(scene)
+        response.status = Status.EVENT_BUDGET if scene.frequency > 2410.0 else response.status
+        return response
+
+    monkeypatch.setattr(fast, "simulate", one_fails)
+    record = life(study(hours=10.0))
+    assert 2 * record.trouble == record.runs and np.isnan(record.amplitude[:, 1]).all()
+    assert record.reduction[0] == pytest.approx(0.7) and record.depth_rate[0, 1] == pytest.approx(GAP / HOURS / 2)
+
+
 def test_resumes_after_an_interrupt_at_any_run(monkeypatch, tmp_path):
     case, kept = study(), tmp_path / "life.h5.partial"
     monkeypatch.setattr(fast, "simulate", Damper())
@@ -151,7 +165,7 @@ def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     assert main(["report", str(out), "-o", str(tmp_path / "page.html")]) == 0
     page = (tmp_path / "page.html").read_text()
     assert record.sentence[1:] in page and "left of body 0" in page
-    figure = life_figure(record)
+    figure = plot(str(out))
     curves = {trace.name: trace for trace in figure.data if trace.name}
     assert np.allclose(curves["reduction"].y, 100 * record.reduction)
 

@@ -163,7 +163,7 @@ def test_the_search_finds_a_known_optimum(tmp_path, monkeypatch):
         ]
         shape = (len(designs), len(sample), len(self.study.frequencies))
         self.scenes += np.prod(shape)
-        return np.broadcast_to(np.reshape(values, (-1, 1, 1)), shape), np.ones(shape)
+        return np.broadcast_to(np.reshape(values, (-1, 1, 1)), shape), np.ones(shape), np.zeros(shape)
 
     monkeypatch.setattr(module._Trial, "_run", bowl)
     change = {"evaluations": 600, "gradient_steps": 0}  # the gradient has no bowl
@@ -249,7 +249,7 @@ def test_a_design_with_a_run_that_is_not_ok_never_wins(tmp_path, monkeypatch):
         masses = np.array([design.mass_ratio for design in designs])
         damped = np.broadcast_to(masses[:, None, None], shape).copy()
         damped[masses < 0.01, :, 0] = np.nan
-        return damped, np.ones(shape)
+        return damped, np.ones(shape), np.zeros(shape)
 
     def mean(data):
         data["optimise"] |= {"over_band": "mean", "over_tolerances": "mean"}

@@ -20,6 +20,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import Variable, load, save, write_json
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves
@@ -181,6 +182,24 @@ def test_surface_of_blocks_is_closed_and_outside():
         assert np.einsum("ij,ij->", normals, (a + b + c) / 9) == pytest.approx(2.0)
         lengths = np.linalg.norm(np.diff(points[sharp_edges(points, triangles)], axis=1), axis=-1)
         assert lengths.sum() == pytest.approx(16.0)  # no edge across a flat side
+
+
+def test_hot_spots_are_marked_where_the_stress_is_largest(results, tmp_path):
+    rom = tmp_path / "rom.h5"
+    assert main(["reduce", str(results / "case.toml"), "--modes", "2", "--hot-spots", "2", "-o", str(rom)]) == 0
+    write_report(collect([rom, results / "modes.h5"]), tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    mesh, spots = charts(text)["spots-0"]
+    facts = hot_spots(ReducedModel.load(rom))
+    assert spots["text"] == list(facts)
+    first = 1e3 * np.array(facts["hot1"]["coordinates"])
+    assert [spots[axis][0] for axis in "xyz"] == pytest.approx(first)
+    # nodes have the largest stress of their cells, in MPa per um
+    stress, places = np.array(mesh["intensity"]), np.column_stack([mesh[axis] for axis in "xyz"])
+    own = stress[np.argmin(np.linalg.norm(places - first, axis=1))]
+    assert own == pytest.approx(stress.max(), rel=0.01)
+    assert own == pytest.approx(1e-12 * facts["hot1"]["per_amplitude"]["von_mises"], rel=0.01)
+    assert "MPa per um of tip" in text
 
 
 @pytest.mark.slow

@@ -17,8 +17,9 @@ _MPA = ("MPa", 1e-6)
 def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     """Yield a line for each hot spot (rom.recovery.hot_spots): place, stress of the first mode, static stresses."""
     for name, facts in spots.items():
-        x, y, z = facts["coordinates"]
-        line = f"{name} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
+        line = name
+        if "coordinates" in facts:
+            line += " at ({:.4g}, {:.4g}, {:.4g}) m".format(*facts["coordinates"])
         line += f" in {facts['group']}" if facts.get("group") else ""
         parts = []
         if mode := facts.get("per_amplitude"):
