@@ -38,7 +38,7 @@ class FileKind(NamedTuple):
     """A kind of input file.
 
     name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
-    completed: "module:function" that takes the schema of the record and returns that of the files, "" for the same.
+    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none.
     """
 
     name: str
@@ -53,9 +53,13 @@ class FileKind(NamedTuple):
 
     @property
     def schema(self) -> dict[str, Any]:
-        """JSON Schema of the files of this kind."""
-        made = schema(self.record)
-        return _at(self.completed)(made) if self.completed else made
+        """JSON Schema of the record: every key with what it holds."""
+        return schema(self.record)
+
+    @property
+    def file_schema(self) -> dict[str, Any]:
+        """JSON Schema of the files of this kind, by which editors check them."""
+        return _at(self.completed)(self.schema) if self.completed else self.schema
 
 
 def _at(place: str) -> Any:
