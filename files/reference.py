@@ -108,14 +108,10 @@ def constants(node: dict[str, Any]) -> dict[str, str]:
 
 
 def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a table among the variants that a node stands for: the one with its constants, or keys."""
+    """Return the schema of a table among the variants that a node stands for: the one whose constants it has."""
     tables = [option for option in options(schema, node) if option.get("type") == "object"]
     fitting = [one for one in tables if all(table.get(key) == value for key, value in constants(one).items())]
-
-    def fit(one: dict[str, Any]) -> tuple[int, int]:
-        return len(constants(one)), len(one.get("properties", {}).keys() & table.keys())
-
-    return max(fitting, key=fit) if fitting else next(iter(tables), {})
+    return max(fitting, key=lambda one: len(constants(one))) if fitting else next(iter(tables), {})
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:

@@ -82,12 +82,16 @@ def with_ranges(schema: dict[str, Any]) -> dict[str, Any]:
 
 def _ranged(node: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a key whose number may be a range; of any other key as it is."""
-    if node.get("type") != "number":
+    forms = node.get("oneOf", node.get("anyOf", [node]))  # a word may stand for a number, too
+    plain_number = next((form for form in forms if form.get("type") == "number"), None)
+    if plain_number is None:
         return node
     bounds = ("type", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
-    number = {key: node[key] for key in bounds if key in node}
+    number = {key: plain_number[key] for key in bounds if key in plain_number}
     pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
-    return {key: value for key, value in node.items() if key not in number} | {"anyOf": [number, pair]}
+    words = [form for form in forms if form is not plain_number]
+    rest = {key: value for key, value in node.items() if key not in (*number, "oneOf", "anyOf")}
+    return rest | {"anyOf": [number, pair, *words]}
 
 
 def _peeled(data: dict[str, Any], places: list[list[Any]], source: str) -> dict[str, Any]:

@@ -211,6 +211,11 @@ class Scene(OpenRecord, Displayed):
             self._check_row(cavity)
         if self.planar:
             self._check_plane()
+        if self.wear is not None and self.contact.parallel:
+            raise ValueError(
+                f'wear: each spring of law = "{self.contact.law}" counts as an impact; take law = "compliant" with a '
+                "stiffness"
+            )
         if self.excitation.engine_order is not None and not self.speed:
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_rotation()

@@ -22,12 +22,16 @@ _Key = tuple[int, str, int]
 
 
 class Impact(NamedTuple):
-    """An impact: contact, speed of approach, m/s, largest force, N, and duration, s."""
+    """An impact: contact, speed of approach, m/s, and the energy, J, of Hertz's contact under its largest force.
+
+    mass: kg, of the collision; duration: s, None where it is that of Hertz's collision.
+    """
 
     key: _Key
     speed: float
-    force: float
-    duration: float
+    energy: float
+    mass: float
+    duration: float | None
 
 
 def wanted(scene: Scene) -> bool:
@@ -44,11 +48,12 @@ def with_contacts(scene: Scene, response: Response, events: bool) -> Response:
     begin = response.transient / response.frequency
     kept = response.event_list if events else ()
     try:
-        found = list(impacts_of(contact, not scene.contact.rigid, response.event_list, begin))
+        found: dict[_Key, list[Impact]] = {}
+        for impact in impacts_of(contact, not scene.contact.rigid, response.event_list, begin):
+            found.setdefault(impact.key, []).append(impact)
+        strengths = tuple(_strength(impacts, contact, pair.first_yield) for impacts in found.values())
     except ValueError as error:
         return replace(response, event_list=kept, warnings=(*response.warnings, f"contact.pair: {error}"))
-    keys = dict.fromkeys(impact.key for impact in found)
-    strengths = tuple(_strength([one for one in found if one.key == key], contact, pair.first_yield) for key in keys)
     return replace(
         response, contacts=strengths, event_list=kept,
         warnings=response.warnings + tuple(_warnings(strengths, pair.restitution_speeds)),
@@ -69,11 +74,12 @@ def impacts_of(contact: Contact, compliant: bool, events: Sequence[Event], begin
         end, impulse, single = ends.get((key, event.time), (None, abs(event.impulse), True))
         if end is not None and single:
             duration = end - event.time
-            yield Impact(key, speed, peak_over_mean(after / speed) * impulse / duration, duration)
+            force = peak_over_mean(after / speed) * impulse / duration
+            yield Impact(key, speed, contact.energy(force), 0.0, duration)
             continue
-        known = collision(contact, impulse / (speed + after), speed)
+        mass = impulse / (speed + after)
         until[key] = event.time if end is None else end
-        yield Impact(key, speed, known.force, known.duration if end is None else end - event.time)
+        yield Impact(key, speed, 0.5 * mass * speed**2, mass, None if end is None else end - event.time)
 
 
 def _ends(events: Sequence[Event]) -> dict[tuple[_Key, float], tuple[float, float, bool]]:
@@ -97,17 +103,18 @@ def _ends(events: Sequence[Event]) -> dict[tuple[_Key, float], tuple[float, floa
 
 def _strength(impacts: list[Impact], contact: Contact, first_yield: float | None) -> ContactStrength:
     """Return the strength of one contact, from its impacts."""
-    worst = max(impacts, key=lambda impact: impact.force)
-    pressure = contact.pressure(worst.force)
+    worst = max(impacts, key=lambda impact: impact.energy)
+    force, duration = contact.force_of_energy(worst.energy), worst.duration
+    if duration is None:
+        duration = collision(contact, worst.mass, worst.speed).duration
+    pressure = contact.pressure(force)
     utilisation = yielding = None
     if first_yield is not None:
-        limit = contact.force_of_pressure(first_yield)
+        limit = contact.energy(contact.force_of_pressure(first_yield))
         utilisation = pressure / first_yield
-        yielding = sum(impact.force > limit for impact in impacts) / len(impacts)
+        yielding = sum(impact.energy > limit for impact in impacts) / len(impacts)
     fastest = max(impact.speed for impact in impacts)
-    return ContactStrength(
-        *worst.key, len(impacts), fastest, worst.force, worst.duration, pressure, utilisation, yielding
-    )  # fmt: skip
+    return ContactStrength(*worst.key, len(impacts), fastest, force, duration, pressure, utilisation, yielding)
 
 
 def _warnings(strengths: Sequence[ContactStrength], speeds: tuple[float, float] | None) -> Iterator[str]:

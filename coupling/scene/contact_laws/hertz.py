@@ -23,6 +23,7 @@ class Hertz(ContactLaw):
     """
 
     rigid: ClassVar[bool] = False
+    parallel: ClassVar[bool] = True
     force: Positive
     """largest force up to which the springs follow the contact; beyond, they stiffen no more [N]"""
     springs: Annotated[Whole, Field(ge=4, le=40)] = 10

@@ -41,6 +41,8 @@ class ContactLaw:
     rigid: ClassVar[bool] = True
     #: whether the restitution is that of impulses, of expansion to compression (Poisson), not of speeds (Newton)
     two_phases: ClassVar[bool] = False
+    #: whether a contact is several units of the engine, whose impacts count one by one
+    parallel: ClassVar[bool] = False
     pair: Pair | None = field(default=None, kw_only=True)
     """shapes and materials of what touches: for stiffness, and for the strength of contacts"""
 

@@ -47,7 +47,7 @@ def test_gap_and_hours_in_closed_form(found):
     # the floor wears by a tenth of a wall, and opens nothing
     assert record.depth[-1, 0] == pytest.approx(record.depth[-1, 1] / 10)
     assert record.gap[-1, 0] - GAP == pytest.approx(record.depth[-1, 1:].sum())
-    assert f"damps for {lost:.0f} h ({early:.0f} to {late:.0f} h)" in record.sentence
+    assert f"Damps for {lost:.0f} h ({early:.0f} to {late:.0f} h)" in record.sentence
     assert record.time[-1] < 1.2 * LOST  # it ends where nothing is left to find out
     assert record.trouble == 0 and record.runs % 2 == 0
 
@@ -80,10 +80,10 @@ def test_bands_of_scattering_runs_hold_the_hours(found):
 def test_a_damper_that_lasts_and_one_that_never_damps(found):
     record, _ = found(study(hours=500.0))
     assert record.hours == (None, None, None)
-    assert record.sentence.startswith("damps for all 500 h: the reduction is 70%")
+    assert record.sentence.startswith("Damps for all 500 h: the reduction is 70%")
     assert record.time[-1] == pytest.approx(500.0)
     never, _ = found(study(hours=500.0), share=0.6)
-    assert never.hours[0] == 0.0 and "does not damp by 50%" in never.sentence
+    assert never.hours[0] == 0.0 and "Does not damp by 50%" in never.sentence
 
 
 def test_dwell_weighs_the_points_of_the_band(found, monkeypatch):
@@ -164,7 +164,7 @@ def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     assert record.sentence in capsys.readouterr().out
     assert main(["report", str(out), "-o", str(tmp_path / "page.html")]) == 0
     page = (tmp_path / "page.html").read_text()
-    assert record.sentence[1:] in page and "left of body 0" in page
+    assert record.sentence in page and "left of body 0" in page
     figure = plot(str(out))
     curves = {trace.name: trace for trace in figure.data if trace.name}
     assert np.allclose(curves["reduction"].y, 100 * record.reduction)

@@ -5,7 +5,9 @@ import math
 import pytest
 
 import vanedamp as vd
+from tests.tools.schemas import faults
 from vanedamp.coupling.contacts.collision import collision
+from vanedamp.coupling.scene.ranges import read
 from vanedamp.files.toml_input import InputError, validate
 
 PAIR = {"young": 2e11, "radius": 0.05}
@@ -43,6 +45,19 @@ def test_the_spring_of_a_collision(match):
     else:
         assert SPEED * math.sqrt(stiffness * MASS) == pytest.approx(known.force, rel=1e-10)
         assert duration / known.duration == pytest.approx(0.8539, abs=1e-4)
+
+
+def test_ranges_of_a_stiffness_and_of_a_pair():
+    """As in the ensembles' files: a list of two numbers where one belongs, or two speeds where two belong."""
+    data = thrown({"law": "compliant", "stiffness": 1e8}).to_dict()
+    contact = {"law": "compliant", "stiffness": [1e8, 2e8]}
+    assert dict(read(vd.Scene, data | {"contact": contact}, "s").ranges) == {"contact.stiffness": (1e8, 2e8)}
+    pair = PAIR | {"young": [2e11, 2.1e11], "restitution_speeds": [0.1, 0.3]}
+    scene = read(vd.Scene, data | {"contact": {"law": "newton", "pair": pair}}, "s")
+    assert dict(scene.ranges) == {"contact.pair.young": (2e11, 2.1e11)}
+    assert scene.contact.pair.restitution_speeds == (0.1, 0.3)
+    for tables in ({"contact": contact}, {"contact": {"law": "newton", "pair": pair}}):
+        assert faults("scene", data | tables) == []
 
 
 def test_tangent_at_a_preload():

@@ -102,6 +102,7 @@ def test_blocks_hit_the_springs_of_two_corners():
     ("changes", "message"),
     [
         ({"contact": {"pair": {"young": 2e11}}}, 'contact: pair: law = "hertz" needs .contact.pair. with .*'),
+        ({"wear": {"rate": 1e-15}}, 'wear: each spring of law = "hertz" counts as an impact; .*'),
         ({"contact": {"springs": 3}}, r"contact.springs: should be greater than or equal to 4 \(got 3\)"),
         ({"body": {"restitution": 0.7}}, r"damper\[0\].restitution: a Hertzian contact loses nothing; .* \(got 0.7\)"),
         ({"contact": {"pair": PAIR | {"width": 0.01, "depth": 1e-5}}}, "contact: force: the strip of contact .*"),
