@@ -33,8 +33,8 @@ from vanedamp.coupling.system.system import System
 
 #: fields of the records with a row for every sample
 _SAMPLED = ("samples", "coordinates", "sampled", "shut")
-#: periods of each part of a run by which the error of sampling is measured
-_CHECKED = 8
+#: samples that are evaluated together, in whole periods; periods of these by which the error of sampling is measured
+_TOGETHER, _CHECKED = 20_000, 8
 
 
 def stressed(
@@ -117,9 +117,15 @@ class StressWatch:
         begin, self._taken = self._taken, done
         if not self._sampling or done <= begin or self._whole is None:
             return
-        q, rows = self._whole.coordinates, slice(begin * self.each, done * self.each)
-        if np.isnan(q[rows][:1]).any():
+        q, together = self._whole.coordinates, max(_TOGETHER // self.each, 1)
+        if np.isnan(q[begin * self.each]).any():
             return
+        for first in range(begin, done, together):
+            self._evaluate(q, first, min(first + together, done))
+
+    def _evaluate(self, q: np.ndarray, begin: int, done: int) -> None:
+        """Take the stress of some periods from the samples (n, modes) of the run, and give these back."""
+        rows = slice(begin * self.each, done * self.each)
         # the first sample has none before it where the periods before were not sampled
         before = q[max(rows.start - 1, self._parts[0][0] * self.each if self._parts else rows.start)]
         stress = self.spots.stress(np.concatenate([before[None], q[rows], q[rows][-1:]]))
