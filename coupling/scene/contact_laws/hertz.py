@@ -8,6 +8,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.contacts.collision import speed_of_force, spring
+from vanedamp.coupling.contacts.hertz import Contact
 from vanedamp.coupling.contacts.parallel_springs import Spring, parallel_springs
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole
@@ -39,22 +41,29 @@ class Hertz(ContactLaw):
         except ValueError as error:
             raise ValueError(f"force: {error}") from None
 
-    def _parallel(self) -> tuple[Spring, ...]:
+    @property
+    def _contact(self) -> Contact:
         assert self.pair is not None
         contact = self.pair.contact
         assert contact is not None
-        return parallel_springs(contact, self.force, self.springs)
+        return contact
+
+    def _parallel(self) -> tuple[Spring, ...]:
+        return parallel_springs(self._contact, self.force, self.springs)
 
     def flexibility(self, mass: float) -> float:
-        """Return the flexibility of the first spring, m/N: the largest."""
-        return 1.0 / self._parallel()[0].stiffness
+        """Return the flexibility of the spring whose collision at `force` lasts as long, m/N."""
+        return 1.0 / spring(self._contact, mass, speed_of_force(self._contact, mass, self.force), "duration")
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
-        """Return the first spring. Raises InputError for a restitution."""
+        """Return the spring whose collision at `force` lasts as long. Raises InputError for a restitution.
+
+        It is for estimates; the units have those of `layers`.
+        """
         if restitution != 1.0:
             raise InputError(f"restitution: a Hertzian contact loses nothing; drop it (got {restitution:g})")
-        return Element(1.0, self._parallel()[0].stiffness)
+        return Element(1.0, 1.0 / self.flexibility(mass))
 
     def layers(self, element: Element) -> tuple[tuple[float, Element], ...]:
         """Return the springs, each with the depth at which it begins, m."""
-        return tuple((spring.depth, Element(1.0, spring.stiffness)) for spring in self._parallel())
+        return tuple((one.depth, Element(1.0, one.stiffness)) for one in self._parallel())

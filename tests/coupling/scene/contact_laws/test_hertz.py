@@ -1,5 +1,7 @@
 """Hertzian contact as springs in parallel: free collisions of the engine against the closed form, and its laws."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -74,6 +76,15 @@ def test_errors_fall_with_the_square_of_the_springs():
             worst = max(worst, abs(pushed / CONTACT.force_of_energy(energy) - 1))
         errors.append(worst * (count - 2) ** 2)
     assert errors == pytest.approx([0.058] * 3, rel=0.03)
+
+
+def test_the_spring_of_estimates_has_the_duration_at_the_largest_force():
+    """Such as those of the number of modes that a contact needs: they take one spring."""
+    law = thrown(FASTEST).contact
+    found = law.element(1.0, MASS)
+    assert math.pi * math.sqrt(MASS / found.stiffness) == pytest.approx(collision(CONTACT, MASS, FASTEST).duration)
+    assert law.flexibility(MASS) * found.stiffness == pytest.approx(1.0)
+    assert len(law.layers(found)) == 10
 
 
 def test_energy_and_other_methods():
