@@ -61,11 +61,11 @@ class Table(NamedTuple):
 
 
 def tables(schema: Schema) -> Iterator[Table]:
-    """Yield the tables of a file in their order, each before those inside it."""
+    """Yield the tables of a file in their order, each before those inside it; one that variants share once."""
     top = _keys(schema, schema)
     if top:
         yield Table("", "Before the first table", "", "", top)
-    yield from _inner(schema, schema, "")
+    yield from dict.fromkeys(_inner(schema, schema, ""))
 
 
 def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[Table]:

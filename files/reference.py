@@ -38,7 +38,7 @@ class FileKind(NamedTuple):
     """A kind of input file.
 
     name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
-    completed: "module:function" that takes the schema of the record and returns that of the files, "" for the same.
+    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none.
     """
 
     name: str
@@ -53,9 +53,13 @@ class FileKind(NamedTuple):
 
     @property
     def schema(self) -> dict[str, Any]:
-        """JSON Schema of the files of this kind."""
-        made = schema(self.record)
-        return _at(self.completed)(made) if self.completed else made
+        """JSON Schema of the record: every key with what it holds."""
+        return schema(self.record)
+
+    @property
+    def file_schema(self) -> dict[str, Any]:
+        """JSON Schema of the files of this kind, by which editors check them."""
+        return _at(self.completed)(self.schema) if self.completed else self.schema
 
 
 def _at(place: str) -> Any:
@@ -104,14 +108,10 @@ def constants(node: dict[str, Any]) -> dict[str, str]:
 
 
 def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a table among the variants that a node stands for: the one with its constants, or keys."""
+    """Return the schema of a table among the variants that a node stands for: the one whose constants it has."""
     tables = [option for option in options(schema, node) if option.get("type") == "object"]
     fitting = [one for one in tables if all(table.get(key) == value for key, value in constants(one).items())]
-
-    def fit(one: dict[str, Any]) -> tuple[int, int]:
-        return len(constants(one)), len(one.get("properties", {}).keys() & table.keys())
-
-    return max(fitting, key=fit) if fitting else next(iter(tables), {})
+    return max(fitting, key=lambda one: len(constants(one))) if fitting else next(iter(tables), {})
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:

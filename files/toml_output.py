@@ -34,10 +34,9 @@ def write_commented(
 
     notes: as in `commented`.
     """
-    made = kind.schema
-    write_schema(Path(path).with_name(schema_name(kind.name)), made)
+    write_schema(Path(path).with_name(schema_name(kind.name)), kind.file_schema)
     with replacing(path) as temporary:
-        temporary.write_text(commented(data, made, kind.name, notes), encoding="utf-8")
+        temporary.write_text(commented(data, kind.schema, kind.name, notes), encoding="utf-8")
 
 
 def write_schema(path: str | Path, schema: Mapping[str, Any]) -> None:

@@ -94,8 +94,19 @@ class Ensemble(SceneRecord, Plotted):
         due = ", ".join(f"{self.numbers[one]} {total[one]:.2f} ± {confidence[one]:.2f}" for one in order)
         return (
             f"reduction {middle:.3f} in the median, {low:.3f} to {high:.3f} in 90 % of the samples; "
-            f"{f'its spread by total index: {due}' if due else 'it does not spread'}"
+            f"{f'its spread by total index: {due}' if due else 'it does not spread'}{self._remark(place)}"
         )
+
+    def _remark(self, place: tuple[Any, ...]) -> str:
+        """Return how many samples of a curve have no peak within its range, in words; nothing for none."""
+        swept = resonance_axis(self.scene, self.axes)[0]
+        if swept is None or len(self.axes[swept]) < 2:
+            return ""
+        mean = np.where(self.status == "ok", self.members["amplitude_mean_dynamic"], -np.inf)
+        curves = np.moveaxis(mean, 1 + list(self.axes).index(swept), -1)[(slice(None), *place)]
+        top = self.axes[swept][curves.argmax(axis=-1)]
+        share = float(np.isin(top, (self.axes[swept].min(), self.axes[swept].max())).mean())
+        return f"; in {share:.0%} of the samples the peak lies at an edge of the range" if share else ""
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data: axes, ranges, quantiles and indices; the file has all members."""

@@ -33,8 +33,10 @@ class ContactWork(NamedTuple):
         return float(self.course[:, 1].sum())
 
 
-def contact_name(damper: int, side: str, corner: int) -> str:
-    """Return the name of a contact for people."""
+def contact_name(damper: int, side: str, corner: int = -1) -> str:
+    """Return the name of a contact, or of a face without corner, for people."""
+    if side == "body":
+        return f"bodies {damper} and {damper + 1}"
     what = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
     return f"{what} {damper}" + (f", corner {corner}" if corner >= 0 else "")
 

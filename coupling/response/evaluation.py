@@ -194,7 +194,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         status = Status.TILTED if tilted and status in _USABLE else status
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
-    if scene.wear is not None:
+    if scene.wear is not None and records.worn.shape[1]:  # a ring-down does not count it
         extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
     return Response(
         status=status,

@@ -14,6 +14,8 @@ from vanedamp.files.toml_input import STRICT, Positive, Real
 MeanStress = Literal["none", "goodman", "gerber", "soderberg"]
 #: the strength that each line of mean stress ends at
 LIMITS = {"goodman": "tensile_strength", "gerber": "tensile_strength", "soderberg": "yield_strength"}
+# exponent beyond which a curve is no curve, and its gamma functions overflow
+_STEEPEST = 50
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -32,11 +34,11 @@ class Fatigue:
     the yield strength (default: "goodman" with a tensile strength, else "none")"""
     criterion: Literal["von_mises", "principal"] = "von_mises"
     """stress that counts: signed von Mises (ductile materials) or the largest principal stress (brittle ones)"""
-    exponent: Positive | None = None
+    exponent: Annotated[Positive, Field(le=_STEEPEST)] | None = None
     """Basquin's exponent k of the curve N = knee (amplitude / strength)^-k; without it there is no life [-]"""
     knee: Positive | None = None
     """cycles at the knee of the curve, at which the amplitude is `strength` [-]"""
-    after_knee: Literal["none", "original", "haibach"] | Positive = "haibach"
+    after_knee: Literal["none", "original", "haibach"] | Annotated[Positive, Field(le=2 * _STEEPEST)] = "haibach"
     """curve below `strength`: "none" (an endurance limit: no damage), "original" (exponent k), "haibach" (2 k - 1), or
     an exponent [-]"""
     scatter: Annotated[Real, Field(ge=1)] = 1.0

@@ -78,6 +78,14 @@ def spots_of(scene: Scene) -> Spots | None:
     return Spots(facts, rows, squares, scene.speed)
 
 
+def known_spots(scene: Scene) -> Spots:
+    """Return the hot spots of a scene without open choices. Raises InputError for a structure without any."""
+    spots = spots_of(scene)
+    if spots is None:
+        raise InputError("structure: no hot spots; take a reduced model with them (vanedamp reduce --hot-spots 3)")
+    return spots
+
+
 def samples_of(scene: Scene, system: System, spots: Spots, asked: int = 0) -> int:
     """Return the number of samples per period from which stresses are taken: a multiple of `asked`, even if possible.
 

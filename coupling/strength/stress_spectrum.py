@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.spot_stress import LINEAR
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.spectral import (
@@ -15,7 +13,8 @@ from vanedamp.coupling.strength.spectral import (
     spectral_density,
     von_mises_components,
 )
-from vanedamp.coupling.strength.spots import Spots, spots_of
+from vanedamp.coupling.strength.spots import Spots, known_spots
+from vanedamp.coupling.strength.stress_history import stress_history
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import InputError
 
@@ -27,7 +26,7 @@ def linear_moments(scene: Scene, spots: Spots | None = None) -> dict[str, list[M
     curve with a sine at a resonance without damping. spots: the scene's. Raises InputError for a scene without hot
     spots, or another excitation.
     """
-    spots = spots or _spots(scene)
+    spots = spots or known_spots(scene)
     if scene.excitation.signal is not None:
         raise InputError(f'excitation.waveform: no spectrum of "{scene.excitation.signal.shape}"; take a multi-sine')
     found = {}
@@ -49,24 +48,12 @@ def run_moments(scene: Scene, samples_per_period: int, highest_hz: float | None 
     whose l4 grows with that frequency. Raises InputError for a scene without hot spots, or a method that keeps no modal
     coordinates.
     """
-    scene = choose(scene).scene
-    spots = _spots(scene)
-    response = respond(scene, samples_per_period=samples_per_period)
-    if response.coordinates is None:
-        raise InputError(f"solver.method: {scene.solver.method} keeps no samples of modal coordinates")
-    kept = response.coordinates[response.transient * samples_per_period :]
-    stress = von_mises_components(np.moveaxis(spots.stress(kept), 1, 0))
-    rate = 1.0 / float(response.time[1] - response.time[0])
+    history = stress_history(scene, samples_per_period)
+    stress = von_mises_components(np.moveaxis(history.stress, 1, 0))
+    rate = 1.0 / float(history.time[1] - history.time[0])
     found = []
-    for place in range(len(spots.rows)):
+    for place in range(len(history.spots)):
         hertz, density = spectral_density(stress[:, place], rate)
         below = hertz <= (highest_hz or np.inf)
         found.append(moments(hertz[below], density[below]))
     return found
-
-
-def _spots(scene: Scene) -> Spots:
-    spots = spots_of(scene)
-    if spots is None:
-        raise InputError("structure: no hot spots; take a reduced model with them (vanedamp reduce --hot-spots 3)")
-    return spots

@@ -237,6 +237,12 @@ def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
     return min((t.fatigue_strength for t in materials.values() if t.fatigue_strength is not None), default=None)
 
 
+def _with_fatigue(schema: dict[str, Any]) -> None:
+    """Let the schema of [material] have [material.fatigue] as a table of its own, and materials under other names."""
+    material, fatigue = schema["additionalProperties"]["oneOf"]
+    schema |= {"properties": {"fatigue": fatigue}, "additionalProperties": material}
+
+
 _Material = Annotated[
     Annotated[MaterialTable, Tag("material")] | Annotated[Fatigue, Tag("fatigue")],
     Discriminator(_kind_of_material),
@@ -248,7 +254,7 @@ _Materials = Annotated[
         str,
         Annotated[MaterialTable, GetPydanticSchema(lambda _, handler: handler(_Material))],
     ],
-    Field(min_length=1),
+    Field(min_length=1, json_schema_extra=_with_fatigue),
     AfterValidator(_spread),
 ]
 

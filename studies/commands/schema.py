@@ -16,7 +16,7 @@ def add_kind(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> None:
     """Print the schema, or write it."""
-    schema = KINDS[arguments.kind].schema
+    schema = KINDS[arguments.kind].file_schema
     if arguments.output is None:
         print(schema_text(schema), end="")
         return

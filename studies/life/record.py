@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.studies.life.study import Contact, Life
 
@@ -76,6 +77,15 @@ class LifeRecord:
         data |= {"study": dict(self.study), "contacts": [one._asdict() for one in self.contacts]}
         return data | {name: getattr(self, name).tolist() for name in _ARRAYS}
 
+    @property
+    def faces(self) -> dict[str, list[int]]:
+        """Contacts of each face with a known patch, by its name: a face wears by the mean of its contacts."""
+        found: dict[str, list[int]] = {}
+        for place, one in enumerate(self.contacts):
+            if np.isfinite(one.area):
+                found.setdefault(contact_name(one.damper, one.side), []).append(place)
+        return found
+
     def rows(self) -> Iterator[tuple[str, ...]]:
         """Yield the table over hours: time, gaps with band, reduction with band."""
         for number, hours in enumerate(self.time):
@@ -117,13 +127,13 @@ def sentence_of(
     reduction, first, last = f"{table.threshold:.0%}", values["reduction"][0], values["reduction"][-1]
     if lost == 0.0:
         return (
-            f"does not damp by {reduction} at any time in {table.hours:g} h: {first:.0%} as new, {last:.0%} at the end"
+            f"Does not damp by {reduction} at any time in {table.hours:g} h: {first:.0%} as new, {last:.0%} at the end"
         )
     if lost is None:
         doubt = "" if early is None else f", from {early:.0f} h on without certainty"
-        return f"damps for all {table.hours:g} h{doubt}: the reduction is {first:.0%} as new and {last:.0%} at the end"
+        return f"Damps for all {table.hours:g} h{doubt}: the reduction is {first:.0%} as new and {last:.0%} at the end"
     until = f"more than {values['time'][-1]:.0f}" if late is None else f"{late:.0f}"
     begin = "" if first >= table.threshold else f" once worn in (as new {first:.0%})"
     return (
-        f"damps for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the reduction falls below {reduction}"
+        f"Damps for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the reduction falls below {reduction}"
     )

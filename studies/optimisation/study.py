@@ -108,9 +108,8 @@ class Optimise(Band):
     limits: Limits = field(default_factory=Limits)
     """what designs must keep (default: nothing)"""
     measure: Measure = "amplitude_mean"
-    """what counts of a run: "amplitude_mean", the mean of the peaks of its periods, or "amplitude_max", both without
-    static deflection; "stress", the amplitude of von Mises stress at the worst hot spot; "life", Miner's sum of the
-    worst hot spot in 10,000 h; "wear", the depth at the contact that wears fastest in 10,000 h, over X"""
+    """what counts of a run: "amplitude_mean" or "amplitude_max" of its periods, without static deflection; "stress" at
+    the worst hot spot; "life", its damage, or "wear", the deepest over X, in 10,000 h"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"

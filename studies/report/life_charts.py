@@ -23,11 +23,10 @@ def life_figure(record: LifeRecord) -> go.Figure:
     for place, cavity in enumerate(scene["cavity"]):
         gap, band = 1e6 * record.gap[:, place], 1e6 * record.gap_band[:, place]
         _curve(figure, 2, record.time, gap, band, f"gap of {cavity['name']}", 1 + place)
-    for place, contact in enumerate(record.contacts):
-        depth = 1e6 * record.depth[:, place]
-        if np.isfinite(depth).all():
-            band = 1e6 * (record.depth_band + record.depth_error)[:, place]
-            _curve(figure, 3, record.time, depth, band, contact.name, 2 + place)
+    for number, (name, places) in enumerate(record.faces.items()):
+        band = np.linalg.norm(record.depth_band[:, places], axis=1) + record.depth_error[:, places].sum(axis=1)
+        depth = record.depth[:, places].mean(axis=1)
+        _curve(figure, 3, record.time, 1e6 * depth, 1e6 * band / len(places), name, 2 + number)
     for row, title in enumerate(("reduction, %", "gap, µm", "depth of wear, µm"), 1):
         figure.update_yaxes(title_text=title, rangemode="tozero", row=row, col=1)
     figure.update_xaxes(title_text="hours", row=3, col=1)
@@ -38,7 +37,7 @@ def life_figure(record: LifeRecord) -> go.Figure:
 
 
 def wear_figure(names: Sequence[str], depth_rate: Sequence[float], spread: Sequence[float]) -> go.Figure:
-    """Draw the depths of wear per hour of contacts, m/h, with half widths of their 95 % intervals."""
+    """Draw the depths of wear per hour of faces, m/h, with half widths of their 95 % intervals."""
     figure = go.Figure(
         go.Bar(
             x=list(names), y=[1e9 * rate for rate in depth_rate], marker={"color": COLOURS[0]},

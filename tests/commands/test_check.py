@@ -232,7 +232,7 @@ def test_study(tmp_path, capfd):
 
 
 def test_life(tmp_path, capfd):
-    tables = {"wear": {"coefficient": 1e-4, "hardness": 2e9}, "life": {"band": [2380.0, 2400.0], "hours": 500.0}}
+    tables = {"wear": {"coefficient": 1e-4, "hardness": 2e9}, "life": {"band": [2350.0, 2450.0], "hours": 500.0}}
     found = checked(tmp_path, capfd, DAMPED | tables)
     assert found["kind"] == "life" and found["commands"] == ["life"] and found["hours"] == 500.0
     assert found["sliding_wear_rate"] == pytest.approx(5e-14)

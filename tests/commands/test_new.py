@@ -34,7 +34,7 @@ def test_a_new_file_is_valid_commented_and_names_its_schema(folder, kind, capfd)
     assert main(["new", kind]) == 0
     text = Path(f"{kind}.toml").read_text()
     assert text.splitlines()[0] == f"#:schema ./{kind}.schema.json"
-    assert json.loads(Path(f"{kind}.schema.json").read_text()) == KINDS[kind].schema
+    assert json.loads(Path(f"{kind}.schema.json").read_text()) == KINDS[kind].file_schema
     assert faults(kind, tomllib.loads(text)) == []
     assert f"vanedamp check {kind}.toml" in " ".join(text.split("\n# "))
     assert max(map(len, text.splitlines())) <= 120

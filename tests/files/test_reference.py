@@ -92,7 +92,7 @@ def test_commented_file_reads_back_and_says_what_its_keys_mean() -> None:
 
 def test_write_commented_writes_the_schema_beside_the_file(tmp_path) -> None:
     write_commented(tmp_path / "mine.toml", SCENE, KINDS["scene"])
-    assert json.loads((tmp_path / "scene.schema.json").read_text()) == KINDS["scene"].schema
+    assert json.loads((tmp_path / "scene.schema.json").read_text()) == KINDS["scene"].file_schema
     assert (tmp_path / "mine.toml").read_text().startswith("#:schema ./scene.schema.json\n")
 
 

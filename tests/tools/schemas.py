@@ -32,7 +32,7 @@ def shipped_schemas() -> dict[str, dict[str, Any]]:
 @cache
 def validator(kind: str) -> Draft202012Validator:
     """The validator of a kind of files, whose schema is one itself."""
-    schema = KINDS[kind].schema
+    schema = KINDS[kind].file_schema
     Draft202012Validator.check_schema(schema)
     return Draft202012Validator(schema)
 

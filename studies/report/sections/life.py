@@ -29,19 +29,18 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 
 def _life(file: str, record: LifeRecord, page: Page) -> dict[str, Any]:
-    names = [contact.name for contact in record.contacts]
-    known = [place for place in range(len(names)) if np.isfinite(record.depth[:, place]).all()]
+    faces = record.faces
+    depth = {name: record.depth[:, places].mean(axis=1) for name, places in faces.items()}
+    rate = [float(record.depth_rate[0, places].mean()) for places in faces.values()]
+    spread = [float(np.linalg.norm(record.depth_rate_confidence[0, places])) / len(places) for places in faces.values()]
     header = ("hours", "reduction", "reduction_band", *(f"gap_{place}" for place in range(record.gap.shape[1])))
-    header += tuple(f"depth_{names[place].replace(' ', '_')}" for place in known)
-    rows = zip(
-        record.time, record.reduction, record.reduction_band, *record.gap.T, *record.depth[:, known].T, strict=True
-    )  # fmt: skip
+    header += tuple(f"depth_{name.replace(' ', '_')}" for name in faces)
+    rows = zip(record.time, record.reduction, record.reduction_band, *record.gap.T, *depth.values(), strict=True)
     course = page.chart("life", dressed(life_figure(record), height=780), header, rows, [file])
-    rates = [values[0, known].tolist() for values in (record.depth_rate, record.depth_rate_confidence)]
-    bars = dressed(wear_figure([names[place] for place in known], *rates), height=360)
-    wear = zip((names[place] for place in known), *rates, strict=True)
+    bars = dressed(wear_figure(list(faces), rate, spread), height=360)
+    wear = zip(faces, rate, spread, strict=True)
     return {
         "record": record, "file": file,
-        "contacts": [(names[place], record.depth[-1, place], record.depth_rate[0, place]) for place in known],
-        "charts": [course, page.chart("wear", bars, ("contact", "depth_rate", "confidence"), wear, [file])],
+        "faces": [(name, depth[name][-1], own) for name, own in zip(faces, rate, strict=True)],
+        "charts": [course, page.chart("wear", bars, ("face", "depth_rate", "confidence"), wear, [file])],
     }  # fmt: skip

@@ -172,6 +172,14 @@ def test_stress_of_a_reduced_model(tmp_path):
     np.testing.assert_array_equal(again.quantile["peak_utilisation"], found.quantile["utilisation"])
 
 
+def test_peaks_at_an_edge_are_counted(result):
+    axis = result.axes["excitation.frequency"]
+    top = axis[result.members["amplitude_mean_dynamic"].argmax(axis=1)]
+    share = np.isin(top, axis[[0, -1]]).mean()
+    assert 0.0 < share < 1.0
+    assert f"; in {share:.0%} of the samples the peak lies at an edge" in next(result.sentences())
+
+
 def test_curves_over_other_axes():
     table = {"damper.0.restitution": [0.3, 0.6], "excitation.frequency": [0.98 * RESONANCE, RESONANCE]}
     found = ensemble(damped(sweep=table))
@@ -183,5 +191,6 @@ def test_curves_over_other_axes():
     without = ensemble(damped(sweep={"damper.0.restitution": [0.3, 0.6]}))
     assert without.curves == ("damper.0.restitution",) and without.quantile["peak_amplitude"].shape == (5, 2)
     np.testing.assert_array_equal(without.quantile["peak_amplitude"], without.quantile["amplitude_mean_dynamic"])
+    assert "edge" not in next(without.sentences())
     for record in (found, without):
         assert record.plot().layout.xaxis2.title.text

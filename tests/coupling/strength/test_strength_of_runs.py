@@ -24,6 +24,7 @@ from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.hot_spots import strength_lines
 
 CURVE = {"strength": 400e6, "exponent": 5.0, "knee": 1e7, "after_knee": "original", "tensile_strength": 1000e6}
 FACTS = {
@@ -186,6 +187,9 @@ def test_damage_of_a_pass_is_that_of_its_periods(file, tmp_path):
     assert strength["hot1"]["utilisation"] == pytest.approx(2.0 * amplitudes.max() / 400e6, rel=0.01)
     assert strength["hot1"]["life_starts"]["50%"] == pytest.approx(0.25 / strength["hot1"]["damage"])
     assert "damage" not in strength["hot2"]  # no curve
+    first, second = strength_lines(found.strength(run))
+    assert first.startswith("hot1: ") and first.endswith(f"{strength['hot1']['life_starts']['50%']:.3g} starts")
+    assert second.endswith(f"utilisation {strength['hot2']['utilisation']:.3g}")
     found.save(tmp_path / "ramp.h5")
     assert Ramp.load(tmp_path / "ramp.h5").runs[0].strength == run.strength
 

@@ -11,6 +11,7 @@ from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
+from vanedamp.coupling.strength.stress_history import stress_history
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
@@ -91,8 +92,10 @@ def test_stress_changes_nothing_else_and_follows_dense_samples(file):
     assert response.amplitude_mean == plain.amplitude_mean and np.array_equal(response.section, plain.section)
     assert response.impacts_per_period > 0.5
     assert len(response.time) == 0 and response.coordinates is None
-    dense = respond(made, samples_per_period=1000)
+    dense, history = respond(made, samples_per_period=1000), stress_history(made, 1000)
     q = dense.coordinates[40 * 1000 :] @ ReducedModel.load(file).natural[1].T
+    assert history.spots == ("hot1", "hot2") and np.array_equal(history.time, dense.time[40 * 1000 :])
+    assert history.stress == pytest.approx(np.array([STRESS[name] @ q.T for name in history.spots]), abs=1.0)
     stress = (q @ STRESS["hot1"][0]).reshape(-1, 1000)
     assert response.stress[0].amplitude["xx"] == pytest.approx(0.5 * np.ptp(stress, axis=1).mean(), rel=0.01)
     assert response.stress[0].amplitude_max["xx"] == pytest.approx(0.5 * np.ptp(stress, axis=1).max(), rel=0.02)

@@ -98,6 +98,7 @@ def test_a_volume_group_may_be_called_fatigue(tmp_path):
     ("old", "new", "message"),
     [
         ("8.0", "-8.0", "material.fatigue.exponent: should be greater than 0 (got -8.0)"),
+        ("8.0", "51.0", "material.fatigue.exponent: should be less than or equal to 50 (got 51.0)"),
         ("exponent", "exponnent", "material.fatigue.exponnent: unknown key; did you mean 'exponent'?"),
         ("knee = 1e7\n", "", "material.fatigue: knee: missing; a curve of stress and life needs it with exponent"),
         ("1e9", "1e8", "material: default.fatigue.strength: expected at most the tensile strength 1e+08, not 4e+08"),
