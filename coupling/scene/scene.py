@@ -259,9 +259,13 @@ class Scene(OpenRecord, Displayed):
 
     @property
     def planar(self) -> bool:
-        """Whether it needs the engine for planar bodies: a body planar or on a spring, or impacts of two phases."""
+        """Whether it needs the engine for planar bodies: a body planar or on a spring, or impacts of two phases.
+
+        So do neighbours with springs in parallel, which the engine for sliders takes to begin at once.
+        """
         rubs = any(element.rubs for _, _, element in self.elements)
-        return rubs or self.contact.two_phases or any(damper.planar for damper in self.damper)
+        rows = self.contact.parallel and len({damper.cavity for damper in self.damper}) < len(self.damper)
+        return rubs or rows or self.contact.two_phases or any(damper.planar for damper in self.damper)
 
     @property
     def elements(self) -> Iterator[tuple[str, int, SceneElement]]:

@@ -48,8 +48,8 @@ class Kind:
     def __init__(self, scene: Scene) -> None:
         """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
         run = run_of(scene)
-        if not isinstance(run, EngineRun):
-            raise ValueError("not a scene of the engine for sliders")
+        if not isinstance(run, EngineRun) or scene.contact.parallel:
+            raise ValueError("not a scene of the engine for sliders, or one whose contacts begin at several gaps")
         run.check()
         self.scene, self.run, self.start = scene, run, start_of(scene, run.whole)
         transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)

@@ -9,9 +9,10 @@ import vanedamp as vd
 from vanedamp.coupling.contacts.collision import collision, speed_of_force
 from vanedamp.coupling.contacts.parallel_springs import parallel_springs
 from vanedamp.coupling.methods.registry import run_of
-from vanedamp.coupling.numerics.codes import SPRUNG
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import Walk
+from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 
 PAIR, MASS, FORCE, PERIODS = {"young": 2e11, "radius": 0.05}, 0.02, 500.0, 8
@@ -35,7 +36,7 @@ def first_collision(scene):
     """Largest sum of the springs' forces, N, and duration, s, by the segments of the engine's own motion."""
     peak, begin, end = 0.0, None, None
     for segment in Walk(run_of(scene, events=True), PERIODS):
-        if (segment.state == SPRUNG).any():
+        if not np.isin(segment.state[: segment.system.contacts], (OPEN, LEAVING)).all():
             begin, end = segment.start if begin is None else begin, segment.start + segment.duration
             times = np.linspace(0.0, segment.duration, 400)
             peak = max(peak, *(segment.forces(t)[: segment.system.contacts].sum() for t in times))
@@ -107,6 +108,29 @@ def test_blocks_hit_the_springs_of_two_corners():
     assert planar.status is slider.status is Status.OK
     assert planar.slip[-1] == pytest.approx(slider.slip[-1], abs=1e-9)
     assert planar.energy_residual < 1e-13
+
+
+def test_two_spheres_in_one_cavity():
+    """A body hits its neighbour at rest, at the reduced mass of both."""
+    masses, apart = (MASS, 0.03), 1e-5
+    reduced = 1 / sum(1 / mass for mass in masses)
+    speed = speed_of_force(CONTACT, reduced, FORCE)
+    first = {"cavity": "c", "mass": masses[0], "position": -apart, "velocity": speed}
+    scene = thrown(speed, damper=[first, {"cavity": "c", "mass": masses[1]}])
+    known, (force, duration) = collision(CONTACT, reduced, speed), first_collision(scene)
+    assert force == pytest.approx(known.force, rel=1e-3)
+    assert duration == pytest.approx(known.duration, rel=4e-4)
+    run = vd.simulate(scene)
+    assert run.status is Status.OK
+    assert run.energy_residual < 1e-12
+
+
+def test_a_sweep_over_the_gap_moves_all_springs():
+    gaps = [1e-4, 1.5e-4]
+    found = sweep(thrown(FASTEST, sweep={"cavity.c.gap": gaps}))
+    alone = [vd.simulate(thrown(FASTEST, cavity=[{"name": "c", "gap": gap}])) for gap in gaps]
+    assert found.impacts_per_period.tolist() == [one.impacts_per_period for one in alone]
+    assert alone[0].impacts_per_period > alone[1].impacts_per_period
 
 
 @pytest.mark.parametrize(
