@@ -7,11 +7,10 @@ from concurrent.futures import BrokenExecutor, Executor
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.ensembles.members import Members
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -25,6 +24,9 @@ from vanedamp.files.store import clear_leftovers
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.terminal import progress, stage
+
+if TYPE_CHECKING:  # loads the sweeps, which a single run does not use
+    from vanedamp.coupling.ensembles.members import Members
 
 #: samples per period of the run at the peak
 PEAK_SAMPLES = 200

@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
-from vanedamp.coupling.ensembles.record import AT_POINTS, STRENGTH, WEAR, Ensemble
+from vanedamp.coupling.ensembles.record import AT_POINTS, STRENGTH, WEAR, Ensemble, complete
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sweep.further import stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import resonance_axis
@@ -76,8 +76,10 @@ def _of_curves(points: Members, results: Mapping[str, np.ndarray]) -> dict[str, 
     swept, _ = resonance_axis(points.base, points.grid.axes)
     along = () if swept is None else (1 + list(points.grid.axes).index(swept),)
 
+    whole = complete(np.isfinite(results["amplitude_mean_dynamic"]), points.base, points.grid.axes)
+
     def highest(name: str) -> np.ndarray:
-        return np.asarray(np.fmax.reduce(results[name], axis=along))
+        return np.where(whole, np.fmax.reduce(results[name], axis=along), np.nan)
 
     peak = highest("amplitude_mean_dynamic")
     undamped = points.peaks().get("undamped_peak", highest("amplitude_undamped"))

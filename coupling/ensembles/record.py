@@ -32,6 +32,9 @@ OF_CURVES = {
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
 
+#: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
+COMPLETE, _MOST_SAMPLES = 0.9, 0.5
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(SceneRecord, Plotted):
@@ -74,6 +77,11 @@ class Ensemble(SceneRecord, Plotted):
         return int((self.status != "ok").sum())
 
     @property
+    def complete(self) -> np.ndarray:
+        """Whether so many points of a sample's curve are ok that its peak counts (samples, ...)."""
+        return complete(self.status == "ok", self.scene, self.axes)
+
+    @property
     def curves(self) -> tuple[str, ...]:
         """The axes over which there is a curve each: all but the frequency, or the speed along an engine order."""
         swept = resonance_axis(self.scene, self.axes)[0]
@@ -88,7 +96,10 @@ class Ensemble(SceneRecord, Plotted):
     def _sentence(self, place: tuple[Any, ...]) -> str:
         low, _, middle, _, high = self.quantile["reduction"][(slice(None), *place)].tolist()
         if not np.isfinite(middle):
-            return "no reduction: nothing to compare with, or no run is ok"
+            return f"no reduction: nothing to compare with, or no sample has {COMPLETE:.0%} of its runs ok"
+        whole = float(self.complete[(slice(None), *place)].mean())
+        if whole < _MOST_SAMPLES:
+            return f"no reduction: only {whole:.0%} of the samples have {COMPLETE:.0%} of their runs ok"
         total, confidence = self.indices["reduction"][(slice(2, 4), slice(None), *place)]
         order = [number for number in np.argsort(-total, kind="stable") if np.isfinite(total[number])][:_NAMED]
         due = ", ".join(f"{self.numbers[one]} {total[one]:.2f} ± {confidence[one]:.2f}" for one in order)
@@ -171,3 +182,10 @@ class Ensemble(SceneRecord, Plotted):
 
 def _dimension(path: str) -> str:
     return path.replace(".", "_")
+
+
+def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:
+    """Return whether enough points of each sample's curve are ok (samples, ...), from those of all (samples, *grid)."""
+    swept = resonance_axis(scene, axes)[0]
+    share = ok if swept is None else ok.mean(axis=1 + list(axes).index(swept))
+    return np.asarray(share >= COMPLETE)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from vanedamp.coupling.strength.counting import Cycles
 from vanedamp.coupling.strength.haigh import equivalent_amplitude
@@ -16,7 +16,7 @@ from vanedamp.files.toml_input import InputError
 #: probabilities of failure whose lives are results
 PROBABILITIES = (0.1, 0.5, 0.9)
 # difference of the normal distribution's quantiles at 90 % and 10 %
-_BETWEEN = norm.ppf(0.9) - norm.ppf(0.1)
+_BETWEEN = ndtri(0.9) - ndtri(0.1)
 
 
 def damage_per_cycle(amplitude: np.ndarray | float, fatigue: Fatigue) -> np.ndarray:
@@ -62,7 +62,7 @@ def life_at(median: float, fatigue: Fatigue, probability: float) -> float:
     """
     if not 0.0 < probability < 1.0:
         raise InputError(f"probability: expected a number between 0 and 1, not {probability:g}")
-    return float(median * fatigue.scatter ** (norm.ppf(probability) / _BETWEEN))
+    return float(median * fatigue.scatter ** (ndtri(probability) / _BETWEEN))
 
 
 def quantiles(median: float, fatigue: Fatigue, probabilities: Sequence[float] = PROBABILITIES) -> dict[str, float]:

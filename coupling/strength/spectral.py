@@ -11,8 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.signal import welch
 from scipy.special import gamma, gammainc, gammaincc
 
 from vanedamp.coupling.strength.haigh import mean_factor
@@ -59,6 +57,8 @@ def moments(frequency_hz: np.ndarray, density: np.ndarray) -> Moments:
         raise InputError("frequency_hz: expected frequencies from zero or above it, ascending")
     if not (density >= 0.0).all() or not np.isfinite(density).all() or not density.any():
         raise InputError("density: expected numbers that are not negative, not all zero")
+    from scipy.integrate import trapezoid
+
     omega = 2.0 * math.pi * frequency
     return Moments(*(float(trapezoid(omega**order * density, frequency)) for order in (0, 1, 2, 4)))
 
@@ -91,6 +91,8 @@ def spectral_density(
     Several components add their powers. segment: samples of a segment (default: an eighth of the history), Hann window,
     half overlapping, the mean of each removed.
     """
+    from scipy.signal import welch  # loads most of scipy
+
     history = np.atleast_2d(np.asarray(history, dtype=float))
     frequency, density = welch(history, sampling_hz, nperseg=segment or max(history.shape[1] // 8, 2))
     return frequency, density.sum(axis=0)

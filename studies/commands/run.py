@@ -13,7 +13,6 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.ensembles import run_at_one_frequency
 from vanedamp.studies.commands.support.messages import wear_lines, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
@@ -24,6 +23,9 @@ from vanedamp.studies.terminal import progress
 def run(arguments: Namespace, scene: Scene) -> None:
     """Simulate the scene, or all samples of its ranges."""
     if scene.ranges:
+        # loads pools of processes, which a single run does not use
+        from vanedamp.studies.commands.support.ensembles import run_at_one_frequency
+
         run_at_one_frequency(arguments, scene)
         return
     check_run(scene, arguments.samples)
