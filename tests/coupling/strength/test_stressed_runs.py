@@ -112,13 +112,13 @@ def test_samples_that_are_asked_for_stay_as_they_are(file):
 
 
 def test_methods_with_steps_have_the_same_stress(file):
-    exact = simulate(scene(file, time={"periods": 30, "transient": 10})).stress
-    stepped = simulate(
-        scene(file, time={"periods": 30, "transient": 10}, solver={"method": "penalty", "steps_per_period": 2500})
-    ).stress
+    """A restitution at which neighbouring motions approach each other."""
+    calm = {"damper.0.restitution": 0.1, "time": {"periods": 30, "transient": 10}}
+    exact = simulate(scene(file, **calm)).stress
+    stepped = simulate(scene(file, solver={"method": "penalty", "steps_per_period": 2500}, **calm)).stress
     assert stepped[0].samples_per_period in (50, 100, 125)
     for one, other in zip(exact, stepped, strict=True):
-        assert other.von_mises == pytest.approx(one.von_mises, rel=0.02)
+        assert other.von_mises == pytest.approx(one.von_mises, rel=2e-3)
 
 
 def test_samples_are_dense_enough_for_what_impacts_excite(file):
