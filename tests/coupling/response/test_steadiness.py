@@ -151,4 +151,6 @@ def test_random_scenes():
     ok = [outcome for outcome in outcomes if outcome.run.status == "ok"]
     assert len(ok) >= 10
     assert sum(outcome.covered for outcome in ok) >= len(ok) - 1
-    assert max(outcome.error for outcome in ok) < 0.05
+    for outcome in ok:  # a chaotic motion may have its mean anywhere in the interval
+        confidence = (outcome.run.amplitude_mean_confidence or 0.0) / outcome.run.amplitude_mean
+        assert outcome.error < 0.03 + confidence
