@@ -98,7 +98,9 @@ def ramp(
     for end in ends:  # before the first run: a speed may be too high
         assemble(with_choices(end, choices).scene)
     total, before = sum(len(course.time) for course in planned), 0
-    with _Checkpoint(checkpoint, scene, provenance or {}) as kept:
+    spots = hot_spots_in_file(scene.structure)
+    data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
+    with _Checkpoint(checkpoint, scene, data) as kept:
         runs, notes = kept.runs, kept.notes
         for number, course in enumerate(planned):
             chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
@@ -118,8 +120,6 @@ def ramp(
             runs.append(run.result())
             kept.changed()
     curves, tops = _stationary(first, table)
-    spots = hot_spots_in_file(scene.structure)
-    data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
     return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), data)
 
 

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 
+from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.strength.assessment import fatigue_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.rom.recovery import COMPONENTS, von_mises
-from vanedamp.studies.report.charts import Chart, axis_title, dressed
+from vanedamp.studies.report.charts import COLOURS, DASHES, Chart, axis_title, dressed
 from vanedamp.studies.report.life_charts import wear_figure
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.strength_charts import (
@@ -24,6 +26,9 @@ from vanedamp.studies.report.strength_charts import (
     lives_figure,
     stress_figure,
 )
+
+#: periods of a course that are drawn
+_MOST_POINTS = 2000
 
 
 def spots_shown(file: str, stress: Mapping[str, Any], strength: Mapping[str, Any], page: Page) -> dict[str, Any]:
@@ -88,6 +93,32 @@ def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
         kind, column = ("damage", "damage_per_hour") if place == 0 else ("wear", "depth_rate")
         shown["charts"].append(page.chart(kind, figure, ("of", axis, column), rows, [file]))
     return shown
+
+
+def course_chart(
+    page: Page, file: str, title: str, courses: Mapping[str, tuple[np.ndarray, np.ndarray]], spots: Sequence[str]
+) -> Chart:
+    """Return the chart of von Mises amplitudes in the periods of motions: (p,) places on an axis with its title and
+    stresses (p, s, 8), Pa, by the motion's name. Of more periods than a page takes, the largest of equally many each.
+    """  # fmt: skip
+    figure, rows = go.Figure(), []
+    for number, (name, (x, stress)) in enumerate(courses.items()):
+        x, values = _largest(x, stress[:, :, MEASURES.index("von_mises")])
+        for place, spot in enumerate(spots):
+            figure.add_scatter(
+                x=x, y=1e-6 * values[:, place], mode="lines", name=f"{spot} {name}".strip(),
+                line={"color": COLOURS[place % len(COLOURS)], "dash": DASHES[number % len(DASHES)]},
+            )  # fmt: skip
+            rows += [(name, spot, *row) for row in zip(x.tolist(), values[:, place].tolist(), strict=True)]
+    figure.update_xaxes(title_text=title)
+    figure.update_yaxes(title_text="amplitude of von Mises stress, MPa", rangemode="tozero")
+    return page.chart("stress", dressed(figure, height=420), ("motion", "hot_spot", "at", "von_mises"), rows, [file])
+
+
+def _largest(x: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest values (k, s) of runs of equally many periods, and where these begin; all of few."""
+    starts = np.unique(np.linspace(0, len(x), _MOST_POINTS, endpoint=False).astype(int))
+    return x[starts], np.maximum.reduceat(values, starts, axis=0)
 
 
 def _curves(stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:

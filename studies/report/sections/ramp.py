@@ -14,9 +14,10 @@ import plotly.graph_objects as go
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
-from vanedamp.studies.report.charts import COLOURS, Table, dressed
+from vanedamp.studies.report.charts import COLOURS, Chart, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.strength import course_chart
 from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 70
@@ -56,7 +57,18 @@ def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
         "passed": ramp.tops["half_power_width"] > 0.0,
         "chart": page.chart("ramp", ramp_figure(ramp, named), *_ramp_table(ramp), [file, *beside]),
         "peaks": page.chart("peaks", peaks_figure(ramp), *_peaks_table(ramp), [file]),
+        "stress": _stress_chart(file, ramp, page),
     }
+
+
+def _stress_chart(file: str, ramp: Ramp, page: Page) -> Chart | None:
+    """Return the stress of the runs over the frequency, or the speed; None without hot spots."""
+    at = along(ramp)
+    courses = {
+        run_name(ramp, run): (getattr(run, at), run.stress) for run in ramp.runs
+        if run.stress is not None and len(run.stress)
+    }  # fmt: skip
+    return course_chart(page, file, _TITLES[at], courses, list(ramp.provenance["hot_spots"])) if courses else None
 
 
 def along(ramp: Ramp) -> str:

@@ -16,6 +16,7 @@ from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.strength import course_chart
 
 ORDER = 75
 KIND = "ring_down"
@@ -55,7 +56,12 @@ def _shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
         chart = page.chart("ring-down", ring_down_figure(record), HEADER, ring_down_rows(record), [file])
     names = ("frequency", "damping_ratio", "damping_ratio_energy")
     bins = list(zip(*(zip(*record.bins[name], strict=True) for name in names), strict=True)) if table.bins else []
-    return {"file": file, "record": record, "begun": begun, "chart": chart, "bins": bins}
+    stress = None
+    if record.stress is not None and len(record.stress):
+        times = np.arange(len(record.stress)) / record.scene.frequency
+        spots = list(record.provenance["hot_spots"])
+        stress = course_chart(page, file, "time, s", {"": (times, record.stress)}, spots)
+    return {"file": file, "record": record, "begun": begun, "chart": chart, "bins": bins, "stress": stress}
 
 
 def ring_down_rows(record: RingDown) -> Iterator[list[object]]:

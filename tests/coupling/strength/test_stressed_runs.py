@@ -177,6 +177,21 @@ def test_stress_rings_down_by_the_damping_of_the_mode(file, tmp_path):
     assert np.array_equal(again.stress, found.stress) and list(again.provenance["hot_spots"]) == ["hot1", "hot2"]
 
 
+def test_an_interrupted_ramp_keeps_the_stress_of_finished_runs(file, tmp_path):
+    made = one_mode(file, ramp={"from": 0.95 * FIRST, "to": 1.05 * FIRST, "rate": 40.0, "both": True})
+
+    def interrupted(done, total):
+        if done > 0.7 * total:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ramp(made, interrupted, checkpoint=tmp_path / "partial")
+    resumed, whole = ramp(made, checkpoint=tmp_path / "partial"), ramp(made)
+    assert len(resumed.runs) == 2
+    for run, other in zip(resumed.runs, whole.runs, strict=True):
+        assert np.array_equal(run.stress, other.stress)
+
+
 def test_stress_of_a_ramp_follows_the_displacement_of_one_mode(file, tmp_path):
     found = ramp(one_mode(file, ramp={"from": 0.95 * FIRST, "to": 1.05 * FIRST, "rate": 10.0}))
     (run,) = found.runs
