@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Literal
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +17,8 @@ from vanedamp.coupling.scene.rotation import Rotation, hertz_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.files.toml_input import STRICT, InputError, Positive
+
+File = TypeVar("File", bound=Scene)
 
 _MOST_FREQUENCIES = 10_000
 #: quantity of the points of a band, and its unit
@@ -79,6 +83,22 @@ class Band:
                 "place of excitation.frequency, or give a band in Hz"
             )
         return hertz_of("rotation.rpm" if self.key == "rpm" else "rotation.speed", order) * self.values
+
+
+def file_in(record: type[File], tables: Mapping[str, Any], table: str, missing: str, path: str | Path) -> File:
+    """Return the file of a study in its tables, of a TOML file that lies at `path`, which errors name.
+
+    missing: what to do without its own table. Raises InputError.
+    """
+    data = dict(tables)
+    if table not in data:
+        raise InputError(f"{path}: {table}: missing; {missing}")
+    given = data[table]
+    if isinstance(given, dict) and not set(UNITS) & set(given):
+        raise InputError(
+            f"{path}: {table}.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
+        )
+    return record.of(data, path)
 
 
 def scene_in(file: Scene) -> Scene:

@@ -21,7 +21,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
-from vanedamp.studies.band import UNITS, Band, drive, placed, reference_amplitude, scene_in
+from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplitude, scene_in
 
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
@@ -101,15 +101,7 @@ class LifeStudy(NamedTuple):
     @classmethod
     def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> LifeStudy:
         """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
-        data = dict(tables)
-        if "life" not in data:
-            raise InputError(f"{path}: life: missing; give hours and a band in a [life] table (docs/wear.md)")
-        given = data["life"]
-        if isinstance(given, dict) and not set(UNITS) & set(given):
-            raise InputError(
-                f"{path}: life.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
-            )
-        file = LifeFile.of(data, path)
+        file = file_in(LifeFile, tables, "life", "give hours and a band in a [life] table (docs/wear.md)", path)
         try:
             scene, band = placed(scene_in(file), file.life)
             _check(scene)

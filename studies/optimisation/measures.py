@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spots import Spots, spots_of
@@ -18,8 +19,6 @@ from vanedamp.files.toml_input import STRICT, InputError, Positive
 Measure = Literal["amplitude_mean", "amplitude_max", "stress", "life", "wear"]
 #: hours of operation that damage and wear refer to
 SERVICE = 10_000.0
-#: place of the amplitude of von Mises stress in linear_stresses
-_VON_MISES = 6
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -76,7 +75,7 @@ def _undamped(scene: Scene, spots: Spots) -> float:
     linear = linear_stresses(scene, spots)
     if linear is None:
         raise InputError("excitation.waveform: a stress without bodies is that of a sum of sines; give harmonics")
-    return float(linear["undamped"][:, _VON_MISES].max())
+    return float(linear["undamped"][:, MEASURES.index("von_mises")].max())
 
 
 def counted(base: Scene, measure: Measure, limits: Limits, values: np.ndarray) -> np.ndarray:

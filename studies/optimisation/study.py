@@ -23,7 +23,7 @@ from vanedamp.coupling.system.transient import left_over, settled_after, timed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
-from vanedamp.studies.band import UNITS, Band, drive, ends, placed, reference_amplitude, scene_in
+from vanedamp.studies.band import Band, drive, ends, file_in, placed, reference_amplitude, scene_in
 from vanedamp.studies.optimisation.measures import SERVICE, Limits, Measure, check_measured, reference_stress
 
 #: longest transient that is proposed, in periods
@@ -182,15 +182,7 @@ class Study(NamedTuple):
     @classmethod
     def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> Study:
         """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
-        data = dict(tables)
-        if "optimise" not in data:
-            raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
-        given = data["optimise"]
-        if isinstance(given, dict) and not set(UNITS) & set(given):
-            raise InputError(
-                f"{path}: optimise.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
-            )
-        file = StudyFile.of(data, path)
+        file = file_in(StudyFile, tables, "optimise", "say what is best in an [optimise] table (docs/sweeps.md)", path)
         table, scene = file.optimise, scene_in(file)
         for number in scene.ranges:
             raise InputError(f"{path}: {number}: a range is for `vanedamp run` and `vanedamp sweep`; give [tolerances]")
@@ -207,7 +199,7 @@ class Study(NamedTuple):
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
         study = cls(
             replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, reference,
-            tuple(_doubts(scene, given)),
+            tuple(_doubts(scene, tables["optimise"])),
         )  # fmt: skip
         try:
             study._check_corners()

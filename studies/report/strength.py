@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.strength.assessment import fatigue_of
 from vanedamp.coupling.sweep.grid import resonance_axis
@@ -155,5 +156,4 @@ def contacts_shown(file: str, wear: Sequence[Mapping[str, Any]], page: Page) -> 
 
 
 def _place(one: Mapping[str, Any]) -> str:
-    corner = "" if one["corner"] < 0 else f", corner {one['corner']}"
-    return f"{one['side']} of body {one['damper'] + 1}{corner}"
+    return contact_name(one["damper"], one["side"], one["corner"])
