@@ -61,6 +61,11 @@ def check_measured(scene: Scene, measure: Measure, limits: Limits) -> None:
             )
         if name == "wear" and scene.wear is None:
             raise InputError(f"optimise.{key}: wear is not counted; give the scene a [wear] table")
+        if name == "wear" and scene.wear is not None and scene.wear.area is None and scene.wear.width is None:
+            raise InputError(
+                f"optimise.{key}: the patch that wears is not known; give wear.area, or wear.width with the extents of "
+                "the body (wear.length, wear.height)"
+            )
 
 
 def reference_stress(scenes: list[Scene], over_band: str) -> float:
@@ -80,7 +85,7 @@ def _undamped(scene: Scene, spots: Spots) -> float:
 
 def counted(base: Scene, measure: Measure, limits: Limits, values: np.ndarray) -> np.ndarray:
     """Return of runs in a sweep's columns (p, c) what counts, the same without bodies, and by how much they exceed
-    their limits (p, 3): the largest relative excess, 0 within all limits. nan: not known.
+    their limits (p, 3): the largest relative excess, 0 within all limits, 1 where it is not known. nan: not known.
     """  # fmt: skip
     parts = {name: values[:, columns] for name, columns in parts_of(base).items()}
     stress = {name: found for name, found in stresses_of(parts["stress"], (len(values),)) if found.ndim == 2}
@@ -102,4 +107,4 @@ def counted(base: Scene, measure: Measure, limits: Limits, values: np.ndarray) -
     }  # fmt: skip
     excess = [damage * limit if name == "life" else used[name] / limit for name, limit in limits.given.items()]
     over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(len(values))
-    return np.column_stack([*pairs[measure], over])
+    return np.column_stack([*pairs[measure], np.where(np.isnan(over), 1.0, over)])  # a limit is not kept unseen

@@ -101,6 +101,7 @@ def _rates(study, record):
         ({"structure": RIGID}, "optimise.measure: stress"),
         ({"optimise": {"limits": {"utilisation": -1.0}}}, "greater than 0"),
         ({"wear": None, "optimise": {"limits": {"wear": 1e-9}}}, "optimise.limits.wear: wear is not counted"),
+        ({"wear": {"rate": 1e-15}, "optimise": {"limits": {"wear": 1e-9}}}, "optimise.limits.wear: the patch"),
     ],
 )  # fmt: skip
 def test_what_runs_do_not_have_is_rejected(file, change, message):
@@ -113,3 +114,10 @@ def test_what_runs_do_not_have_is_rejected(file, change, message):
         del data["wear"]
     with pytest.raises(InputError, match=message):
         Study.of(data)
+
+
+def test_a_limit_that_runs_do_not_tell_is_not_kept(file):
+    """A width alone leaves the patch of a slider unknown."""
+    data = tables(file, limits={"wear": 1e-9}) | {"wear": {"impact_rate": 1e-13, "width": 1e-3}}
+    record = optimise(Study.of(data))
+    assert record.history_amplitude.min() >= 2.0
