@@ -78,7 +78,16 @@ def test_cluster_is_centred_on_z(curved):
 
 def test_groups_of_the_shipped_mesh():
     domain = fenicsx.read(SHIPPED)
-    assert set(domain.facets) == {"clamp", "shroud", "c1_left", "c1_right", "c1_floor", "c1_roof"}
+    assert set(domain.facets) == {
+        "clamp",
+        "shroud",
+        "shroud_low",
+        "shroud_high",
+        "c1_left",
+        "c1_right",
+        "c1_floor",
+        "c1_roof",
+    }
     assert set(domain.volumes) == {"outer_shroud", "airfoils", "inner_shroud"}
     facets = [facet for members in domain.facets.values() for facet in members]
     assert len(facets) == len(set(facets))
