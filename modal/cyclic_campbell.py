@@ -1,6 +1,6 @@
-"""Campbell diagram of a ring: frequencies of every nodal diameter over the speed, and the engine orders that excite them.
+"""Campbell diagram of a ring: frequencies of every nodal diameter over the speed, and engine orders that excite them.
 
-In the rotating frame, where a load at rest loads sector j by cos(k (W t + j alpha)): the order k = i N + h excites the
+In the rotating frame, where a load at rest loads sector j by cos(k (W t + j alpha)), the order k = i N + h excites the
 wave exp(i (omega t + h j alpha)), against the turn, and k = i N - h the one with it. Waves of one sign and diameter
 keep their order: their curves do not cross.
 """
@@ -8,6 +8,7 @@ keep their order: their curves do not cross.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +41,9 @@ def ring_campbell(
     wanted = checked_speeds(speeds, orders, count, rotating.standing.free.size, tolerance)
     if any(order != int(order) for order in orders):
         raise CampbellError("orders: expected whole engine orders of a ring")
-    numbers, families, curves, errors, solved = [], [], [], [], set()
+    curves: list[_Curve] = []
     crossings: list[Crossing] = []
+    errors, solved = [], set()
     for diameter in sector.diameters:
         if report is not None:
             report(diameter, len(sector.diameters))
@@ -54,25 +56,18 @@ def ring_campbell(
             solved |= set(source.solved)
             for sense in (1, -1) if travels and gyroscopic else (1,):
                 small = source.of_sense(sense) if isinstance(source, _Waves) else source.small
-                found = np.array([ritz_modes(small, float(speed))[0][:count] for speed in wanted]).T
-                for order in orders:
-                    excited, own = aliased(int(order), sector.sectors)
-                    if excited == diameter and (own == sense or not (travels and gyroscopic)):
-                        crossings += [
-                            Crossing(len(numbers) + place, float(order), speed, order * speed / (2.0 * np.pi))
-                            for place, speed in enumerate(meetings(small, order)[: len(found)].tolist())
-                            if wanted[0] <= speed <= wanted[-1]
-                        ]
-                numbers += [sense * diameter] * len(found)
-                families += range(len(found))
-                curves.extend(found)
+                met = [k for k in orders if aliased(int(k), sector.sectors) in ((diameter, sense), (diameter, 0))
+                       or (not gyroscopic and aliased(int(k), sector.sectors)[0] == diameter)]  # fmt: skip
+                crossings += _crossings(small, met, wanted, count, len(curves))
+                frequencies = np.array([ritz_modes(small, float(speed))[0][:count] for speed in wanted]).T
+                curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
     worst = np.max(errors, axis=0)
     warnings = [] if worst.max() <= tolerance else [f"frequencies are estimated to be wrong by up to {worst.max():.2g}"]
     return Campbell(
         speeds=wanted,
         asked=np.ones(wanted.size, dtype=bool),
         modes=np.arange(len(curves)),
-        frequencies_hz=np.array(curves) / (2.0 * np.pi),
+        frequencies_hz=np.array([curve.frequencies for curve in curves]) / (2.0 * np.pi),
         errors=worst,
         solved=np.sort(list(solved)),
         orders=tuple(float(order) for order in orders),
@@ -81,9 +76,27 @@ def ring_campbell(
         gyroscopic=gyroscopic,
         warnings=tuple(warnings),
         provenance=rotating.standing.provenance,
-        diameters=np.array(numbers),
-        families=np.array(families),
+        diameters=np.array([curve.diameter for curve in curves]),
+        families=np.array([curve.family for curve in curves]),
     )
+
+
+class _Curve(NamedTuple):
+    diameter: int
+    family: int
+    frequencies: np.ndarray
+
+
+def _crossings(
+    small: Sequence[np.ndarray], orders: Sequence[float], speeds: np.ndarray, count: int, first: int
+) -> list[Crossing]:
+    """Return where orders meet the `count` lowest curves of small matrices, the modes from `first` on."""
+    return [
+        Crossing(first + place, float(order), speed, order * speed / (2.0 * np.pi))
+        for order in orders
+        for place, speed in enumerate(meetings(small, order)[:count].tolist())
+        if speeds[0] <= speed <= speeds[-1]
+    ]
 
 
 def _refined(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> np.ndarray:

@@ -14,6 +14,7 @@ from tests.modal.test_cyclic import STEEL, every
 from tests.tools.ring_mesh import write_ring
 from vanedamp.meshes.sector import Sector, build
 from vanedamp.modal.cyclic import cyclic_sector
+from vanedamp.modal.cyclic_campbell import ring_campbell
 from vanedamp.modal.cyclic_faces import rotation
 from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
@@ -128,6 +129,28 @@ def test_wave_with_gyroscopic_coupling_moves_the_whole_mesh(rotating):
         forces = stiffness @ moved + SPEED * omega * (whole.gyroscopic @ quarter)
         rest = (forces - omega**2 * (whole.standing.mass @ moved))[whole.standing.free]
         assert np.linalg.norm(rest) < 1e-5 * np.linalg.norm(forces[whole.standing.free])
+
+
+@pytest.mark.parametrize("gyroscopic", [False, True])
+def test_campbell_diagram_by_nodal_diameter(rotating, gyroscopic):
+    """Curves are the modes at every speed; at a crossing the whole mesh has the order's frequency."""
+    sector, whole = rotating
+    speeds = np.linspace(1000.0, 3000.0, 5)
+    found = ring_campbell(of_ring(sector.standing), sector, speeds, [3, 5, 7, 10], 2, gyroscopic)
+    assert found.error <= 1e-8 and not found.warnings
+    for place, speed in enumerate(speeds):
+        ring = of_ring(sector.standing)
+        modes = (
+            gyroscopic_ring_modes(ring, sector, speed, 2) if gyroscopic else ring_modes(of_ring(sector.at(speed)), 2)
+        )
+        assert np.array_equal(found.diameters, modes.diameters) and np.array_equal(found.families, modes.families)
+        assert found.frequencies_hz[:, place] == pytest.approx(modes.frequencies_hz, rel=1e-8)
+    excited = {crossing.order: {int(found.diameters[c.mode]) for c in found.crossings if c.order == crossing.order}
+               for crossing in found.crossings}  # fmt: skip
+    assert excited == {5.0: {-1} if gyroscopic else {1}, 7.0: {1}, 10.0: {-2} if gyroscopic else {2}}
+    for crossing in found.crossings:
+        known = gyroscopic_modes(whole, crossing.speed, 14) if gyroscopic else solve_modes(whole.at(crossing.speed), 14)
+        assert np.abs(known.frequencies_hz / crossing.frequency_hz - 1).min() < 1e-7
 
 
 def test_engine_orders_move_the_whole_mesh_alike(standing):
