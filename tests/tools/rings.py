@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
+from vanedamp.modal.cyclic import CyclicSector, cyclic_sector
+from vanedamp.modal.cyclic_faces import rotation
+from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
 
@@ -60,3 +63,64 @@ class Chain:
             stiffness=self.stiffness * np.outer(shape, shape), mass=self.mass * np.outer(shape, shape),
             damping_ratio=self.damping_ratio,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LumpedDisk:
+    """A disk of N sectors with a blade each, of masses that springs of three stiffnesses join: 3 freedoms a mass.
+
+    A sector has nodes 0 (face low), 1 (face high), 2 (rim, also on springs to ground) and 3, 4, 5 up the blade; its
+    axes are x radial, y tangential, z axial.
+    """
+
+    sectors: int = 6
+    blade: float = 1e7
+    rim: float = 3e7
+    axes: tuple[float, float, float] = (2.3, 1.0, 0.6)
+
+    def _springs(self, pairs: Sequence[tuple[int, int]], stiffness: float) -> np.ndarray:
+        matrix = np.zeros((18, 18))
+        for one, other in pairs:
+            for place, sign in (((one, one), 1), ((other, other), 1), ((one, other), -1), ((other, one), -1)):
+                rows, columns = (slice(3 * node, 3 * node + 3) for node in place)
+                matrix[rows, columns] += sign * stiffness * np.diag(self.axes)
+        return matrix
+
+    @property
+    def part(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness and mass (18, 18) of the blade."""
+        masses = np.repeat([0.0, 0.0, 0.0, 0.2, 0.15, 0.1], 3)
+        return self._springs([(2, 3), (3, 4), (4, 5)], self.blade), np.diag(masses)
+
+    def matrices(self, damping_ratio: float = 0.002) -> SystemMatrices:
+        """Return the matrices of a sector with both faces free, and patches of one node each."""
+        blade, mass = self.part
+        stiffness = blade + self._springs([(0, 2), (2, 1)], self.rim)
+        stiffness[6:9, 6:9] += self.rim * np.eye(3)
+        mass = mass + np.diag(np.repeat([0.3, 0.3, 1.0, 0.0, 0.0, 0.0], 3))
+        angle = np.pi / self.sectors
+        ends = [[np.cos(angle), side * np.sin(angle), 0.0] for side in (-1, 1)]
+        coordinates = 0.2 * np.array([*ends, *[[radius, 0.0, 0.0] for radius in (1.0, 1.1, 1.2, 1.3)]])
+        names = ("low", "high", "rim", "root", "middle", "tip")
+        patches = {name: Patch(np.array([node]), np.ones(1)) for node, name in enumerate(names)}
+        sparse_ones = (sparse.csr_array(matrix) for matrix in (stiffness, mass))
+        return SystemMatrices(*sparse_ones, coordinates, np.empty(0, int), patches, damping_ratio)
+
+    def sector(self) -> CyclicSector:
+        """Return the cyclic sector about the axis z."""
+        return cyclic_sector(self.matrices(), "low", "high", self.sectors)
+
+    def whole(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return stiffness and mass of the whole ring (15 N, 15 N), and what makes a sector's motion (N, 18, 15 N) of
+        its coordinates: those of the nodes of every sector but its face high, in its axes."""
+        deviations, matrices = deviations or Deviations(), self.matrices()
+        place, turn = np.zeros((self.sectors, 18, 15 * self.sectors)), rotation(np.eye(3)[2], 2 * np.pi / self.sectors)
+        for j in range(self.sectors):
+            own = 15 * j + np.arange(15)
+            place[j, np.r_[0:3, 6:18], own] = 1.0
+            place[j, 3:6, 15 * ((j + 1) % self.sectors) + np.arange(3)] = turn
+        found = []
+        for name, own, part in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), self.part, strict=True):
+            values = deviations.of(name, self.sectors)
+            found.append(sum(t.T @ (own.toarray() + d * part) @ t for t, d in zip(place, values, strict=True)))
+        return found[0], found[1], place
