@@ -110,21 +110,17 @@ def forced(
 
 
 def _of_ring(ring: RingModel, order: int, label: str, at: str, deviations: Deviations, speed: float) -> Forced:
-    """Return the response of a reduced ring by its lowest natural modes and the static response of the rest."""
+    """Return the response of a reduced ring by all its waves."""
     push, seen = (_place(ring.interface, one) for one in (label, at))
     mass, stiffness = ring.matrices(deviations, speed)
-    squares, shapes = linalg.eigh(stiffness, mass, subset_by_index=[0, ring.modes - 1])
-    load = ring.rows[:, push].T @ _phases(order, ring.sectors)
-    rows = ring.rows[:, seen]
+    squares, shapes = linalg.eigh(stiffness, mass)
     if squares[0] <= 0.0:
         raise ReducedModelError("the ring can move freely, or is unstable at that speed: it has no response to compare")
-    modal = shapes.T @ load
-    residual = rows @ (np.linalg.solve(stiffness, load) - shapes @ (modal / squares))
-    added = ring.added_damping(deviations)
+    load = shapes.T @ (ring.rows[:, push].T @ _phases(order, ring.sectors))
     damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
-    if added is not None:
+    if (added := ring.added_damping(deviations)) is not None:
         damping = damping + shapes.T @ added @ shapes
-    return _superposed(squares, damping, rows @ shapes, modal, residual)
+    return _superposed(squares, damping, ring.rows[:, seen] @ shapes, load, np.zeros(ring.sectors))
 
 
 def _superposed(

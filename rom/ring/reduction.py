@@ -124,11 +124,12 @@ def _of_diameter(
     sectors, found: at standstill, and at the greatest speed, and their modes; vectors (k, n) of the interface.
     """
     statics = [_Statics(sector, number, factorize) for sector in sectors]
-    first, lead = statics[0], _shapes(found[0], number)
+    first = statics[0]
+    lead = first.own(_shapes(found[0], number))
     lead_squares = _squares(found[0], number)
     wanted = [first.response(vectors)]
     for static, modes in zip(statics[1:], found[1:], strict=True):
-        wanted += [static.response(vectors), _shapes(modes, number)]
+        wanted += [static.response(vectors), static.own(_shapes(modes, number))]
     rest, _ = first.independent(np.vstack(wanted), lead, _DEPENDENT, unit=True)
     others, left = first.independent(np.vstack([static.response(forces) for static in statics]),
                                      np.vstack([lead, rest]), _LEFT_OUT)  # fmt: skip
@@ -161,15 +162,19 @@ class _Statics:
         """Return the fields (p, n) under loads (p, n), real or complex, on a sector."""
         rows = np.zeros((len(loads), self.problem.matrices.size))
         rows[:, self._free] = self._factors.solve(self.problem.forces(loads.T)[self._free]).T
-        return self.problem.fields(rows)
+        return self.own(self.problem.fields(rows))
+
+    def own(self, values: np.ndarray) -> np.ndarray:
+        """Return fields, or products of them, as the diameter has them: real where it does not travel."""
+        return values if self.problem.travels else np.asarray(values.real)
 
     def energies(self, fields: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return fields^H K others over the ring."""
-        return np.asarray(self.factor * fields.conj() @ (self._stiffness @ others.T))
+        return self.own(self.factor * fields.conj() @ (self._stiffness @ others.T))
 
     def masses(self, fields: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return fields^H M others over the ring."""
-        return np.asarray(self.factor * fields.conj() @ (self._mass @ others.T))
+        return self.own(self.factor * fields.conj() @ (self._mass @ others.T))
 
     def independent(
         self, fields: np.ndarray, known: np.ndarray, least: float, unit: bool = False
@@ -192,8 +197,8 @@ class _Statics:
         """Return squared frequencies (q,) and fields (q, n) of modal mass 1 in the span of fields."""
         if not len(fields):
             return np.empty(0), fields
-        squares, turns = linalg.eigh(self.energies(fields, fields), self.masses(fields, fields))
-        return squares, turns.T @ fields
+        inverse, turns = linalg.eigh(self.masses(fields, fields), self.energies(fields, fields))
+        return 1.0 / inverse, (turns / np.sqrt(inverse)).T @ fields
 
     def receptance_error(self, waves: _Waves, vectors: np.ndarray) -> float:
         """Return the largest error of the interface's receptance by modes and static response, relative.
@@ -241,7 +246,8 @@ def _model(
     }  # fmt: skip
     return RingModel(
         sectors=sector.sectors, axis=sector.axis, point=sector.point, diameters=diameters[order],
-        squares=squares[order], modes=int(lead.sum()), interface=interface.labels, selection=(fields @ interface.vectors).T,
+        squares=squares[order], modes=int(lead.sum()), interface=interface.labels,
+        selection=(fields @ interface.vectors).T,
         directions=interface.directions, normals=interface.normals, positions=interface.positions, arms=interface.arms,
         base_load=fields @ (matrices.mass @ translations), part_load=fields @ (part.mass @ translations),
         stiffness=fields @ (part.stiffness @ fields.T), mass=fields @ (part.mass @ fields.T),

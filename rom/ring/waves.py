@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 
 from vanedamp.files import store
-from vanedamp.modal.rotating import cross_matrix
+from vanedamp.modal.cyclic_faces import rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,5 +76,4 @@ class Waves:
 
 def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
     """Return the rotations (N, 3, 3) of the sectors' frames about an axis (3,)."""
-    cross = cross_matrix(axis)
-    return np.array([linalg.expm(2.0 * np.pi * sector / sectors * cross) for sector in range(sectors)])
+    return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])

@@ -118,7 +118,7 @@ class LumpedDisk:
         for j in range(self.sectors):
             own = 15 * j + np.arange(15)
             place[j, np.r_[0:3, 6:18], own] = 1.0
-            place[j, 3:6, 15 * ((j + 1) % self.sectors) + np.arange(3)] = turn
+            place[j][3:6, 15 * ((j + 1) % self.sectors) + np.arange(3)] = turn
         found = []
         for name, own, part in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), self.part, strict=True):
             values = deviations.of(name, self.sectors)
