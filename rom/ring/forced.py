@@ -10,12 +10,12 @@ U the complex amplitudes (N,) with the phase of the load on sector 0 as referenc
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.ring_model import RingModel, sector_label
@@ -93,12 +93,12 @@ def forced(
     speed: of a reduced ring that rotates, rad/s.
     """
     if isinstance(model, RingModel):
-        return _of_ring(model, order, label, at or label, deviations or Deviations(), speed)
+        return Natural.of(model, deviations, speed).forced(model, order, label, at)
     ring = model.provenance.get("ring")
     if ring is None:
         raise RingError("model: no reduced ring; a force that turns around needs the sectors of one")
     sectors = int(ring["sectors"])
-    places = [[_place(model.interface, sector_label(one, j)) for j in range(sectors)] for one in (label, at or label)]
+    places = [[place_of(model.interface, sector_label(one, j)) for j in range(sectors)] for one in (label, at or label)]
     phases = _phases(order, sectors)
     squares, shapes = model.natural
     rows = model.selection @ shapes
@@ -109,18 +109,31 @@ def forced(
     return _superposed(squares, damping, rows[places[1]], rows[places[0]].T @ phases, residual)
 
 
-def _of_ring(ring: RingModel, order: int, label: str, at: str, deviations: Deviations, speed: float) -> Forced:
-    """Return the response of a reduced ring by all its waves."""
-    push, seen = (_place(ring.interface, one) for one in (label, at))
-    mass, stiffness = ring.matrices(deviations, speed)
-    squares, shapes = linalg.eigh(stiffness, mass)
-    if squares[0] <= 0.0:
-        raise ReducedModelError("the ring can move freely, or is unstable at that speed: it has no response to compare")
-    load = shapes.T @ (ring.rows[:, push].T @ _phases(order, ring.sectors))
-    damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
-    if (added := ring.added_damping(deviations)) is not None:
-        damping = damping + shapes.T @ added @ shapes
-    return _superposed(squares, damping, ring.rows[:, seen] @ shapes, load, np.zeros(ring.sectors))
+class Natural(NamedTuple):
+    """All natural modes of a ring with deviations: squares (n,), shapes (n, n) in its waves, modal damping (n, n)."""
+
+    squares: np.ndarray
+    shapes: np.ndarray
+    damping: np.ndarray
+
+    @classmethod
+    def of(cls, ring: RingModel, deviations: Deviations | None = None, speed: float = 0.0) -> Natural:
+        """Return those of a ring at a speed, rad/s. Raises RingError where it can move freely or is unstable."""
+        deviations = deviations or Deviations()
+        mass, stiffness = ring.matrices(deviations, speed)
+        squares, shapes = linalg.eigh(stiffness, mass)
+        if squares[0] <= 0.0:
+            raise RingError("the ring can move freely, or is unstable at that speed: it has no response to compare")
+        damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
+        if (added := ring.added_damping(deviations)) is not None:
+            damping = damping + shapes.T @ added @ shapes
+        return cls(squares, shapes, damping)
+
+    def forced(self, ring: RingModel, order: int, label: str, at: str | None = None) -> Forced:
+        """Return the response to an engine order. Raises RingError for an unknown label."""
+        load = self.shapes.T @ load_of(ring, order, label)
+        rows = ring.rows[:, place_of(ring.interface, at or label)] @ self.shapes
+        return _superposed(self.squares, self.damping, rows, load, np.zeros(ring.sectors))
 
 
 def _superposed(
@@ -140,6 +153,11 @@ def _superposed(
     return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual)
 
 
+def load_of(ring: RingModel, order: int, label: str) -> np.ndarray:
+    """Return the load (n,), complex, of an engine order of unit force at a label on the waves of a reduced ring."""
+    return np.asarray(ring.rows[:, place_of(ring.interface, label)].T @ _phases(order, ring.sectors))
+
+
 def participation(shapes: np.ndarray) -> np.ndarray:
     """Return the number of sectors (m,) that take part in shapes over sectors (N, m): (sum a^2)^2 / sum a^4.
 
@@ -154,7 +172,8 @@ def _phases(order: int, sectors: int) -> np.ndarray:
     return np.exp(-2j * np.pi / sectors * (order * np.arange(sectors) % sectors))
 
 
-def _place(labels: tuple[str, ...], label: str) -> int:
+def place_of(labels: tuple[str, ...], label: str) -> int:
+    """Return the number of an interface label. Raises RingError for an unknown one."""
     if label not in labels:
         raise RingError(f"label: no interface coordinate {label!r}; there are: {', '.join(labels)}")
     return labels.index(label)
