@@ -22,7 +22,7 @@ from vanedamp.rom.ring.ring_model import RingModel, sector_label
 
 # half-bandwidths around every resonance at which a response is sampled, and halvings of the bracket of a peak
 _AROUND = np.array([-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
-_ROUNDS = 30
+_ROUNDS = 16
 
 
 @dataclass(frozen=True, eq=False)
