@@ -38,6 +38,10 @@ from vanedamp.files.errors import VanedampError as VanedampError
 from vanedamp.files.toml_input import InputError as InputError
 from vanedamp.modal.campbell import Campbell as Campbell
 from vanedamp.modal.campbell import campbell as campbell
+from vanedamp.modal.cyclic import CyclicSector as CyclicSector
+from vanedamp.modal.cyclic import cyclic_sector as cyclic_sector
+from vanedamp.modal.cyclic_modes import RingModes as RingModes
+from vanedamp.modal.cyclic_modes import ring_modes as ring_modes
 from vanedamp.modal.eigen import Modes as Modes
 from vanedamp.modal.eigen import solve_modes as solve_modes
 from vanedamp.modal.matrices import Patch as Patch
