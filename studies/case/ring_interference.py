@@ -42,13 +42,15 @@ def ring_interference(
     found = Interference.of(
         modes, None if given is None else [int(order) for order in given], speed=speed, operating=operating
     )
-    return found if table is None else replace(found, **_over_speed(structure, found, table.speeds, report))
+    if table is None:
+        return found
+    return replace(found, speeds=table.speeds, over_speed_hz=_over_speed(structure, found, table.speeds, report))
 
 
 def _over_speed(
     structure: Structure, found: Interference, speeds: np.ndarray, report: Callable[[int, int], None] | None
-) -> dict[str, np.ndarray]:
-    """Return the speeds, and the frequencies of the modes there (m, s), which are matched by diameter and family."""
+) -> np.ndarray:
+    """Return the frequencies (m, s) of the modes at speeds, which are matched by diameter and family."""
     assert structure.rotating is not None  # [campbell] needs [rotation]
     over = np.full((len(found.modes), len(speeds)), np.nan)
     rows = {pair: row for row, pair in enumerate(_pairs(found.modes))}
@@ -59,7 +61,7 @@ def _over_speed(
                 over[rows[pair], place] = frequency
         if report is not None:
             report(place + 1, len(speeds))
-    return {"speeds": speeds, "over_speed_hz": over}
+    return over
 
 
 def _pairs(modes: RingModes) -> list[tuple[int, int]]:

@@ -7,12 +7,11 @@ from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
-from vanedamp.studies.case.ring_stages import ring_analysis
-
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.interference import Interference
 from vanedamp.modal.speed_range import RPM
 from vanedamp.studies.case.ring_interference import ring_interference
+from vanedamp.studies.case.ring_stages import ring_analysis
 from vanedamp.studies.case.stages import assemble, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result

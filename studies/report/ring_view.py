@@ -22,6 +22,8 @@ from vanedamp.studies.ring_mesh import WholeRing, joints, whole_ring
 
 #: elevations of the eye above the horizon from which a ring is looked at, degrees
 _ELEVATIONS = (55.0, 30.0)
+#: the longest side of the scene, as the eye's distance counts it
+_SIDE = 1.8
 #: of the shapes in a page, which are whole numbers
 _STEPS = 32767
 
@@ -76,6 +78,12 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     turns = Rotation.from_rotvec(np.outer(2.0 * np.pi * np.arange(modes.sectors) / modes.sectors, modes.axis))
     figure = go.Figure(deformed_mesh(points + scale * moved, np.linalg.norm(moved, axis=1), ring.cells))
     in_space(figure, viewpoint(points, moved, _ELEVATIONS))
+    # the axes stay while the wave travels
+    low, high = points.min(axis=0) - scale, points.max(axis=0) + scale
+    for name, ends in zip("xyz", np.column_stack([low, high]).tolist(), strict=True):
+        figure.layout.scene[f"{name}axis"].range = ends
+    sides = dict(zip("xyz", (_SIDE * (high - low) / (high - low).max()).tolist(), strict=True))
+    figure.update_layout(scene={"aspectmode": "manual", "aspectratio": sides})
     return figure.update_layout(meta={
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),

@@ -35,10 +35,11 @@ def load(path: Path) -> Result:
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
     """Return charts and tables of every ring."""
-    return [_ring(file, *result.record, page) for file, result in results.items()]
+    return [_ring(file, result.record, page) for file, result in results.items()]
 
 
-def _ring(file: str, modes: RingModes, found: Interference, surface: WholeRing | None, page: Page) -> dict[str, Any]:
+def _ring(file: str, record: tuple[RingModes, Interference, WholeRing | None], page: Page) -> dict[str, Any]:
+    modes, found, surface = record
     diagram = page.chart("interference", interference_figure(found), *interference_table(found), [file])
     campbell, view = None, None
     if found.speeds.size:
