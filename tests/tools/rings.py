@@ -1,48 +1,62 @@
-"""Rings for tests: chains around a circle, whose waves are known in closed form."""
+"""Rings whose solution is known: chains of one mass a sector, on springs to ground and to their neighbours."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
+from scipy import linalg
+
+from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
 
 
-def chain_ring(
-    sectors: int = 6, masses: tuple[float, ...] = (0.1,), spring: float = 1e6, inner: float = 4e6,
-    coupling: float = 0.05, damping_ratio: float = 0.002, radius: float = 0.2, modes: int | None = None,
-) -> RingModel:  # fmt: skip
-    """Return a ring of chains: in each sector masses (kg), the first on a spring to the ground and on `coupling` times
-    this spring to those of both neighbours, each other on the spring `inner` to the one before. All waves are kept.
+@dataclass(frozen=True)
+class Chain:
+    """N masses m, kg, that move along the axis z, on ground springs k, N/m, coupled to both neighbours by c, N/m."""
 
-    The label "tip" is the last mass, "root" the first. They move along the circle, y of sector 0, at the radius (m).
-    """
-    count = len(masses)
-    own = np.zeros((count, count))
-    own[0, 0] = spring
-    for place in range(1, count):
-        own[place - 1 : place + 1, place - 1 : place + 1] += inner * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    diameters, squares, fields = [], [], []
-    for diameter in range(sectors // 2 + 1):
-        stiffness = own.copy()
-        stiffness[0, 0] += 2.0 * coupling * spring * (1.0 - np.cos(2 * np.pi * diameter / sectors))
-        scale = 1.0 / np.sqrt(masses)
-        found, shapes = np.linalg.eigh(scale[:, None] * stiffness * scale)
-        pair = 0 < 2 * diameter < sectors
-        for square, shape in zip(found, (scale[:, None] * shapes).T, strict=True):
-            z = shape * np.sqrt((2.0 if pair else 1.0) / sectors)
-            diameters += [diameter] * (2 if pair else 1)
-            squares += [square] * (2 if pair else 1)
-            fields += [z, 0.0 * z] if pair else [z]
-    fields = np.array(fields)
-    order = np.argsort(squares, kind="stable")
-    part = fields @ own @ fields.T
-    at = np.zeros((len(order), 3))
-    at[:, 1] = fields @ np.array(masses)
-    return RingModel(
-        sectors=sectors, axis=np.array([0.0, 0.0, 1.0]), point=np.zeros(3), diameters=np.array(diameters)[order],
-        squares=np.array(squares)[order], modes=modes or len(order), interface=("tip", "root"),
-        selection=fields[order][:, [-1, 0]].T, directions=np.tile([0.0, 1.0, 0.0], (2, 1)), normals=np.zeros((2, 3)),
-        positions=np.tile([radius, 0.0, 0.0], (2, 1)), arms=np.zeros(2), base_load=at[order], part_load=at[order],
-        stiffness=part[np.ix_(order, order)], mass=(fields * masses @ fields.T)[np.ix_(order, order)],
-        damping_ratio=damping_ratio,
-    )  # fmt: skip
+    sectors: int = 6
+    mass: float = 0.5
+    stiffness: float = 2e6
+    coupling: float = 2e5
+    damping_ratio: float = 0.002
+    radius: float = 0.2
+
+    def matrices(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return stiffness and mass (N, N) of the whole ring."""
+        deviations = deviations or Deviations()
+        stiffness, mass = (deviations.of(name, self.sectors) for name in ("stiffness", "mass"))
+        first = np.zeros(self.sectors)
+        for step in (1, -1):
+            first[0] += self.coupling
+            first[step % self.sectors] -= self.coupling
+        return linalg.circulant(first) + np.diag(self.stiffness * (1 + stiffness)), np.diag(self.mass * (1 + mass))
+
+    def squares(self, diameters: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Return the squared angular frequencies of nodal diameters, tuned."""
+        angles = 2 * np.pi / self.sectors * np.asarray(diameters)
+        return (self.stiffness + 2 * self.coupling * (1 - np.cos(angles))) / self.mass
+
+    @property
+    def diameters(self) -> np.ndarray:
+        """The nodal diameters of the waves: pairs but for 0 and N/2."""
+        return np.repeat(*np.unique(np.minimum(np.arange(self.sectors), -np.arange(self.sectors) % self.sectors),
+                                    return_counts=True))  # fmt: skip
+
+    def ring(self, label: str = "tip") -> RingModel:
+        """Return the ring as a reduced model, exact: the ground spring and the mass deviate."""
+        diameters = self.diameters
+        single = (diameters == 0) | (2 * diameters == self.sectors)
+        first = ~np.r_[False, diameters[1:] == diameters[:-1]]
+        shape = np.sqrt(np.where(single, 1.0, 2.0) / (self.sectors * self.mass)) * first
+        zeros = np.zeros((1, 3))
+        return RingModel(
+            sectors=self.sectors, axis=np.array([0.0, 0.0, 1.0]), point=np.zeros(3), diameters=diameters,
+            squares=self.squares(diameters), modes=self.sectors, interface=(label,), selection=shape[None],
+            directions=np.array([[0.0, 0.0, 1.0]]), normals=zeros, positions=np.array([[self.radius, 0.0, 0.0]]),
+            arms=np.zeros(1), base_load=self.mass * np.outer(shape, [0.0, 0.0, 1.0]),
+            part_load=self.mass * np.outer(shape, [0.0, 0.0, 1.0]),
+            stiffness=self.stiffness * np.outer(shape, shape), mass=self.mass * np.outer(shape, shape),
+            damping_ratio=self.damping_ratio,
+        )  # fmt: skip
