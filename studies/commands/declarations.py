@@ -15,10 +15,12 @@ from vanedamp.studies.commands.support.arguments import (
     metres_per_second,
     mode_count,
     newtons,
+    order,
     output_file,
     period_count,
     ratio,
     resume,
+    rpm,
     spot_count,
     workers,
 )
@@ -80,6 +82,24 @@ COMMANDS = (
         ),
         writes={"output": _RECORD, "picture": (".png",)}, checkpoint=True,
         reads=Function("support.cases:read_campbell_case"),
+    ),
+    Command(
+        "ring", "modes of a ring of equal sectors by nodal diameter, and the engine orders that meet them", 27,
+        (
+            input_file("CASE.toml"), output_file("RING.h5"), json_file,
+            argument("--picture", metavar="FILE.png", help="the interference diagram as a picture"),
+            argument("--vtu", metavar="FILE.vtu", help="the modes on the whole ring, for ParaView"),
+            argument(
+                "--rpm", type=rpm, nargs=2, metavar=("LOW", "HIGH"),
+                help="speeds of operation (default: those of [campbell], or 5 %% about that of [rotation])",
+            ),
+            argument(
+                "--orders", type=order, nargs="+", metavar="R",
+                help="engine orders (default: those of [campbell], or 1 to the number of sectors)",
+            ),
+        ),
+        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",)},
+        reads=Function("support.cases:read_ring_case"),
     ),
     Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,
@@ -162,18 +182,19 @@ COMMANDS = (
         writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
     ),
     Command(
-        "explore", "sliders, and a forced response that follows them, in the browser", 85,
+        "explore", "sliders, and a forced response or the modes of a ring that follow them, in the browser", 85,
         (
             argument(
-                "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|DIR",
-                help="a scene, or files of sweeps and folders of such; default: the rigid model of the shipped cluster",
+                "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|RING.h5|DIR",
+                help="a scene, or files of sweeps and folders of such, or modes of rings; default: the rigid model of "
+                "the shipped cluster",
             ),
-            output_file("SCENE.toml"),
+            output_file("SCENE.toml|RING.html"),
             argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)"),
             argument("--no-browser", action="store_true", help="only print the address"),
             workers,
         ),
-        writes={"output": (".toml",)},
+        writes={"output": (".toml", ".html")},
     ),
     Command(
         "orbits",

@@ -19,6 +19,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.modal.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
@@ -142,6 +143,17 @@ def _campbell(record: _Record) -> Iterator[Fact]:
     yield Fact("crossings", found)
     yield Fact("veerings", int((of["approach_kind"] == "veering").sum()))
     yield Fact("error", float(of["error"].max()), "", "estimated, relative, of the frequencies")
+
+
+def _ring(record: _Record) -> Iterator[Fact]:
+    found = Interference.load(record.path)
+    yield Fact("sectors", found.modes.sectors)
+    yield Fact("speed", found.speed, "rad/s")
+    rows = [f"diameter {found.label(h)}: " + ", ".join(f"{hz:.6g}" for hz in row if np.isfinite(hz))
+            for h, row in found.by_diameter()]  # fmt: skip
+    yield Fact("frequencies", rows, "Hz", "by family")
+    met = found.in_operation
+    yield Fact("meetings", [f"{found.name(each.mode)} and order {each.order:g} at {each.rpm:.6g} rpm" for each in met])
 
 
 def _reduced(record: _Record) -> Iterator[Fact]:
@@ -289,6 +301,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "modes": ("a modal analysis", "modal", _modes),
     "calibration": ("a case calibrated with measurements", "calibrate", _calibration),
     "campbell": ("a Campbell diagram", "campbell", _campbell),
+    "ring-modes": ("the modes of a ring", "ring", _ring),
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
     "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
     "mistuning": ("amplification of a mistuned ring", "ring", _mistuning),

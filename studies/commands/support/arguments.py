@@ -46,6 +46,16 @@ def hertz(text: str) -> float:
     return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
 
 
+def rpm(text: str) -> float:
+    """Return a speed of rotation."""
+    return _number(text, "a speed in rpm", lambda value: 0.0 < value < math.inf)
+
+
+def order(text: str) -> int:
+    """Return an engine order."""
+    return count(text, 1)
+
+
 def metres_per_second(text: str) -> float:
     """Return a speed."""
     return _number(text, "a speed in m/s", lambda value: 0.0 < value < math.inf)
