@@ -8,6 +8,7 @@ from __future__ import annotations
 from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
     count,
+    family_count,
     hertz,
     input_file,
     json_file,
@@ -101,6 +102,27 @@ COMMANDS = (
         reads=Function("support.cases:read_ring_case"),
     ),
     Command(
+        "mistuning", "amplification of a mistuned ring under engine orders, over draws of its deviations", 28,
+        (
+            input_file("CASE.toml"), output_file("MISTUNING.h5"), json_file,
+            argument(
+                "--orders", type=count, nargs="+", metavar="R",
+                help="engine orders (default: 1 to half the number of sectors)",
+            ),
+            argument(
+                "--seeds", type=family_count, default=100, metavar="N",
+                help="draws, by the seeds from that of [mistuning] on (default: %(default)s)",
+            ),
+            argument("--at", metavar="LABEL", help="interface label of force and response (default: the first)"),
+            argument(
+                "--family", type=family_count, default=1, metavar="N",
+                help="family of modes around which peaks count (default: the first)",
+            ),
+            argument("--ring", metavar="RING.h5", help="reduced ring of the case (default: the case is reduced)"),
+        ),
+        writes={"output": _RECORD}, reads=Function("support.cases:read_ring_case"),
+    ),
+    Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,
         (
             input_file("CASE.toml"), output_file("CALIBRATION.h5"),
@@ -134,6 +156,10 @@ COMMANDS = (
             argument(
                 "--max-frequency", type=hertz, metavar="HZ",
                 help="up to which the error is estimated (default: 1.5 times the first bending)",
+            ),
+            argument(
+                "--families", type=family_count, default=3, metavar="N",
+                help="of a ring: modes of every nodal diameter (default: %(default)s), or all up to --max-frequency",
             ),
             argument(
                 "--hot-spots", type=spot_count, default=0, metavar="N",
