@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from vanedamp.studies.case.ring_stages import ring_analysis
 
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
+from vanedamp.studies.case.ring_stages import ring_analysis
 from vanedamp.studies.case.stages import Structure
 
 #: about the speed of [rotation], speeds of operation where nothing says them
