@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.tools.rings import plate_waves
+from tests.tools.plate_rings import plate_waves
 from vanedamp.modal.interference import Interference
 
 

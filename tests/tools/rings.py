@@ -1,47 +1,126 @@
-"""Rings of a mesh that is written by hand, with waves in closed form as their modes."""
+"""Rings whose solution is known: chains of one mass a sector, on springs to ground and to their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg, sparse
 
-from vanedamp.files.store import Variable
-from vanedamp.modal.cyclic_modes import RingModes
-
-#: nodes of a sector along the radius, the circumference and the height
-SHAPE = (3, 4, 2)
-
-
-def sector_mesh(sectors: int, radii=(0.1, 0.2), thickness: float = 0.01) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (n, 3) and hexahedra (c, 8) of a sector of an annular plate about z, from angle 0 to 2 pi / N."""
-    radius, angle, height = np.meshgrid(
-        np.linspace(*radii, SHAPE[0]), np.linspace(0.0, 2 * np.pi / sectors, SHAPE[1]), [0.0, thickness], indexing="ij"
-    )
-    points = np.column_stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel(), height.ravel()])
-    number = np.arange(len(points)).reshape(SHAPE)
-    i, j = (each.ravel() for each in np.meshgrid(range(SHAPE[0] - 1), range(SHAPE[1] - 1), indexing="ij"))
-    square = ((0, 0), (1, 0), (1, 1), (0, 1))
-    cells = np.column_stack([number[i + di, j + dj, k] for k in (0, 1) for di, dj in square])
-    return points, cells
+from vanedamp.modal.cyclic import CyclicSector, cyclic_sector
+from vanedamp.modal.cyclic_faces import rotation
+from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.rom.ring.deviations import Deviations
+from vanedamp.rom.ring.ring_model import RingModel
 
 
-def plate_waves(sectors: int = 8, families: int = 2, point=(0.0, 0.0, 0.0)) -> RingModes:
-    """Bending-like waves w = r^(f+1) exp(i h angle) along z of every diameter, at 100 (f + 1) + 10 h^2 Hz."""
-    points, _ = sector_mesh(sectors)
-    radius, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
-    pairs = [(h, f) for f in range(families) for h in range(sectors // 2 + 1)]
-    shapes = np.zeros((len(pairs), len(points), 3), dtype=complex)
-    for row, (h, f) in enumerate(pairs):
-        wave = radius ** (f + 1) * np.exp(1j * h * angle)
-        shapes[row, :, 2] = wave.real if 2 * h in (0, sectors) else wave
-    diameters, order = np.transpose(pairs)
-    frequencies = 100.0 * (order + 1) + 10.0 * diameters**2
-    return RingModes(
-        sectors, np.array([0.0, 0.0, 1.0]), np.array(point), diameters, order, frequencies, np.zeros(len(pairs)),
-        shapes.reshape(len(pairs), -1), {},
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Chain:
+    """N masses m, kg, that move along the axis z, on ground springs k, N/m, coupled to both neighbours by c, N/m."""
+
+    sectors: int = 6
+    mass: float = 0.5
+    stiffness: float = 2e6
+    coupling: float = 2e5
+    damping_ratio: float = 0.002
+    radius: float = 0.2
+
+    def matrices(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return stiffness and mass (N, N) of the whole ring."""
+        deviations = deviations or Deviations()
+        stiffness, mass = (deviations.of(name, self.sectors) for name in ("stiffness", "mass"))
+        first = np.zeros(self.sectors)
+        for step in (1, -1):
+            first[0] += self.coupling
+            first[step % self.sectors] -= self.coupling
+        return linalg.circulant(first) + np.diag(self.stiffness * (1 + stiffness)), np.diag(self.mass * (1 + mass))
+
+    def squares(self, diameters: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Return the squared angular frequencies of nodal diameters, tuned."""
+        angles = 2 * np.pi / self.sectors * np.asarray(diameters)
+        return (self.stiffness + 2 * self.coupling * (1 - np.cos(angles))) / self.mass
+
+    @property
+    def diameters(self) -> np.ndarray:
+        """The nodal diameters of the waves: pairs but for 0 and N/2."""
+        return np.repeat(*np.unique(np.minimum(np.arange(self.sectors), -np.arange(self.sectors) % self.sectors),
+                                    return_counts=True))  # fmt: skip
+
+    def ring(self, label: str = "tip") -> RingModel:
+        """Return the ring as a reduced model, exact: the ground spring and the mass deviate."""
+        diameters = self.diameters
+        single = (diameters == 0) | (2 * diameters == self.sectors)
+        first = ~np.r_[False, diameters[1:] == diameters[:-1]]
+        shape = np.sqrt(np.where(single, 1.0, 2.0) / (self.sectors * self.mass)) * first
+        zeros = np.zeros((1, 3))
+        return RingModel(
+            sectors=self.sectors, axis=np.array([0.0, 0.0, 1.0]), point=np.zeros(3), diameters=diameters,
+            squares=self.squares(diameters), modes=self.sectors, interface=(label,), selection=shape[None],
+            directions=np.array([[0.0, 0.0, 1.0]]), normals=zeros, positions=np.array([[self.radius, 0.0, 0.0]]),
+            arms=np.zeros(1), base_load=self.mass * np.outer(shape, [0.0, 0.0, 1.0]),
+            part_load=self.mass * np.outer(shape, [0.0, 0.0, 1.0]),
+            stiffness=self.stiffness * np.outer(shape, shape), mass=self.mass * np.outer(shape, shape),
+            damping_ratio=self.damping_ratio,
+        )  # fmt: skip
 
 
-def mesh_variables(sectors: int) -> tuple[dict, dict]:
-    """The mesh of a sector as it rides along in a file of modes."""
-    points, cells = sector_mesh(sectors)
-    return {
-        "coordinates": Variable(points, ("node", "axis"), "m"), "cell": Variable(cells, ("cells", "corner"))
-    }, {"vtk_cell_type": 12}  # fmt: skip
+@dataclass(frozen=True)
+class LumpedDisk:
+    """A disk of N sectors with a blade each, of masses that springs of three stiffnesses join: 3 freedoms a mass.
+
+    A sector has nodes 0 (face low), 1 (face high), 2 (rim, also on springs to ground) and 3, 4, 5 up the blade; its
+    axes are x radial, y tangential, z axial.
+    """
+
+    sectors: int = 6
+    blade: float = 1e7
+    rim: float = 3e7
+    axes: tuple[float, float, float] = (2.3, 1.0, 0.6)
+
+    def _springs(self, pairs: Sequence[tuple[int, int]], stiffness: float) -> np.ndarray:
+        matrix = np.zeros((18, 18))
+        for one, other in pairs:
+            for place, sign in (((one, one), 1), ((other, other), 1), ((one, other), -1), ((other, one), -1)):
+                rows, columns = (slice(3 * node, 3 * node + 3) for node in place)
+                matrix[rows, columns] += sign * stiffness * np.diag(self.axes)
+        return matrix
+
+    @property
+    def part(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness and mass (18, 18) of the blade."""
+        masses = np.repeat([0.0, 0.0, 0.0, 0.2, 0.15, 0.1], 3)
+        return self._springs([(2, 3), (3, 4), (4, 5)], self.blade), np.diag(masses)
+
+    def matrices(self, damping_ratio: float = 0.002) -> SystemMatrices:
+        """Return the matrices of a sector with both faces free, and patches of one node each."""
+        blade, mass = self.part
+        stiffness = blade + self._springs([(0, 2), (2, 1)], self.rim)
+        stiffness[6:9, 6:9] += self.rim * np.eye(3)
+        mass = mass + np.diag(np.repeat([0.3, 0.3, 1.0, 0.0, 0.0, 0.0], 3))
+        angle = np.pi / self.sectors
+        ends = [[np.cos(angle), side * np.sin(angle), 0.0] for side in (-1, 1)]
+        coordinates = 0.2 * np.array([*ends, *[[radius, 0.0, 0.0] for radius in (1.0, 1.1, 1.2, 1.3)]])
+        names = ("low", "high", "rim", "root", "middle", "tip")
+        patches = {name: Patch(np.array([node]), np.ones(1)) for node, name in enumerate(names)}
+        sparse_ones = (sparse.csr_array(matrix) for matrix in (stiffness, mass))
+        return SystemMatrices(*sparse_ones, coordinates, np.empty(0, int), patches, damping_ratio)
+
+    def sector(self) -> CyclicSector:
+        """Return the cyclic sector about the axis z."""
+        return cyclic_sector(self.matrices(), "low", "high", self.sectors)
+
+    def whole(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return stiffness and mass of the whole ring (15 N, 15 N), and what makes a sector's motion (N, 18, 15 N) of
+        its coordinates: those of the nodes of every sector but its face high, in its axes."""
+        deviations, matrices = deviations or Deviations(), self.matrices()
+        place, turn = np.zeros((self.sectors, 18, 15 * self.sectors)), rotation(np.eye(3)[2], 2 * np.pi / self.sectors)
+        for j in range(self.sectors):
+            own = 15 * j + np.arange(15)
+            place[j, np.r_[0:3, 6:18], own] = 1.0
+            place[j][3:6, 15 * ((j + 1) % self.sectors) + np.arange(3)] = turn
+        found = []
+        for name, own, part in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), self.part, strict=True):
+            values = deviations.of(name, self.sectors)
+            found.append(sum(t.T @ (own.toarray() + d * part) @ t for t, d in zip(place, values, strict=True)))
+        return found[0], found[1], place

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
-from tests.tools.rings import mesh_variables, plate_waves, sector_mesh
+from tests.tools.plate_rings import mesh_variables, plate_waves, sector_mesh
 from vanedamp.modal.interference import Interference
 from vanedamp.studies.cli import main
 from vanedamp.studies.report import ring_view as module
