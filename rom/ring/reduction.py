@@ -28,7 +28,8 @@ from vanedamp.rom.ring.ring_model import RingModel
 _LEFT_OUT = 1e-5
 # of the strain energy of a static response to the interface: below it the others determine it
 _DEPENDENT = 1e-9
-_POINTS = 17
+# points of the receptance, and where they end: over the first family, if the last one reaches so far
+_POINTS, _REACH = 17, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +71,9 @@ def reduce_ring(
     centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, with the greatest_speed, rad/s
     report         called with the number of diameters done, and of all
 
-    The estimate of the error is `estimate` of the provenance: of the interface's receptance, up to the lowest frequency
-    of the last family, and of squared frequencies per squared deviation. Raises RingError for an interface of rigid or
-    full patches, and what ring_modes and the factorisation raise.
+    The estimate of the error is `estimate` of the provenance: of the interface's receptance, up to 1.5 times the first
+    family's frequencies or the last family's lowest, and of squared frequencies per squared deviation. Raises RingError
+    for an interface of rigid or full patches, and what ring_modes and the factorisation raise.
     """
     if not isinstance(interface, Interface):
         interface = Interface.on_patches(sector.matrices, interface)
@@ -83,14 +84,14 @@ def reduce_ring(
     sectors = [sector] + [_at(sector, centrifugal, speed) for speed in speeds[1:]]
     found = [ring_modes(one, families, max_frequency) for one in sectors]
     forces = np.vstack([_forces(modes, part) for modes in found])
-    waves, errors, total = [], [], len(sector.diameters)
+    waves, errors, total, top = [], [], len(sector.diameters), _top(found[0])
     for done, number in enumerate(sector.diameters):
         if report is not None:
             report(done, total)
-        one, error = _of_diameter(sectors, found, number, interface.vectors.T, forces, factorize)
+        one, error = _of_diameter(sectors, found, number, interface.vectors.T, forces, factorize, top)
         waves.append(one)
         errors.append(error)
-    return _model(sector, interface, part, waves, errors, centrifugal, greatest_speed)
+    return _model(sector, interface, part, waves, errors, top, centrifugal, greatest_speed)
 
 
 def _at(sector: CyclicSector, centrifugal: sparse.csr_array | None, speed: float) -> CyclicSector:
@@ -117,7 +118,7 @@ def _forces(modes: RingModes, part: Part) -> np.ndarray:
 
 def _of_diameter(
     sectors: Sequence[CyclicSector], found: Sequence[RingModes], number: int, vectors: np.ndarray, forces: np.ndarray,
-    factorize: Factorize,
+    factorize: Factorize, top: float,
 ) -> tuple[_Waves, tuple[float, float]]:  # fmt: skip
     """Return the waves of a diameter, and the errors of the receptance and of deviations that they leave.
 
@@ -135,7 +136,13 @@ def _of_diameter(
                                      np.vstack([lead, rest]), _LEFT_OUT)  # fmt: skip
     squares, fields = first.ritz(np.vstack([rest, others]))
     waves = _Waves(first.problem, np.vstack([lead, fields]), np.r_[lead_squares, squares], len(lead), first.factor)
-    return waves, (first.receptance_error(waves, vectors), left)
+    return waves, (first.receptance_error(waves, vectors, top), left)
+
+
+def _top(modes: RingModes) -> float:
+    """Return the angular frequency up to which errors count: over the first family, and not over the last one."""
+    lasts = [modes.frequencies_hz[modes.diameters == number].max() for number in np.unique(modes.diameters)]
+    return float(2.0 * np.pi * min(*lasts, _REACH * modes.frequencies_hz[modes.families == 0].max()))
 
 
 def _shapes(modes: RingModes, number: int) -> np.ndarray:
@@ -200,10 +207,10 @@ class _Statics:
         inverse, turns = linalg.eigh(self.masses(fields, fields), self.energies(fields, fields))
         return 1.0 / inverse, (turns / np.sqrt(inverse)).T @ fields
 
-    def receptance_error(self, waves: _Waves, vectors: np.ndarray) -> float:
+    def receptance_error(self, waves: _Waves, vectors: np.ndarray, top: float) -> float:
         """Return the largest error of the interface's receptance by modes and static response, relative.
 
-        Against a basis with the next block of quasi-static responses, up to the last of the modes.
+        Against a basis with the next block of quasi-static responses, up to an angular frequency.
         """
         attached = waves.fields[waves.modes :]
         further, _ = self.independent(self.response((self._mass @ attached.T).T), waves.fields, _DEPENDENT, unit=True)
@@ -213,7 +220,7 @@ class _Statics:
         static = (rest / squares) @ rest.conj().T
         ratio = self.problem.matrices.damping_ratio
         worst = 0.0
-        for omega in np.linspace(0.0, np.sqrt(lowest[-1]), _POINTS):
+        for omega in np.linspace(0.0, top, _POINTS):
             modal = (kept / (lowest - omega**2 + 2j * ratio * omega * np.sqrt(lowest))) @ kept.conj().T
             dynamic = (rest / (squares - omega**2 + 2j * ratio * omega * np.sqrt(squares))) @ rest.conj().T
             worst = max(worst, float(np.linalg.norm(static - dynamic) / np.linalg.norm(modal + dynamic)))
@@ -222,7 +229,7 @@ class _Statics:
 
 def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[_Waves],
-    errors: Sequence[tuple[float, float]], centrifugal: sparse.csr_array | None, greatest_speed: float,
+    errors: Sequence[tuple[float, float]], top: float, centrifugal: sparse.csr_array | None, greatest_speed: float,
 ) -> RingModel:  # fmt: skip
     """Return the reduced ring of the waves of all diameters: natural modes first."""
     fields = _real([one.fields for one in waves], waves)
@@ -238,9 +245,8 @@ def _model(
     fields, matrices = fields[order], sector.matrices
     translations = matrices.rigid_translations()
     receptance, left = (max(values) for values in zip(*errors, strict=True))
-    top = min(float(one.squares[one.modes - 1]) for one in waves) ** 0.5 / (2.0 * np.pi)
     estimate: dict[str, Any] = {
-        "receptance": receptance, "deviation": left, "frequencies_hz": [0.0, top],
+        "receptance": receptance, "deviation": left, "frequencies_hz": [0.0, top / (2.0 * np.pi)],
         "sentence": f"{lead.sum()} natural modes of the ring: estimated error {100 * receptance:.2g} % of the "
         f"interface's receptance, {100 * left:.1g} % of squared frequencies per squared deviation",
     }  # fmt: skip

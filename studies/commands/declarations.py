@@ -8,6 +8,7 @@ from __future__ import annotations
 from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
     count,
+    family_count,
     hertz,
     input_file,
     json_file,
@@ -134,6 +135,10 @@ COMMANDS = (
             argument(
                 "--max-frequency", type=hertz, metavar="HZ",
                 help="up to which the error is estimated (default: 1.5 times the first bending)",
+            ),
+            argument(
+                "--families", type=family_count, default=3, metavar="N",
+                help="of a ring: modes of every nodal diameter (default: %(default)s), or all up to --max-frequency",
             ),
             argument(
                 "--hot-spots", type=spot_count, default=0, metavar="N",

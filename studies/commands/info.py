@@ -22,6 +22,8 @@ from vanedamp.files.store import Variable, decoding, load_any
 from vanedamp.modal.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
@@ -167,6 +169,23 @@ def _reduced(record: _Record) -> Iterator[Fact]:
         yield Fact(name, facts)
 
 
+def _ring_model(record: _Record) -> Iterator[Fact]:
+    ring = RingModel.load(record.path)
+    yield Fact("sectors", ring.sectors)
+    yield Fact("frequency_hz", np.unique(ring.frequencies_hz)[:_MOST].tolist(), "Hz", "of the tuned ring at standstill")
+    yield Fact("interface", list(ring.interface), "", "of every sector")
+    yield Fact("modes", ring.modes, "", f"natural modes among {len(ring.squares)} waves")
+    yield Fact("estimate", ring.provenance.get("estimate", {}).get("sentence"))
+
+
+def _mistuning(record: _Record) -> Iterator[Fact]:
+    study = MistuningStudy.load(record.path).to_json()
+    yield Fact("draws", study["seeds"])
+    for row in study["orders"]:
+        top, median = row["amplification"]["largest"], row["quantiles"][0]["value"]
+        yield Fact(f"order {row['order']}", f"amplification up to {top:.4g}, median {median:.4g}")
+
+
 def _response(record: _Record) -> Iterator[Fact]:
     for name in _OF_RESPONSE:
         yield Fact(name, record.attributes.get(name), UNITS.get(name, ""))
@@ -284,6 +303,8 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "campbell": ("a Campbell diagram", "campbell", _campbell),
     "ring-modes": ("the modes of a ring", "ring", _ring),
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
+    "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
+    "mistuning": ("amplification of a mistuned ring", "ring", _mistuning),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
     "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),

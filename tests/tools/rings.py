@@ -9,7 +9,6 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.cyclic import CyclicSector, cyclic_sector
-from vanedamp.modal.cyclic_faces import rotation
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
@@ -111,16 +110,37 @@ class LumpedDisk:
         return cyclic_sector(self.matrices(), "low", "high", self.sectors)
 
     def whole(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return stiffness and mass of the whole ring (15 N, 15 N), and what makes a sector's motion (N, 18, 15 N) of
-        its coordinates: those of the nodes of every sector but its face high, in its axes."""
-        deviations, matrices = deviations or Deviations(), self.matrices()
-        place, turn = np.zeros((self.sectors, 18, 15 * self.sectors)), rotation(np.eye(3)[2], 2 * np.pi / self.sectors)
-        for j in range(self.sectors):
-            own = 15 * j + np.arange(15)
-            place[j, np.r_[0:3, 6:18], own] = 1.0
-            place[j][3:6, 15 * ((j + 1) % self.sectors) + np.arange(3)] = turn
-        found = []
-        for name, own, part in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), self.part, strict=True):
-            values = deviations.of(name, self.sectors)
-            found.append(sum(t.T @ (own.toarray() + d * part) @ t for t, d in zip(place, values, strict=True)))
-        return found[0], found[1], place
+        """Return stiffness and mass (15 N, 15 N) of the whole ring, and the motion of every sector (N, 18, 15 N)."""
+        part = tuple(map(sparse.csr_array, self.part))
+        stiffness, mass, place = whole_ring(self.sector(), part, deviations)
+        return stiffness.toarray(), mass.toarray(), np.array([one.toarray() for one in place])
+
+
+def whole_ring(
+    sector: CyclicSector, part: tuple[sparse.csr_array, sparse.csr_array], deviations: Deviations | None = None
+) -> tuple[sparse.csr_array, sparse.csr_array, list[sparse.csr_array]]:
+    """Return stiffness and mass of a whole ring, and what makes the motion of each sector of its coordinates.
+
+    These are the free displacements of the nodes of every sector but its face high, in the sector's axes.
+    """
+    matrices, count = sector.matrices, len(sector.matrices.coordinates)
+    kept = np.setdiff1d(np.arange(count), sector.high)
+    places, size = np.full(count, -1), 3 * len(kept)
+    places[kept] = np.arange(len(kept))
+    own = sparse.csr_array((np.ones(len(kept)), (kept, np.arange(len(kept)))), (count, len(kept)))
+    shared = (np.ones(len(sector.high)), (sector.high, places[sector.low]))
+    next_one = sparse.kron(sparse.csr_array(shared, (count, len(kept))), sector.turn(), format="csr")
+    held = np.zeros((count, 3), bool)
+    held.ravel()[matrices.fixed] = True
+    free = np.flatnonzero(~np.tile(held[kept].ravel(), sector.sectors))
+    found = []
+    for j in range(sector.sectors):
+        blocks = [sparse.csr_array((3 * count, size)) for _ in range(sector.sectors)]
+        blocks[j] = sparse.kron(own, np.eye(3), format="csr")
+        blocks[(j + 1) % sector.sectors] = blocks[(j + 1) % sector.sectors] + next_one
+        found.append(sparse.csr_array(sparse.hstack(blocks, format="csr")[:, free]))
+    deviations, totals = deviations or Deviations(), []
+    for name, whole, one in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), part, strict=True):
+        values = deviations.of(name, sector.sectors)
+        totals.append(sum(t.T @ (whole + d * one) @ t for t, d in zip(found, values, strict=True)))
+    return totals[0], totals[1], found

@@ -78,6 +78,8 @@ def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
 
 #: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
 spot_count = partial(count, most=1000)
+#: a number of families of modes
+family_count = partial(count, least=1)
 #: periods of Lyapunov exponents (coupling.scene.scene, which would be heavy to import)
 period_count = partial(count, least=32)
 
