@@ -13,7 +13,7 @@ from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.strength import contact_strength
-from vanedamp.coupling.strength.stress_watch import stressed
+from vanedamp.coupling.strength.watched import watched
 
 
 def simulate(
@@ -34,7 +34,7 @@ def simulate(
     scene = loaded(scene)
     chosen = choose(scene)
     rounded = contact_strength.wanted(chosen.scene)
-    response = stressed(chosen.scene, events or rounded, samples_per_period, start or chosen.start, progress)
+    response = watched(chosen.scene, events or rounded, samples_per_period, start or chosen.start, progress)
     if rounded:
         response = contact_strength.with_contacts(chosen.scene, response, events)
     took = time.perf_counter() - started

@@ -229,6 +229,13 @@ class Solid:
         }
         return parts | {f"support.{name}": self._support_stiffness(name) for name in self.elastic}
 
+    def part(self, groups: Sequence[str]) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Return stiffness and mass (N, N) of some volume groups. Thermal stress is not among them."""
+        measures = [fenicsx.over(self.domain, 3, self.domain.volumes[name]) for name in groups]
+        inertia = self._density * ufl.inner(self._trial, self._test)
+        stiffness = sum(self._material_stiffness(measure) for measure in measures)
+        return sparse.csr_array(stiffness), sparse.csr_array(sum(fenicsx.matrix(inertia * one) for one in measures))
+
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
         """Return von Mises stresses, Pa, of displacements (N,) at the corners of all cells, each from its own cell."""
         self._check_size(displacement)

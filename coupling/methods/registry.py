@@ -15,7 +15,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.scene.structures import Ring, Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import most_periods
@@ -75,10 +75,18 @@ def run_of(
         samples,
         isinstance(scene.structure, Rom),
         deflects(scene, system),
-        None if scene.wear is None else scene.wear.impact_exponent,
+        _impact_exponent(scene),
     )
     records = records if watch is None else watch.records(records)
     return method.begin(scene, system, records, events, start_of(scene, system, start))
+
+
+def _impact_exponent(scene: Scene) -> float | None:
+    """Return the exponent of impacts that wear; where a ring wants them counted by body any; None: not counted."""
+    if scene.wear is not None:
+        return scene.wear.impact_exponent
+    counted = isinstance(scene.structure, Ring) and _why_not(scene.solver.method, "WEARS") is None
+    return 1.0 if counted else None
 
 
 def _check_bodies(scene: Scene, system: System) -> None:

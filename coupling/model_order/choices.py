@@ -14,6 +14,7 @@ from vanedamp.coupling.model_order import selection
 from vanedamp.coupling.model_order.body_choice import Advice, judge_all, needs_body, with_blocks, with_sliders
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.sectors import unrolled
 
 #: points of a sweep whose bodies are judged, evenly spread
 _POINTS = 5
@@ -54,7 +55,7 @@ def choose(scene: Scene) -> Chosen:
 
 def choices_of(scenes: Iterable[Scene]) -> Choices:
     """Return the choices that suit all of these scenes. Raises InputError when there is no good one."""
-    scenes = list(scenes)
+    scenes = [unrolled(scene) for scene in scenes]
     modes = selection.choices_of(scenes)
     undecided = [scene for scene in scenes if needs_body(scene)]
     if not undecided:
@@ -64,7 +65,8 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
 
 
 def with_choices(scene: Scene, choices: Choices) -> Chosen:
-    """Return the scene with the choices that were made for it."""
+    """Return the scene with the choices that were made for it, and what is repeated over a ring written out."""
+    scene = unrolled(scene)
     selected, body = selection.with_choice(scene, choices.modes), choices.body
     if body is None or not needs_body(scene):
         return Chosen(*selected)

@@ -14,6 +14,7 @@ import numpy as np
 from vanedamp.coupling.response.contact_strength import ContactStrength
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.response.spot_stress import variables as stress_variables
 from vanedamp.files.display import Plotted
@@ -227,6 +228,8 @@ class Response(Plotted):
     """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
     stress: tuple[SpotStress, ...] | None = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
+    sectors: SectorResponse | None = None
+    """response of each sector of a ring; None for other structures"""
     contacts: tuple[ContactStrength, ...] | None = None
     """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
     lyapunov: dict[str, Any] | None = None
@@ -261,6 +264,8 @@ class Response(Plotted):
             data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
         if self.contacts is not None:
             data["contact_strength"] = [contact.to_json() for contact in self.contacts]
+        if self.sectors is not None:
+            data["sectors"] = self.sectors.to_json()
         if self.lyapunov is not None:
             data["lyapunov"] = self.lyapunov
         if events:
@@ -295,6 +300,8 @@ class Response(Plotted):
             variables |= self.in_plane.variables()
         if self.stress:
             variables |= stress_variables(self.stress)
+        if self.sectors is not None:
+            variables |= self.sectors.variables()
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}

@@ -11,6 +11,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from vanedamp.coupling.scene.registration import SHAPES
+from vanedamp.coupling.scene.repetition import Scatter, Sectors
 from vanedamp.coupling.scene.shapes.shape import Shape
 from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.reference import unit_in
@@ -53,6 +54,15 @@ class Cavity:
     """from the axis of rotation to a body's centre at mid-travel; the cavity lies in the plane of rotation [m]"""
     centrifugal_deg: Real = 0.0
     """angle of the centrifugal load: 0 presses the bodies on the floor, 90 pulls them to the left wall [degree]"""
+    sectors: Sectors | None = None
+    """sectors of a ring that have this cavity and its bodies, named "c@0", "c@1", ...: "all", "alternate", a number, or
+    a list (default: as written)"""
+    scatter: Scatter | None = None
+    """scatter of gap and positions over these sectors"""
+
+    def __post_init__(self) -> None:
+        if self.scatter is not None and self.sectors is None:
+            raise ValueError('scatter: is over the sectors of a ring; give sectors, such as "all"')
 
     def labels(self) -> tuple[str | None, str | None, str | None]:
         """Return the labels of left wall, right wall and floor; a single one serves all three."""
@@ -198,3 +208,5 @@ class FrictionDamper:
     """tangential stiffness in series with the contact, unloaded at time zero (default: rigid Coulomb) [N/m]"""
     at: str | None = None
     """interface label of a reduced model where it acts (default: excitation.at)"""
+    sectors: Sectors | None = None
+    """sectors of a ring that have one (default: as written)"""

@@ -57,7 +57,10 @@ class Excitation:
     """frequency near that resonance, or [lowest, highest]; of several the one that responds most (default: the
     frequency, or its range in a sweep) [Hz]"""
     at: str | None = None
-    """interface label of a reduced model where the force acts and the response is taken"""
+    """interface label of a reduced model where the force acts and the response is taken; in a ring "tip" is "tip@0" """
+    wave: Whole | None = None
+    """engine order r of a wave: the force acts in all sectors of a ring, in sector j of N later by 360 r j/N degrees;
+    harmonics by their multiples of that (default: a whole engine_order)"""
     harmonic: tuple[Harmonic, ...] = ()
     """sines whose sum excites; that of order 1 has amplitude 1 and phase 0 unless it is among them"""
     waveform: AnyWaveform | None = None
@@ -106,13 +109,21 @@ class Excitation:
         if self.load and self.pattern is not None:
             raise ValueError("give one of load and pattern")
         name = "load" if self.load else "pattern"
-        for other in ("force", "base_acceleration", "harmonic", "waveform"):
+        for other in ("force", "base_acceleration", "harmonic", "waveform", "wave"):
             if getattr(self, other) not in (None, ()):
                 raise ValueError(f"give one of {name} and {other}")
         if self.load_factor is not None and self.resonance_amplitude is not None:
             raise ValueError("give one of load_factor and resonance_amplitude, which finds it")
         if fault := repeated({f"load[{index}]": load for index, load in enumerate(self.load)}):
             raise ValueError(fault)
+
+    @property
+    def travelling(self) -> int | None:
+        """Engine order of the wave by which a force loads a ring; None: it acts at one label."""
+        if (self.force is None and self.resonance_amplitude is None) or self.distributed:
+            return None
+        order = self.engine_order
+        return self.wave if self.wave is not None or order is None or order % 1.0 else int(order)
 
     @property
     def distributed(self) -> bool:

@@ -21,6 +21,7 @@ from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.elements.element import SceneElement
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
+from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values, number_at
 from vanedamp.coupling.scene.ramp import Ramp
@@ -29,7 +30,7 @@ from vanedamp.coupling.scene.registration import ELEMENTS, Contact
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
-from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.coupling.scene.structures import Initial, Prescribed, Ring, Rom, Structure
 from vanedamp.coupling.scene.wear import Wear
 from vanedamp.files.display import Displayed
 from vanedamp.files.key_tables import documented
@@ -92,7 +93,10 @@ class Time:
 #: relative deviation allowed between a frequency and a waveform's with its own duration
 _SAME_PERIOD = 1e-4
 #: where a scene names files, relative to its own
-_FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
+_FILES = (
+    ("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"),
+    *(("structure", "mistuning", name, "file") for name in DEVIATIONS),
+)  # fmt: skip
 #: fewest periods that tell Lyapunov exponents
 LEAST_EXPONENTS = 32
 #: keys of the [sweep] table that are no axes: their least values, and what they mean
@@ -220,6 +224,7 @@ class Scene(OpenRecord, Displayed):
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_rotation()
         self._check_structure()
+        self._check_ring()
         self._check_elements()
         for path, axis in self.sweep.items():
             if path in _KEPT and not (isinstance(axis, int) and axis >= _KEPT[path][0]):
@@ -272,6 +277,16 @@ class Scene(OpenRecord, Displayed):
         """Table, number in it, and record of every element: stops, and those that other code adds."""
         tables = {"stop": self.stop} | (self.added or {})
         return ((table, number, entry) for table, entries in tables.items() for number, entry in enumerate(entries))
+
+    @property
+    def repeats(self) -> bool:
+        """Whether labels and tables are still to be repeated over the sectors of a ring (system.sectors.unrolled)."""
+        tables: tuple[Any, ...] = (*self.cavity, *self.friction_damper, *self.stop)
+        return isinstance(self.structure, Ring) and (
+            "@" not in str(self.excitation.at)
+            or self.excitation.travelling is not None
+            or any(entry.sectors is not None for entry in tables)
+        )
 
     def cavity_of(self, damper: Damper) -> int:
         """Return the number of a body's cavity."""
@@ -420,6 +435,22 @@ class Scene(OpenRecord, Displayed):
                 raise ValueError("friction_damper: a prescribed motion feels no force; remove it")
             if self.initial != Initial():
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
+
+    def _check_ring(self) -> None:
+        """Raise ValueError for something of a ring on another structure, and for a wave that is not of sines."""
+        excitation, ring = self.excitation, isinstance(self.structure, Ring)
+        for table in ("cavity", "friction_damper", "stop"):
+            for number, entry in enumerate(getattr(self, table)):
+                if entry.sectors is not None and not ring:
+                    raise ValueError(
+                        f'{table}[{number}].sectors: this structure is no ring; take structure.model = "ring", or '
+                        "leave it out"
+                    )
+        if excitation.wave is not None and (not ring or excitation.base_acceleration):
+            whose = "a base moves all sectors alike" if ring else 'is around a ring, structure.model = "ring"'
+            raise ValueError(f"excitation.wave: {whose}; leave it out")
+        if ring and excitation.travelling is not None and excitation.waveform is not None:
+            raise ValueError("excitation.waveform: a wave around a ring takes sines; give harmonic")
 
     def _check_ranges(self) -> None:
         """Raise ValueError for a range that is none, or of no number of the scene."""

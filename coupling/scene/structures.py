@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.scene.mistuning import Mistuning
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
 
 
@@ -101,7 +102,24 @@ class Rom:
             raise ValueError("attached: attachment modes go with natural = true and a number of modes")
 
 
-Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model"), BeforeValidator(_structure)]
+@dataclass(frozen=True, config=STRICT)
+class Ring(Rom):
+    """A reduced ring of sectors. Interface labels end with their sector, "tip@0" to "tip@35" of 36."""
+
+    model: Literal["ring"]  # type: ignore[assignment]
+    """"ring": a ring of sectors"""
+    file: Annotated[str, BeforeValidator(_file)]
+    """file of the reduced ring (`vanedamp reduce` of a case with [ring]), relative to the scene's"""
+    mistuning: Mistuning | None = None
+    """deviations of the sectors (default: tuned)"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.modes == "auto":
+            raise ValueError('modes: "auto" is for model = "rom"; a ring has the modes of its file, or the first ones')
+
+
+Structure = Annotated[Prescribed | Rigid | Rom | Ring, Field(discriminator="model"), BeforeValidator(_structure)]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -19,27 +19,35 @@ from vanedamp.rom.recovery import COMPONENTS, hot_spots
 
 #: samples per period of the highest harmonic, and of any motion; impacts take up to so many
 OF_HARMONIC, _LEAST, _MOST = 16, 48, 192
-#: fraction of the amplitude of stress that samples may miss by estimate (`samples_of`)
+#: fraction of the amplitude that samples may miss by estimate (`samples_of`)
 _MISSED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Spots:
-    """Hot spots of a reduced model with n modes.
+class Functionals:
+    """Functionals of n modal coordinates at s places, of c components.
 
-    facts: of each, by name (rom.recovery.hot_spots); rows: (s, 6, n) Pa per modal coordinate; squares: (n,) squared
-    angular frequencies; speed: of rotation, rad/s.
+    rows: (s, c, n) in their unit per modal coordinate; squares: (n,) squared angular frequencies.
     """
 
-    facts: dict[str, dict[str, Any]]
     rows: np.ndarray
     squares: np.ndarray
-    speed: float
 
     @cached_property
     def size(self) -> np.ndarray:
-        """(s, n) Pa, a norm of the stress per modal coordinate."""
+        """(s, n) a norm of the components per modal coordinate."""
         return np.sqrt((self.rows**2).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Spots(Functionals):
+    """Hot spots of a reduced model with n modes: stresses, Pa.
+
+    facts: of each, by name (rom.recovery.hot_spots); speed: of rotation, rad/s.
+    """
+
+    facts: dict[str, dict[str, Any]]
+    speed: float
 
     @cached_property
     def materials(self) -> list[Fatigue | None]:
@@ -75,7 +83,7 @@ def spots_of(scene: Scene) -> Spots | None:
     places = [model.outputs.index(f"{name}.{component}") for name in facts for component in COMPONENTS]
     squares, shapes = model.natural
     rows = (model.output_rows[places] @ shapes).reshape(-1, 6, len(squares))
-    return Spots(facts, rows, squares, scene.speed)
+    return Spots(rows, squares, facts, scene.speed)
 
 
 def known_spots(scene: Scene) -> Spots:
@@ -86,13 +94,13 @@ def known_spots(scene: Scene) -> Spots:
     return spots
 
 
-def samples_of(scene: Scene, system: System, spots: Spots, asked: int = 0) -> int:
-    """Return the number of samples per period from which stresses are taken: a multiple of `asked`, even if possible.
+def samples_of(scene: Scene, system: System, spots: Functionals, asked: int = 0) -> int:
+    """Return the number of samples per period from which functionals are taken: a multiple of `asked`.
 
-    16 per period of the highest harmonic at least, and so many that what impacts excite is missed by 1 % of the
-    amplitude at most, but no more than 192. A mode misses at most its contribution, and (h / 2)^2 / 6 of it if its
-    phase advances by h between samples: the mean over the places of its peak between two samples. The contribution is
-    that of an impact which reverses the velocity of the excited mode at a contact.
+    An even one if possible, 16 per period of the highest harmonic at least, and so many that what impacts excite is
+    missed by 1 % of the amplitude at most, but no more than 192. A mode misses at most its contribution, and
+    (h / 2)^2 / 6 of it if its phase advances by h between samples: the mean over the places of its peak. The
+    contribution is that of an impact which reverses the velocity of the excited mode at a contact.
     """
     wanted = max(_LEAST, OF_HARMONIC * int(system.order.max(initial=1)))
     share, omega = _impact_shares(system, spots), np.sqrt(np.maximum(spots.squares, 0.0))
@@ -116,8 +124,8 @@ def _fits(scene: Scene, samples: int) -> bool:
     return True
 
 
-def _impact_shares(system: System, spots: Spots) -> np.ndarray:
-    """Return the stress (k, s, n) of modes after an impact of each contact, over that of the mode nearest to order 1.
+def _impact_shares(system: System, spots: Functionals) -> np.ndarray:
+    """Return functionals (k, s, n) of modes after an impact of each contact, over that of the mode nearest to order 1.
 
     That mode moves the contact's places with a velocity, which an elastic impact of the masses in contact reverses. A
     compliant contact takes half a period of these masses on its spring, and hardly excites what is faster.

@@ -68,7 +68,7 @@ def period_stress(stress: np.ndarray, each: int) -> PeriodStress:
     worst = 1 + scalars[0, :, 1:-1].reshape(places, count, each).argmax(axis=-1) + each * np.arange(count)
     sign = signs(about, throughout(np.take_along_axis(about, worst[None], axis=-1)))
     values = np.concatenate([about, sign * scalars])
-    amplitude = 0.5 * (_tops(values, each) + _tops(-values, each))
+    amplitude = 0.5 * (tops(values, each) + tops(-values, each))
     return PeriodStress(np.moveaxis(amplitude, (0, 1, 2), (2, 1, 0)), np.moveaxis(mean, -1, 0))
 
 
@@ -78,7 +78,7 @@ def every_other(stress: np.ndarray) -> np.ndarray:
     return np.concatenate([half[..., :1], half, half[..., -1:]], axis=-1)
 
 
-def _tops(values: np.ndarray, each: int) -> np.ndarray:
+def tops(values: np.ndarray, each: int) -> np.ndarray:
     """Return the largest value (..., p) of each period of values (..., p each + 2)."""
     inner = values[..., 1:-1].reshape(*values.shape[:-1], -1, each)
     middle = 1 + inner.argmax(axis=-1) + each * np.arange(inner.shape[-2])

@@ -17,6 +17,7 @@ from vanedamp.coupling.system.cavities import check_directions, surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude, force_shapes
 from vanedamp.coupling.system.restitution import law_address
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.system.surfaces import Surface, heights, surfaces_of, walls_and_floor
 from vanedamp.coupling.system.system import FLOOR, System, surface_code
 from vanedamp.coupling.system.units import (
@@ -50,6 +51,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
 
     Raises InputError for an unknown label, an unusable model, or bodies that do not fit together.
     """
+    scene = unrolled(scene)
     basis = basis or basis_of(scene)
     n, omega, shares = len(basis.stiffness), 2 * np.pi * scene.frequency, scene.excitation.shares
     check_directions(scene, basis)

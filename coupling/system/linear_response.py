@@ -69,6 +69,17 @@ class LinearResponse:
         amplitude[finite] = np.abs(waves[0, finite]) if len(waves) == 1 else peaks(waves[:, finite], self.order)
         return amplitude
 
+    def amplitudes(self, frequency: float, rows: np.ndarray) -> np.ndarray:
+        """Return amplitudes (s,) of functionals (s, n) in place of the response, at a frequency, Hz.
+
+        Infinite at a frequency that is, to the last bit, a resonance without damping.
+        """
+        try:
+            waves = self.motion(frequency) @ rows.T
+        except np.linalg.LinAlgError:
+            return np.full(len(rows), np.inf)
+        return np.abs(waves[0]) if len(waves) == 1 else peaks(waves, self.order)
+
     def motion(self, frequency: float) -> np.ndarray:
         """Return the complex modal coordinates (e, n) of the harmonics at a frequency, Hz.
 

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.scene.structures import Rom, Structure
+from vanedamp.coupling.scene.mistuning import Mistuning
+from vanedamp.coupling.scene.structures import Ring, Rom, Structure
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
 
 
@@ -27,6 +29,21 @@ class Restricted(NamedTuple):
     model: ReducedModel
     in_file: np.ndarray | None = None
     inertia: np.ndarray | None = None
+
+
+class RingFacts(NamedTuple):
+    """What a scene needs to know of a reduced ring: number of sectors, and the labels of one."""
+
+    sectors: int
+    labels: tuple[str, ...]
+
+
+def ring_in_file(structure: Structure) -> RingFacts | None:
+    """Return the facts of a structure that is a ring; None for any other."""
+    if not isinstance(structure, Ring):
+        return None
+    ring = _ring(structure.file, file_stamp(structure.file))
+    return RingFacts(ring.sectors, ring.interface)
 
 
 def reduced_model(structure: Rom, speed: float) -> ReducedModel:
@@ -46,24 +63,24 @@ def restricted(structure: Rom, speed: float) -> Restricted:
 
 def greatest_speed(structure: Rom) -> float:
     """Return the speed of rotation, rad/s, up to which the model of a file holds; 0 for one that does not rotate."""
-    return _loaded(structure.file, file_stamp(structure.file)).greatest_speed
+    return _whole(structure).greatest_speed
 
 
 def hot_spots_in_file(structure: Structure) -> dict[str, dict[str, Any]]:
     """Return what is known of the hot spots of a structure by name (rom.recovery.hot_spots); empty without any."""
     if not isinstance(structure, Rom):
         return {}
-    return hot_spots(_loaded(structure.file, file_stamp(structure.file)))
+    return hot_spots(_whole(structure))
 
 
 def coordinates_in_file(structure: Rom) -> int:
     """Return the number of coordinates of the model of a file."""
-    return _loaded(structure.file, file_stamp(structure.file)).size
+    return _whole(structure).size
 
 
 @lru_cache(maxsize=8)
-def _restricted(structure: Rom, speed: float, stamp: int) -> Restricted:
-    whole = _loaded(structure.file, stamp)
+def _restricted(structure: Rom, speed: float, _stamp: int) -> Restricted:
+    whole = _whole(structure)
     try:
         model = whole.at_speed(speed)
     except ReducedModelError as error:
@@ -97,6 +114,28 @@ def _cut(model: ReducedModel, structure: Rom) -> ReducedModel:
     return massless(model, modes) if structure.natural else truncated(model, modes)
 
 
+def _whole(structure: Rom) -> ReducedModel:
+    """Return the model of a file, of a ring with its mistuning."""
+    stamp = file_stamp(structure.file)
+    if not isinstance(structure, Ring):
+        return _loaded(structure.file, stamp)
+    mistuning = structure.mistuning
+    stamps = tuple(file_stamp(file) for file in mistuning.files) if mistuning is not None else ()
+    return _mistuned(structure.file, stamp, mistuning, stamps)
+
+
 @lru_cache(maxsize=8)
 def _loaded(file: str, _stamp: int) -> ReducedModel:
     return ReducedModel.load(file)
+
+
+@lru_cache(maxsize=8)
+def _ring(file: str, _stamp: int) -> RingModel:
+    return RingModel.load(file)
+
+
+@lru_cache(maxsize=8)
+def _mistuned(file: str, stamp: int, mistuning: Mistuning | None, _stamps: tuple[int, ...]) -> ReducedModel:
+    """Return the model of a ring. _stamps: of the files of its deviations."""
+    ring = _ring(file, stamp)
+    return ring.model(None if mistuning is None else mistuning.deviations(ring.sectors))

@@ -10,20 +10,24 @@ import numpy as np
 
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Prescribed, Rom, Structure
+from vanedamp.coupling.scene.structures import Prescribed, Ring, Rom, Structure
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, structure_basis
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 
 #: fraction of the largest product of response and loads below which loads do not excite a mode
 _UNMOVED = 1e-9
+#: entries of the matrices that are solved together
+_TOGETHER = 1 << 22
 
 
 def excitation_force(scene: Scene) -> float:
     """Return the amplitude of the exciting force, N, or the factor of several loads (resonance_amplitude resolved)."""
     if isinstance(scene.structure, Prescribed):
         return 0.0
+    scene = unrolled(scene)
     basis = basis_of(scene)
     return force_amplitude(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
@@ -42,10 +46,11 @@ class Resonance(NamedTuple):
 def chosen_resonance(scene: Scene) -> Resonance:
     """Return the resonance that `resonance_amplitude` means: of the mode that responds most within `resonance_near`.
 
-    With an engine order and a range it has the highest response along the order, at the speed where it is met.
+    With an engine order and a range it has the highest response along the order, at the speed where it is met. Of a
+    ring it is that of the tuned one.
     Raises InputError for a structure without damping.
     """
-    scene = _at_resonance(scene)
+    scene = _at_resonance(unrolled(scene))
     basis = basis_of(scene)
     return _chosen(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
@@ -75,9 +80,16 @@ def steady_motion(
 
     Raises LinAlgError at a resonance without damping.
     """
+    loads = np.broadcast_to(force, (len(omega), force.shape[-1]))[:, :, None]
+    parts = np.array_split(np.arange(len(omega)), 1 + len(omega) * len(stiffness) ** 2 // _TOGETHER)
+    return np.concatenate([_solved(stiffness, damping, mass, loads[part], omega[part]) for part in parts])
+
+
+def _solved(
+    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, loads: np.ndarray, omega: np.ndarray
+) -> np.ndarray:
     omega = omega[:, None, None]
     dynamic = np.diag(stiffness) + 1j * omega * damping - omega**2 * mass
-    loads = np.broadcast_to(force[..., None], (len(omega), force.shape[-1], 1))
     return np.asarray(np.linalg.solve(dynamic, loads)[:, :, 0])
 
 
@@ -93,7 +105,12 @@ def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> fl
 
 
 def _at_resonance(scene: Scene) -> Scene:
-    """Return a scene at the speed at which its engine order is in resonance, where that is sought over a range."""
+    """Return a scene at the speed at which its engine order is in resonance, where that is sought over a range.
+
+    A ring is then the tuned one: the level is one for all mistuned rings.
+    """
+    if isinstance(scene.structure, Ring) and scene.structure.mistuning is not None:
+        scene = replace(scene, structure=replace(scene.structure, mistuning=None))
     excitation, at = scene.excitation, forced_label(scene)
     order, (low, high) = excitation.engine_order, scene.resonance_range
     if order is None or low == high:

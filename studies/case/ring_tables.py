@@ -52,6 +52,8 @@ class RingTable:
     """largest distance of two nodes that are one, over the size of the sector [-]"""
     spring: tuple[RingSpringTable, ...] = ()
     """springs between neighbours"""
+    deviating: tuple[str, ...] = ()
+    """volume groups that the deviations of mistuning change, such as ["blade"] (default: the whole sector)"""
 
     def __post_init__(self) -> None:
         if (self.low is None) != (self.high is None):

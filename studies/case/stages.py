@@ -81,6 +81,16 @@ class Structure:
     matrices: SystemMatrices
     rotating: RotatingMatrices | None = None
 
+    def mesh(self) -> tuple[dict[str, Variable], int]:
+        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
+        cells, types, points = self.solid.vtk_mesh()
+        corners = cells.reshape(len(types), -1)[:, 1:]
+        variables = {
+            "coordinates": Variable(points, ("node", "axis"), "m"),
+            "cell": Variable(corners, ("cells", "corner")),
+        }
+        return variables, int(types[0])
+
 
 @stage("mesh and matrices")
 def assemble(case: Case) -> Structure:
@@ -271,19 +281,9 @@ class ModalAnalysis:
             data["fatigue"] = self.fatigue.to_json()
         return data
 
-    def mesh(self) -> tuple[dict[str, Variable], int]:
-        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
-        cells, types, points = self.structure.solid.vtk_mesh()
-        corners = cells.reshape(len(types), -1)[:, 1:]
-        variables = {
-            "coordinates": Variable(points, ("node", "axis"), "m"),
-            "cell": Variable(corners, ("cells", "corner")),
-        }
-        return variables, int(types[0])
-
     def save(self, path: str | Path) -> None:
         """Write the modes with their masses, the mesh (for pictures) and the rigid model."""
-        mesh, cell_type = self.mesh()
+        mesh, cell_type = self.structure.mesh()
         variables = {
             "axis": Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
             "effective_mass": Variable(self.effective_mass, ("mode", "axis"), "kg"),

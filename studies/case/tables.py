@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from vanedamp.coupling.scene.mistuning import DEVIATIONS, Mistuning
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.key_tables import documented
 from vanedamp.files.toml_input import (
@@ -135,6 +136,7 @@ FILES = (
     ("calibration", "damping", "frf"),
     ("calibration", "tune", "shapes"),
     ("temperature", "file"),
+    *(("mistuning", name, "file") for name in DEVIATIONS),
 )
 
 #: the records of the generators' parameters
@@ -444,6 +446,8 @@ class Case:
     """temperature of the structure"""
     ring: RingTable | None = None
     """the ring of equal sectors of which the structure is one"""
+    mistuning: Mistuning | None = None
+    """deviations of the sectors of the ring"""
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}
@@ -458,6 +462,8 @@ class Case:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
         if self.ring is not None and self.rotation is not None and (self.ring.axis or self.ring.point):
             raise ValueError("ring.axis: a ring that rotates has the axis of [rotation]; leave out axis and point")
+        if self.mistuning is not None and self.ring is None:
+            raise ValueError("mistuning: deviations are those of sectors; give [ring] with sectors, low and high")
         stressed = self.temperature is not None or (self.rotation is not None and self.rotation.omega)
         if stressed and self.calibration is not None and self.calibration.tune is not None:
             raise ValueError(
@@ -560,6 +566,8 @@ class Case:
                 _check_group(f"interface.{label}.{key}", group, surfaces)
         for key, group in (self.ring.groups if self.ring is not None else {}).items():
             _check_group(f"ring.{key}", group, surfaces)
+        for group in self.ring.deviating if self.ring is not None else ():
+            _check_group("ring.deviating", group, {"volume": [*volumes]})
         for group in self.material:
             if group != "default":
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})

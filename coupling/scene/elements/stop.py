@@ -9,6 +9,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.elements.element import Parts, SceneElement, Unit
+from vanedamp.coupling.scene.repetition import Sectors
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import STRICT, Fraction, InputError, NonNegative
 
@@ -27,7 +28,10 @@ class Stop(SceneElement):
     at: str | None = None
     """interface label of a reduced model that touches the stop (default: excitation.at)"""
     to: str | None = None
-    """interface label of a reduced model that the stop is at and moves with (default: the ground)"""
+    """interface label of a reduced model that the stop is at and moves with (default: the ground); of a ring,
+    "shroud@+1" is in the next sector"""
+    sectors: Sectors | None = None
+    """sectors of a ring that have one (default: as written)"""
 
     def __post_init__(self) -> None:
         if self.to is not None and self.to == self.at:

@@ -1,0 +1,181 @@
+"""Scenes of a ring with everything written out by sector: cavities, bodies and dampers repeated, a wave as its forces.
+
+A scene stays compact, so that a path such as "cavity.c.gap" names one number. It is unrolled where its open choices are
+made and where its system is assembled. Cavity "c" becomes "c@0", "c@1", ..., its labels and bodies with it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.excitation import Excitation, Harmonic
+from vanedamp.coupling.scene.load_pattern import Load
+from vanedamp.coupling.scene.repetition import Sectors
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.wear import WearPair
+from vanedamp.coupling.system.reduced_model_file import RingFacts, ring_in_file
+from vanedamp.files.toml_input import InputError, nearest
+
+#: keys of a cavity that name labels
+_SURFACES = ("left", "right", "floor", "ceiling")
+
+
+def unrolled(scene: Scene) -> Scene:
+    """Return a scene of a ring with its tables repeated over their sectors; any other scene as it is.
+
+    Ranges are left out: their numbers are the scene's. Raises InputError for a sector that the ring does not have, a
+    label that no sector has, and a gap that its scatter leaves none of.
+    """
+    ring = ring_in_file(scene.structure)
+    if ring is None or not scene.repeats:
+        return scene
+    shown = str(scene.excitation.at).partition("@")[0]
+    cavities, bodies = _cavities(scene, ring)
+    dampers = _repeated(scene.friction_damper, "friction_damper", ("at",), shown, ring)
+    stops = _repeated(scene.stop, "stop", ("at", "to"), shown, ring)
+    copies = {
+        "casing": _places([number for number, _ in dampers]), "stop": _places([number for number, _ in stops]),
+        "": _places([number for number, _ in bodies]),
+    }  # fmt: skip
+    wear = scene.wear and replace(scene.wear, pair=tuple(_pairs(scene.wear.pair, copies)))
+    return replace(
+        scene, excitation=_excitation(scene.excitation, ring), cavity=cavities,
+        damper=tuple(body for _, body in bodies), friction_damper=tuple(damper for _, damper in dampers),
+        stop=tuple(stop for _, stop in stops), wear=wear, ranges={},
+    )  # fmt: skip
+
+
+def sectors_of(given: Sectors, count: int, key: str) -> list[int]:
+    """Return the numbers of the sectors that a table names of a ring with `count`. Raises InputError for others."""
+    if isinstance(given, str):
+        return list(range(0, count, 2 if given == "alternate" else 1))
+    found = [given] if isinstance(given, int) else list(given)
+    for place, sector in enumerate(found):
+        if sector >= count:
+            raise InputError(f"{key}: the ring has no sector {sector}; its {count} sectors are 0 to {count - 1}")
+        if sector in found[:place]:
+            raise InputError(f"{key}: sector {sector} is given twice")
+    return found
+
+
+def _label(label: str, sector: int, ring: RingFacts, key: str) -> str:
+    """Return a label in a sector: one that names its sector as it is, "shroud@+1" in the next one."""
+    name, mark, where = label.partition("@")
+    if name not in ring.labels:
+        raise InputError(f"{key}: no sector of the ring has a label '{name}'; {nearest(name, list(ring.labels))}")
+    if mark and where[:1] not in ("+", "-"):
+        return label
+    step = int(where) if where[1:].isdecimal() else 0
+    return f"{name}@{(sector + step) % ring.sectors}"
+
+
+def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[tuple[int, Damper]]]:
+    """Return the cavities, and the bodies from cavity to cavity, each with its number in the scene."""
+    cavities: list[Cavity] = []
+    bodies: list[tuple[int, Damper]] = []
+    for index, cavity in enumerate(scene.cavity):
+        row = [(number, scene.damper[number]) for number in scene.bodies_in(cavity)]
+        if cavity.sectors is None:
+            cavities.append(cavity)
+            bodies += row
+            continue
+        draws = _Draws(cavity, index, len(row), ring.sectors)
+        for sector in sectors_of(cavity.sectors, ring.sectors, f"cavity[{index}].sectors"):
+            own: dict[str, Any] = {
+                side: _label(label, sector, ring, f"cavity[{index}].{side}")
+                for side in _SURFACES
+                if (label := getattr(cavity, side)) is not None
+            }
+            name, gap = f"{cavity.name}@{sector}", draws.gap(sector)
+            cavities.append(replace(cavity, name=name, gap=gap, sectors=None, scatter=None, **own))
+            places = draws.positions([body.position for _, body in row], sector)
+            bodies += [
+                (number, replace(body, cavity=name, position=place))
+                for (number, body), place in zip(row, places, strict=True)
+            ]
+    return tuple(cavities), bodies
+
+
+class _Draws:
+    """What the scatter of a cavity draws in all sectors: a gap for each, and a position for each of its bodies."""
+
+    def __init__(self, cavity: Cavity, index: int, bodies: int, sectors: int) -> None:
+        self.cavity, self.scatter = cavity, cavity.scatter
+        random = np.random.default_rng((cavity.scatter.seed if cavity.scatter else 0, index))
+        self._gap = random.standard_normal(sectors)
+        self._position = random.uniform(-1.0, 1.0, (sectors, bodies))
+
+    def gap(self, sector: int) -> float:
+        """Return the gap in a sector, m."""
+        factor = 1.0 + (self.scatter.gap if self.scatter else 0.0) * float(self._gap[sector])
+        if factor <= 0.0:
+            raise InputError(f"cavity.{self.cavity.name}.scatter.gap: leaves no gap in sector {sector}; lower it")
+        return self.cavity.gap * factor
+
+    def positions(self, written: Sequence[float], sector: int) -> list[float]:
+        """Return the positions at time zero in a sector, m: in order, and within the free travel."""
+        if self.scatter is None:
+            return list(written)
+        half = 0.5 * self.gap(sector)
+        places = np.array(written) * (2.0 * half / self.cavity.gap)
+        places = places + self.scatter.position * half * self._position[sector]
+        found: list[float] = np.sort(np.clip(places, -half, half)).tolist()
+        return found
+
+
+def _repeated(
+    entries: Sequence[Any], table: str, keys: Sequence[str], shown: str, ring: RingFacts
+) -> list[tuple[int, Any]]:
+    """Return the entries of a table of the structure, over their sectors, each with its number in the scene."""
+    found = []
+    for number, entry in enumerate(entries):
+        if entry.sectors is None:
+            found.append((number, entry))
+            continue
+        for sector in sectors_of(entry.sectors, ring.sectors, f"{table}[{number}].sectors"):
+            own = {
+                key: _label(label, sector, ring, f"{table}[{number}].{key}")
+                for key in keys
+                if (label := getattr(entry, key) or (shown if key == "at" else None)) is not None
+            }
+            found.append((number, replace(entry, sectors=None, **own)))
+    return found
+
+
+def _excitation(excitation: Excitation, ring: RingFacts) -> Excitation:
+    """Return the excitation with its response in one sector, and a wave as forces in all sectors."""
+    at, wave = _label(str(excitation.at), 0, ring, "excitation.at"), excitation.travelling
+    if wave is None:
+        return replace(excitation, at=at)
+    sines = {1: Harmonic(1, 1.0)} | {sine.order: sine for sine in excitation.harmonic}
+    name, count = at.partition("@")[0], ring.sectors
+    loads = tuple(
+        # whole turns are left out, so that equal phases are equal to the last bit
+        Load(
+            f"{name}@{sector}", sine.amplitude, sine.phase - 360.0 * (sine.order * wave * sector % count) / count, order
+        )
+        for (order, sine), sector in itertools.product(sorted(sines.items()), range(count))
+    )
+    return replace(excitation, at=at, wave=None, force=None, harmonic=(), load=loads, load_factor=excitation.force)
+
+
+def _places(numbers: Sequence[int]) -> dict[int, list[int]]:
+    """Return where each entry of a scene stands once it is repeated, by its number."""
+    found: dict[int, list[int]] = {}
+    for place, number in enumerate(numbers):
+        found.setdefault(number, []).append(place)
+    return found
+
+
+def _pairs(pairs: Sequence[WearPair], copies: Mapping[str, Mapping[int, list[int]]]) -> Iterator[WearPair]:
+    """Yield the contacts with rates of their own, by the numbers of what is repeated."""
+    for pair in pairs:
+        own = copies.get(pair.side or "", copies[""])
+        numbers = [None] if pair.damper is None else own.get(pair.damper, [pair.damper])
+        yield from (replace(pair, damper=number) for number in numbers)

@@ -1,0 +1,278 @@
+"""RingModel: a ring of equal sectors by one sector's data in the ring's waves; deviations make its ReducedModel."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files import store
+from vanedamp.files.display import Displayed
+from vanedamp.rom.checks import shaped, symmetric, unit
+from vanedamp.rom.dense_modes import modal_damping
+from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
+from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.waves import Waves, turns
+from vanedamp.rom.truncation import massless
+
+_KIND = "ring-model"
+_ARRAYS = {
+    "axis": (("direction",), "1"),
+    "point": (("direction",), "m"),
+    "diameters": (("coordinate",), "1"),
+    "squares": (("coordinate",), "rad^2/s^2"),
+    "selection": (("interface", "coordinate"), "1"),
+    "directions": (("interface", "direction"), "1"),
+    "normals": (("interface", "direction"), "1"),
+    "positions": (("interface", "direction"), "m"),
+    "arms": (("interface",), "m"),
+    "base_load": (("coordinate", "direction"), "kg"),
+    "part_load": (("coordinate", "direction"), "kg"),
+    "stiffness": (("coordinate", "column"), "N/m"),
+    "mass": (("coordinate", "column"), "kg"),
+    "centrifugal_stiffness": (("coordinate", "column"), "kg"),
+}
+_SYMMETRIC = ("stiffness", "mass", "centrifugal_stiffness")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RingModel(Displayed):
+    """A reduced ring of N equal sectors: n real waves of modal mass 1, and one sector's fields in them.
+
+    The first `modes` waves are natural modes of the tuned ring at standstill; the others add the static response to
+    the interface's forces and to the forces of deviations. rom.ring.waves.Waves says how sectors see the waves.
+
+    sectors, axis, point   N; (3,) unit vector and (3,) m: the axis; sector j is sector 0 turned by 2 pi j / N
+    diameters              (n,) nodal diameters; pairs of waves are adjacent
+    squares                (n,) squared angular frequencies of the tuned ring at standstill
+    modes                  number of natural modes, whole pairs
+    interface              k labels in a sector
+    selection              (k, n) their displacements in sector 0; directions, normals, positions, arms: as in
+                           ReducedModel, of sector 0
+    base_load              (n, 3) kg, of sector 0, by an acceleration of the base along x, y, z of its frame
+    part_load              (n, 3) kg, what the part that deviates has of it
+    stiffness, mass        (n, n) of the part of a sector that deviates, in sector 0's fields
+    damping_ratio          of every mode
+    centrifugal_stiffness  (n, n) kg, of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate
+    greatest_speed         rad/s, up to which the waves hold
+    provenance             where the numbers come from (JSON-able); "estimate": of the error
+
+    Raises RingError or rom.checks.ReducedModelError.
+    """
+
+    sectors: int
+    axis: np.ndarray
+    point: np.ndarray
+    diameters: np.ndarray
+    squares: np.ndarray
+    modes: int
+    interface: tuple[str, ...]
+    selection: np.ndarray
+    directions: np.ndarray
+    normals: np.ndarray
+    positions: np.ndarray
+    arms: np.ndarray
+    base_load: np.ndarray
+    part_load: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    damping_ratio: float
+    centrifugal_stiffness: np.ndarray | None = None
+    greatest_speed: float = 0.0
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths = {
+            "coordinate": len(self.squares), "column": len(self.squares), "interface": len(self.interface),
+            "direction": 3,
+        }  # fmt: skip
+        for name, (dims, _) in _ARRAYS.items():
+            if (given := getattr(self, name)) is not None:
+                shape = tuple(lengths[dimension] for dimension in dims)
+                found = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
+                object.__setattr__(self, name, found)
+        object.__setattr__(self, "diameters", store.frozen(self.diameters, np.int64))
+        object.__setattr__(self, "directions", unit(self.directions))
+        object.__setattr__(self, "interface", tuple(str(label) for label in self.interface))
+        object.__setattr__(self, "provenance", dict(self.provenance))
+        _check_waves(self)
+
+    @property
+    def waves(self) -> Waves:
+        """The waves of the coordinates."""
+        return Waves(self.sectors, self.diameters)
+
+    @property
+    def frequencies_hz(self) -> np.ndarray:
+        """(modes,) natural frequencies of the tuned ring at standstill."""
+        return np.sqrt(np.maximum(self.squares[: self.modes], 0.0)) / (2.0 * np.pi)
+
+    def model(self, deviations: Deviations | None = None, speed: float | None = None) -> ReducedModel:
+        """Return the reduced model of the whole ring with deviations of its sectors.
+
+        Interface labels are "<label>@<sector>", of transverse motions and rotations "<label>@<sector>.normal" and
+        ".rotation"; directions and positions are turned into place. A ring that does not rotate is given by its own
+        lowest natural modes, as many as `modes`, and residual flexibility. One that rotates is given by all waves, so
+        that ReducedModel.at_speed holds; with a speed, rad/s, by natural modes and residual flexibility there. The
+        damping ratio holds for every mode; deviations of damping add the part's share to it. Raises RingError or
+        ReducedModelError.
+        """
+        whole = self.whole(deviations)
+        if speed is None and self.centrifugal_stiffness is not None:
+            return whole
+        at_speed = whole.at_speed(speed or 0.0)
+        tuned = deviations is None or not deviations.any()
+        return self._of_waves(at_speed) if tuned and not speed else massless(at_speed, self.modes)
+
+    def whole(self, deviations: Deviations | None = None) -> ReducedModel:
+        """Return the reduced model in all n waves, without residual flexibility. Errors: as `model`."""
+        deviations = deviations or Deviations()
+        mass, stiffness = self.matrices(deviations)
+        damping = modal_damping(mass, stiffness, self.damping_ratio)
+        added = self.added_damping(deviations)
+        lighter = deviations.of("mass", self.sectors)
+        return ReducedModel(
+            mass=mass, stiffness=stiffness, damping=damping if added is None else damping + added, **self._placed,
+            base_load=self._load(1.0, self.base_load) + self._load(lighter, self.part_load),
+            damping_ratio=self.damping_ratio if added is None else None, provenance=self._provenance, **self._rotation,
+        )  # fmt: skip
+
+    def matrices(self, deviations: Deviations, speed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return mass and stiffness (n, n) of the whole ring with deviations, at a speed, rad/s."""
+        mass = np.eye(len(self.squares)) + self.around("mass", deviations.of("mass", self.sectors))
+        stiffness = np.diag(self.squares) + self.around("stiffness", deviations.of("stiffness", self.sectors))
+        if speed and self.centrifugal_stiffness is not None:
+            stiffness = stiffness + speed**2 * self.centrifugal_stiffness
+        return mass, stiffness
+
+    def added_damping(self, deviations: Deviations) -> np.ndarray | None:
+        """Return the damping (n, n) that deviations add to that of the ratio; None without such deviations.
+
+        Of a part as stiff as the sector, the sum over sectors of what they add to is the modal damping of the waves.
+        """
+        damping = deviations.of("damping", self.sectors)
+        if not damping.any():
+            return None
+        strained = np.where(self.squares > 0.0, self.squares, np.inf)
+        share = np.sqrt(2.0 * self.damping_ratio) * strained**-0.25
+        return share[:, None] * self.around("stiffness", damping) * share
+
+    def around(self, name: str, weights: np.ndarray) -> np.ndarray:
+        """Return the sum (n, n) over sectors, by weights (N,), of "stiffness" or "mass"."""
+        if not np.any(weights):
+            return np.zeros_like(self.stiffness)
+        return self.waves.summed(self._travelling[name], weights)
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(N, k, n) interface displacements of every sector."""
+        return self.waves.in_sectors(self.selection)
+
+    @cached_property
+    def _travelling(self) -> dict[str, np.ndarray]:
+        return {name: self.waves.travelling(getattr(self, name)) for name in ("stiffness", "mass")}
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The N k labels, sector by sector."""
+        return tuple(sector_label(label, sector) for sector in range(self.sectors) for label in self.interface)
+
+    @cached_property
+    def _placed(self) -> dict[str, Any]:
+        """Interface and base load of the whole ring, as fields of a ReducedModel."""
+        rotations = turns(self.axis, self.sectors)
+
+        def turned(vectors: np.ndarray) -> np.ndarray:
+            return np.einsum("sij,kj->ski", rotations, vectors).reshape(-1, 3)
+
+        return {
+            "interface": self.labels,
+            "selection": self.rows.reshape(-1, len(self.squares)),
+            "directions": turned(self.directions),
+            "normals": turned(self.normals),
+            "positions": self.point + turned(self.positions - self.point),
+            "arms": np.tile(self.arms, self.sectors),
+        }
+
+    def _load(self, weights: np.ndarray | float, load: np.ndarray) -> np.ndarray:
+        """Return the load (n, 3) of the whole ring by an acceleration of the base, from a sector's by weights."""
+        weighted = np.broadcast_to(weights, self.sectors)[:, None, None] * self.waves.in_sectors(load.T)
+        return np.asarray(np.einsum("sai,sba->ib", weighted, turns(self.axis, self.sectors)))
+
+    @property
+    def _rotation(self) -> dict[str, Any]:
+        if self.centrifugal_stiffness is None:
+            return {}
+        return {
+            "centrifugal_stiffness": self.centrifugal_stiffness, "rotation_axis": self.axis,
+            "rotation_point": self.point, "greatest_speed": self.greatest_speed,
+        }  # fmt: skip
+
+    @property
+    def _provenance(self) -> dict[str, Any]:
+        ring = {
+            "sectors": self.sectors, "axis": self.axis.tolist(), "point": self.point.tolist(),
+            "labels": list(self.interface),
+        }  # fmt: skip
+        return dict(self.provenance) | {"ring": ring}
+
+    def _of_waves(self, whole: ReducedModel) -> ReducedModel:
+        """Return the tuned ring in its natural modes as they stand, pair by pair, with residual flexibility."""
+        kept, rest = np.arange(self.modes), slice(self.modes, None)
+        felt = whole.selection[:, rest]
+        return whole.projected(
+            np.eye(whole.size)[:, kept], free_modes=self.modes, centrifugal_stiffness=None, greatest_speed=0.0,
+            residual_flexibility=(felt / self.squares[rest]) @ felt.T,
+        )  # fmt: skip
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an HDF5 record that xarray opens."""
+        arrays = {name: (getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
+        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
+        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
+        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
+        attributes = {name: getattr(self, name) for name in ("sectors", "modes", "damping_ratio", "greatest_speed")}
+        store.save(path, _KIND, variables, attributes | {"provenance": dict(self.provenance)})
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> RingModel:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, _KIND)
+        arrays: dict[str, Any] = {name: values.get(name) for name in _ARRAYS}
+        return cls(
+            **arrays,
+            interface=tuple(values["interface"]),
+            sectors=int(attributes["sectors"]),
+            modes=int(attributes["modes"]),
+            damping_ratio=float(attributes["damping_ratio"]),
+            greatest_speed=float(attributes["greatest_speed"]),
+            provenance=json.loads(attributes["provenance"]),
+        )
+
+
+def sector_label(label: str, sector: int) -> str:
+    """Return the label of a sector's interface coordinate in the whole ring, such as "c1@3" or "c1@3.normal"."""
+    for suffix in (NORMAL, ROTATION):
+        if label.endswith(suffix):
+            return f"{label.removesuffix(suffix)}@{sector}{suffix}"
+    return f"{label}@{sector}"
+
+
+def _check_waves(ring: RingModel) -> None:
+    """Raise RingError unless the waves of a ring are whole pairs."""
+    if not ring.interface:
+        raise RingError("interface: empty; a reduced ring needs a coordinate that loads can act on")
+    if ring.sectors < 1 or np.any(2 * ring.diameters > ring.sectors) or np.any(ring.diameters < 0):
+        raise RingError(f"diameters: expected 0 to {ring.sectors // 2}, half of the {ring.sectors} sectors")
+    paired = np.flatnonzero((ring.diameters > 0) & (2 * ring.diameters < ring.sectors))
+    first, second = paired[::2], paired[1::2]
+    if len(paired) % 2 or np.any(second != first + 1) or np.any(ring.diameters[first] != ring.diameters[second]):
+        raise RingError("diameters: waves between 0 and N/2 diameters must stand in adjacent pairs")
+    if not 0 < ring.modes <= len(ring.squares) or ring.modes - 1 in first:
+        raise RingError(f"modes: expected 1 to {len(ring.squares)} waves, whole pairs, not {ring.modes}")
