@@ -314,6 +314,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "optimisation": ("an optimisation", "optimise", _optimisation),
     "life": ("the life of a damper", "life", _life),
     "identification": ("numbers of a scene from measurements", "identify", _identification),
+    "deviations": ("deviations of a ring's sectors from measurements", "identify", _any),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),
     "system-matrices": ("matrices of finite elements", None, _any),
