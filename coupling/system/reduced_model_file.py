@@ -16,6 +16,7 @@ from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing, load_ring
 from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
 
 
@@ -130,8 +131,8 @@ def _loaded(file: str, _stamp: int) -> ReducedModel:
 
 
 @lru_cache(maxsize=8)
-def _ring(file: str, _stamp: int) -> RingModel:
-    return RingModel.load(file)
+def _ring(file: str, _stamp: int) -> RingModel | SectorRing:
+    return load_ring(file)
 
 
 @lru_cache(maxsize=8)

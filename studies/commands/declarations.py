@@ -147,7 +147,7 @@ COMMANDS = (
             ),
             argument(
                 "--basis", default="craig-bampton", metavar="BASIS",
-                help="craig-bampton (default), rubin, macneal, massless or truncated",
+                help="craig-bampton (default), rubin, macneal, massless, truncated; of a ring modes (default), sectors",
             ),
             argument(
                 "--tolerance", type=ratio, default=0.01, metavar="R",
