@@ -70,6 +70,16 @@ def _three(direction: Any) -> Any:
 Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
+def _each(value: Any) -> Any:
+    """Return one number for each of three axes, which a single one stands for."""
+    return [value] * 3 if isinstance(value, int | float) else value
+
+
+_Axes = tuple[NonNegative, NonNegative, NonNegative]
+#: numbers along x, y and z, or one for all three
+Axes = Annotated[_Axes, BeforeValidator(_each, json_schema_input_type=NonNegative | _Axes)]
+
+
 class InputError(VanedampError):
     """Bad input. The message is one line: file, key, error and remedy."""
 

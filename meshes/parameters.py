@@ -48,7 +48,8 @@ class VaneCluster:
     """Parameters of the cluster, SI units, angles in degrees. The defaults belong to the shipped `vane_cluster.msh`.
 
     Facet groups: `clamp` (outer surface of the outer shroud), `shroud` (inner surface of the inner shroud: its average
-    tangential displacement is the response), and for every cavity i from 1 `c<i>_left` and `c<i>_right` (walls normal
+    tangential displacement is the response), `shroud_low` and `shroud_high` (end faces of the inner shroud, at the
+    smaller and the larger angle from z to y), and for every cavity i from 1 `c<i>_left` and `c<i>_right` (walls normal
     to the tangential direction at its negative and positive end), `c<i>_floor` and `c<i>_roof` (walls at the smaller
     and the larger radius). Volume groups: `outer_shroud`, `airfoils`, `inner_shroud`, and `damper` for tied bodies.
 

@@ -144,6 +144,7 @@ def facets(parameters: VaneCluster) -> dict[str, list[int]]:
         "shroud": [tag for tag in surfaces if _on_cylinder(tag, parameters.inner_radius)],
     }
     centres = {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for tag in surfaces}
+    found |= _ends(parameters, centres)
     for number, angle in enumerate(parameters.cavity_angles(), start=1):
         for side, tags in _walls(parameters, angle, centres).items():
             # a tied body may cover a wall
@@ -169,6 +170,18 @@ def _walls(parameters: VaneCluster, angle: float, centres: dict[int, np.ndarray]
             if others.all() and abs(place[axis] - sign * half[axis]) < _TOLERANCE:
                 walls[side].append(tag)
     return walls
+
+
+def _ends(parameters: VaneCluster, centres: dict[int, np.ndarray]) -> dict[str, list[int]]:
+    """Return the end faces of the inner shroud, at the smaller and the larger angle, from the centres of surfaces."""
+    half = 0.5 * math.radians(parameters.sector_deg)
+    ends: dict[str, list[int]] = {"shroud_low": [], "shroud_high": []}
+    for tag, (_, y, z) in centres.items():
+        if math.hypot(y, z) < parameters.platform_radius:
+            for name, angle in (("shroud_low", -half), ("shroud_high", half)):
+                if abs(math.atan2(y, z) - angle) * parameters.inner_radius < _TOLERANCE:
+                    ends[name].append(tag)
+    return ends
 
 
 def _on_cylinder(surface: int, radius: float) -> bool:

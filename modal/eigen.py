@@ -20,7 +20,7 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError, factorize
 
 __all__ = [
-    "Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
+    "Factorization", "Modes", "NoModesError", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
     "stable_share", "static_shape",
 ]  # fmt: skip
 
@@ -34,6 +34,10 @@ _GAP = 1e-6
 _SLICE = 50
 # relative, of a fraction of a stiffness that is stable
 _SHARE_DIGITS = 1e-3
+
+
+class NoModesError(SolverError):
+    """A range of frequencies without a mode."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,7 +243,7 @@ def _within(
         count = pencil.below(upper) - (pencil.below(lower) if low_hz else 0)
     if count == 0:
         low = f"from {low_hz} " if low_hz else ""
-        raise SolverError(f"max_frequency: the structure has no mode {low}up to {high_hz} Hz; raise it")
+        raise NoModesError(f"max_frequency: the structure has no mode {low}up to {high_hz} Hz; raise it")
     if iteration is not None:
         return values, vectors
     if count <= _SLICE:

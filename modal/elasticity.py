@@ -14,9 +14,10 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
-from vanedamp.modal.eigen import SolverError, stable_share, static_shape
+from vanedamp.modal.eigen import SolverError
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix, nodal_product
+from vanedamp.modal.statics import Statics
 from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
@@ -156,11 +157,14 @@ class Solid:
         strain = ufl.sym(ufl.grad(displacement))
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
-    def assemble(self, clamped: Mapping[str, str], damping_ratio: float) -> SystemMatrices:
+    def assemble(
+        self, clamped: Mapping[str, str], damping_ratio: float, statics: Statics | None = None
+    ) -> SystemMatrices:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
         Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
-        part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them.
+        part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them,
+        from the static solution of `statics` (default: the body's own).
         Raises UnstableError for a temperature at which the structure has buckled.
         """
         patches = {name: self._patch(name) for name in self.domain.groups}
@@ -187,19 +191,21 @@ class Solid:
             | ({} if self.temperature is None else {"temperature": self.temperature.to_json()}),
             vertices=fenicsx.vertex_weights(self.space) if self.degree > 1 else None,
         )
-        return self._heated(unheated)
+        return self._heated(unheated, statics or Statics())
 
-    def rotating(self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float]) -> RotatingMatrices:
+    def rotating(
+        self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float], statics: Statics | None = None
+    ) -> RotatingMatrices:
         """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
 
-        The stress comes from the static solution under the centrifugal load, linear in the squared speed; supports turn
-        with the structure. Raises ElasticityError for a structure that is free to move, MatricesError for an axis of
-        length zero.
+        The stress comes from the static solution of `statics` (default: the body's own) under the centrifugal load,
+        linear in the squared speed; supports turn with the structure. Raises ElasticityError for a structure that is
+        free to move, MatricesError for an axis of length zero.
         """
-        direction, origin = unit_direction(axis), np.array(point, dtype=float)
+        direction, origin, statics = unit_direction(axis), np.array(point, dtype=float), statics or Statics()
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
-        stress = self.stress(self._static(matrices, load, _NO_CENTRIFUGAL_SOLUTION))
+        stress = self.stress(self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION))
         self._static_stresses["rotation"] = stress
         return RotatingMatrices(
             standing=matrices,
@@ -208,6 +214,7 @@ class Solid:
             load=load,
             axis=direction,
             point=origin,
+            statics=statics,
         )
 
     def stiffness_parts(self) -> dict[str, sparse.csr_array]:
@@ -221,6 +228,13 @@ class Solid:
             for name, cells in self.domain.volumes.items()
         }
         return parts | {f"support.{name}": self._support_stiffness(name) for name in self.elastic}
+
+    def part(self, groups: Sequence[str]) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Return stiffness and mass (N, N) of some volume groups. Thermal stress is not among them."""
+        measures = [fenicsx.over(self.domain, 3, self.domain.volumes[name]) for name in groups]
+        inertia = self._density * ufl.inner(self._trial, self._test)
+        stiffness = sum(self._material_stiffness(measure) for measure in measures)
+        return sparse.csr_array(stiffness), sparse.csr_array(sum(fenicsx.matrix(inertia * one) for one in measures))
 
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
         """Return von Mises stresses, Pa, of displacements (N,) at the corners of all cells, each from its own cell."""
@@ -280,7 +294,7 @@ class Solid:
         components = [fenicsx.evaluator(stress[pair], space, cells) for pair in pairs]
         return lambda: [np.array(component().x.array[places]) for component in components]
 
-    def _heated(self, matrices: SystemMatrices) -> SystemMatrices:
+    def _heated(self, matrices: SystemMatrices, statics: Statics) -> SystemMatrices:
         """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""
         if self.temperature is None or not any(material.expansion for material in self.materials.values()):
             return matrices
@@ -288,10 +302,10 @@ class Solid:
         strain = self._field(lambda material, values: material.expansion * (values - reference))
         pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
         load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
-        stress = self.stress(self._static(matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
+        stress = self.stress(self._static(statics, matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
         self._static_stresses["temperature"] = stress
         added = self._geometric_stiffness(stress)
-        share = stable_share(matrices, added)
+        share = statics.stable_share(matrices, added)
         if share < 1.0:
             raise UnstableError(
                 f"temperature: the structure buckles at {share:.3g} of its thermal stress; give it less, or supports "
@@ -299,10 +313,10 @@ class Solid:
             )
         return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
 
-    def _static(self, matrices: SystemMatrices, load: np.ndarray, without: str) -> Any:
+    def _static(self, statics: Statics, matrices: SystemMatrices, load: np.ndarray, without: str) -> Any:
         """Return the displacements under a static load as a function; without: the error where there are none."""
         try:
-            return fenicsx.field(self.space, static_shape(matrices, load))
+            return fenicsx.field(self.space, statics.shape(matrices, load))
         except SolverError:
             raise ElasticityError(without) from None
 

@@ -11,14 +11,14 @@ Lawrence et al. (1987), NASA TM 100187; Geradin and Rixen (2015), Mechanical Vib
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.eigen import stable_share
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.statics import Statics
 
 
 class UnstableError(VanedampError):
@@ -34,6 +34,7 @@ class RotatingMatrices:
     gyroscopic             (N, N) skew CSR, kg: G
     load                   (N,) kg m: centrifugal load per squared speed
     axis, point            (3,) unit vector, and (3,) m, a point of the axis
+    statics                by which its stability is checked
     """
 
     standing: SystemMatrices
@@ -42,6 +43,7 @@ class RotatingMatrices:
     load: np.ndarray
     axis: np.ndarray
     point: np.ndarray
+    statics: Statics = field(default_factory=Statics)
 
     def at(self, speed: float) -> SystemMatrices:
         """Return the matrices at a speed, rad/s, without the gyroscopic coupling.
@@ -50,7 +52,7 @@ class RotatingMatrices:
         structure there, but not together with its own damping, however little (Thomson and Tait).
         """
         added = speed**2 * self.centrifugal_stiffness
-        share = stable_share(self.standing, added)
+        share = self.statics.stable_share(self.standing, added)
         if share < 1.0:
             raise UnstableError(
                 f"speed: at {speed:.6g} rad/s the structure is unstable, since the spin softening outweighs its "

@@ -38,6 +38,10 @@ from vanedamp.files.errors import VanedampError as VanedampError
 from vanedamp.files.toml_input import InputError as InputError
 from vanedamp.modal.campbell import Campbell as Campbell
 from vanedamp.modal.campbell import campbell as campbell
+from vanedamp.modal.cyclic import CyclicSector as CyclicSector
+from vanedamp.modal.cyclic import cyclic_sector as cyclic_sector
+from vanedamp.modal.cyclic_modes import RingModes as RingModes
+from vanedamp.modal.cyclic_modes import ring_modes as ring_modes
 from vanedamp.modal.eigen import Modes as Modes
 from vanedamp.modal.eigen import solve_modes as solve_modes
 from vanedamp.modal.matrices import Patch as Patch
@@ -48,6 +52,13 @@ from vanedamp.rom.interface import Interface as Interface
 from vanedamp.rom.interface import InterfaceCoordinate as InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel as ReducedModel
 from vanedamp.rom.reduction import reduce as reduce
+from vanedamp.rom.ring.deviations import Deviations as Deviations
+from vanedamp.rom.ring.forced import forced_response as forced_response
+from vanedamp.rom.ring.reduction import reduce_ring as reduce_ring
+from vanedamp.rom.ring.ring_model import RingModel as RingModel
+from vanedamp.rom.ring.study import MistuningStudy as MistuningStudy
+from vanedamp.rom.ring.study import amplification as amplification
+from vanedamp.rom.ring.study import mistuning_study as mistuning_study
 from vanedamp.studies.case.stages import assemble as assemble
 from vanedamp.studies.case.tables import Case as Case
 from vanedamp.studies.export.export import export as export

@@ -44,6 +44,7 @@ PARTS = (
     Part("vanedamp.modal"),
     Part("vanedamp.rom"),
     Part("vanedamp.rom.bases"),
+    Part("vanedamp.rom.ring"),
     Part("vanedamp.coupling"),
     Part("vanedamp.coupling.contacts"),
     Part("vanedamp.coupling.scene"),

@@ -46,17 +46,18 @@ def datasets(file: Path) -> list[dict[str, Any]]:
 
 
 def mode_dataset(
-    number: int, frequency: float, ratio: float, nodes: np.ndarray, shape: np.ndarray, *, title: str = "mode",
+    number: int, frequency: float, ratio: float, nodes: np.ndarray, shape: np.ndarray, *, name: str = "",
     quantity: str = "displacement", mass: float = 0.0,
 ) -> dict[str, Any]:  # fmt: skip
     """Return dataset 55 of a mode, for `write_universal`: a normal one, or of a complex shape one with an eigenvalue.
 
-    number: from 1; frequency: Hz; ratio: of damping; nodes: labels (n,); shape: (n, 3); mass: modal, of a normal mode.
+    number: from 1; frequency: Hz; ratio: of damping; nodes: labels (n,); shape: (n, 3); mass: modal, of a normal mode;
+    name: in place of "mode" and its number.
     """
     data: dict[str, Any] = {
-        "type": 55, "id1": f"{title} {number}: {frequency:.6g} Hz", "id2": quantity, "id3": "NONE", "id4": "NONE",
-        "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3, "load_case": 1,
-        "mode_n": number, "node_nums": nodes, "r1": shape[:, 0], "r2": shape[:, 1], "r3": shape[:, 2],
+        "type": 55, "id1": f"{name or f'mode {number}'}: {frequency:.6g} Hz", "id2": quantity, "id3": "NONE",
+        "id4": "NONE", "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3,
+        "load_case": 1, "mode_n": number, "node_nums": nodes, "r1": shape[:, 0], "r2": shape[:, 1], "r3": shape[:, 2],
     }  # fmt: skip
     if np.iscomplexobj(shape):
         eigenvalue = 2 * np.pi * frequency * complex(-ratio, np.sqrt(1 - ratio**2))

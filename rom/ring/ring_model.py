@@ -58,7 +58,7 @@ class RingModel(Displayed):
     part_load              (n, 3) kg, what the part that deviates has of it
     stiffness, mass        (n, n) of the part of a sector that deviates, in sector 0's fields
     damping_ratio          of every mode
-    centrifugal_stiffness  (n, n) kg, of a sector: what a squared speed (rad/s) adds to its stiffness; None: no rotation
+    centrifugal_stiffness  (n, n) kg, of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate
     greatest_speed         rad/s, up to which the waves hold
     provenance             where the numbers come from (JSON-able); "estimate": of the error
 
@@ -132,26 +132,38 @@ class RingModel(Displayed):
     def whole(self, deviations: Deviations | None = None) -> ReducedModel:
         """Return the reduced model in all n waves, without residual flexibility. Errors: as `model`."""
         deviations = deviations or Deviations()
-        stiffness, mass, damping = (deviations.of(name, self.sectors) for name in ("stiffness", "mass", "damping"))
-        matrices = {
-            "mass": np.eye(len(self.squares)) + self.around("mass", mass),
-            "stiffness": np.diag(self.squares) + self.around("stiffness", stiffness),
-        }
-        ratio: float | None = self.damping_ratio
-        matrices["damping"] = modal_damping(matrices["mass"], matrices["stiffness"], self.damping_ratio)
-        if np.any(damping):
-            ratio = None
-            # of a part as stiff as the sector this is the modal damping, sector by sector
-            strained = np.where(self.squares > 0.0, self.squares, np.inf)
-            share = np.sqrt(2.0 * self.damping_ratio) * strained**-0.25
-            matrices["damping"] += share[:, None] * self.around("stiffness", damping) * share
+        mass, stiffness = self.matrices(deviations)
+        damping = modal_damping(mass, stiffness, self.damping_ratio)
+        added = self.added_damping(deviations)
+        lighter = deviations.of("mass", self.sectors)
         return ReducedModel(
-            **matrices, **self._placed, base_load=self._load(1.0, self.base_load) + self._load(mass, self.part_load),
-            damping_ratio=ratio, provenance=self._provenance, **self._rotation,
+            mass=mass, stiffness=stiffness, damping=damping if added is None else damping + added, **self._placed,
+            base_load=self._load(1.0, self.base_load) + self._load(lighter, self.part_load),
+            damping_ratio=self.damping_ratio if added is None else None, provenance=self._provenance, **self._rotation,
         )  # fmt: skip
 
+    def matrices(self, deviations: Deviations, speed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return mass and stiffness (n, n) of the whole ring with deviations, at a speed, rad/s."""
+        mass = np.eye(len(self.squares)) + self.around("mass", deviations.of("mass", self.sectors))
+        stiffness = np.diag(self.squares) + self.around("stiffness", deviations.of("stiffness", self.sectors))
+        if speed and self.centrifugal_stiffness is not None:
+            stiffness = stiffness + speed**2 * self.centrifugal_stiffness
+        return mass, stiffness
+
+    def added_damping(self, deviations: Deviations) -> np.ndarray | None:
+        """Return the damping (n, n) that deviations add to that of the ratio; None without such deviations.
+
+        Of a part as stiff as the sector, the sum over sectors of what they add to is the modal damping of the waves.
+        """
+        damping = deviations.of("damping", self.sectors)
+        if not damping.any():
+            return None
+        strained = np.where(self.squares > 0.0, self.squares, np.inf)
+        share = np.sqrt(2.0 * self.damping_ratio) * strained**-0.25
+        return share[:, None] * self.around("stiffness", damping) * share
+
     def around(self, name: str, weights: np.ndarray) -> np.ndarray:
-        """Return the sum (n, n) over sectors, by weights (N,), of "stiffness", "mass" or "centrifugal_stiffness"."""
+        """Return the sum (n, n) over sectors, by weights (N,), of "stiffness" or "mass"."""
         if not np.any(weights):
             return np.zeros_like(self.stiffness)
         return self.waves.summed(self._travelling[name], weights)
@@ -163,8 +175,7 @@ class RingModel(Displayed):
 
     @cached_property
     def _travelling(self) -> dict[str, np.ndarray]:
-        matrices = {name: getattr(self, name) for name in _SYMMETRIC}
-        return {name: self.waves.travelling(matrix) for name, matrix in matrices.items() if matrix is not None}
+        return {name: self.waves.travelling(getattr(self, name)) for name in ("stiffness", "mass")}
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -193,13 +204,13 @@ class RingModel(Displayed):
         weighted = np.broadcast_to(weights, self.sectors)[:, None, None] * self.waves.in_sectors(load.T)
         return np.asarray(np.einsum("sai,sba->ib", weighted, turns(self.axis, self.sectors)))
 
-    @cached_property
+    @property
     def _rotation(self) -> dict[str, Any]:
         if self.centrifugal_stiffness is None:
             return {}
         return {
-            "centrifugal_stiffness": self.around("centrifugal_stiffness", np.ones(self.sectors)),
-            "rotation_axis": self.axis, "rotation_point": self.point, "greatest_speed": self.greatest_speed,
+            "centrifugal_stiffness": self.centrifugal_stiffness, "rotation_axis": self.axis,
+            "rotation_point": self.point, "greatest_speed": self.greatest_speed,
         }  # fmt: skip
 
     @property

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 
 from vanedamp.files import store
-from vanedamp.modal.rotating import cross_matrix
+from vanedamp.modal.cyclic_faces import rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +55,18 @@ class Waves:
         values[len(place) :] *= np.sqrt(0.5)
         return sparse.csr_array((values, (rows, columns)), (len(place),) * 2)
 
+    def at_sector(self, rows: np.ndarray, sector: int) -> np.ndarray:
+        """Return functionals of the fields of a sector, (k, n), for those of another one: (k, n).
+
+        Of sector -j, rows of coordinates become those that sector j sees.
+        """
+        phases = np.exp(2j * np.pi / self.sectors * (sector * self.wavenumbers % self.sectors))
+        turned = self._travelling @ sparse.csr_array(sparse.diags(phases)) @ self._travelling.conj().T
+        return np.asarray(rows @ turned.real)
+
     def in_sectors(self, rows: np.ndarray) -> np.ndarray:
         """Return functionals of the fields of a sector, (k, n), for those of every sector: (N, k, n)."""
-        phases = 2j * np.pi / self.sectors * (np.outer(np.arange(self.sectors), self.wavenumbers) % self.sectors)
-        moved = (rows @ self._travelling)[None] * np.exp(phases)[:, None, :]
-        flat = moved.reshape(-1, len(self.diameters)) @ self._travelling.conj().T
-        return np.asarray(flat.real.reshape(moved.shape))
+        return np.stack([self.at_sector(rows, sector) for sector in range(self.sectors)])
 
     def travelling(self, matrix: np.ndarray) -> np.ndarray:
         """Return a matrix (n, n) of a sector's fields in travelling waves, which `summed` takes."""
@@ -76,5 +82,4 @@ class Waves:
 
 def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
     """Return the rotations (N, 3, 3) of the sectors' frames about an axis (3,)."""
-    cross = cross_matrix(axis)
-    return np.array([linalg.expm(2.0 * np.pi * sector / sectors * cross) for sector in range(sectors)])
+    return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])

@@ -20,6 +20,7 @@ from vanedamp.files.toml_input import InputError, tables
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
+from vanedamp.modal.cyclic_statics import RingStatics
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
@@ -30,6 +31,7 @@ from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
+from vanedamp.modal.statics import Statics
 from vanedamp.modal.stress import HotSpot, PeakStress, corner_groups, hot_spot, nodal_von_mises, peak_stresses
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
@@ -55,7 +57,7 @@ from vanedamp.studies.terminal import stage
 # a mode so near the first bending, relative, that moves its point with such a fraction of its compliance, is reported
 _NEAR, _NOTABLE = 0.02, 0.01
 #: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
-_MODES, _REACH = 10, 1.5
+MODES, _REACH = 10, 1.5
 _UNCOUNTED = (
     "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
     '(solver = "factor")'
@@ -78,6 +80,16 @@ class Structure:
     matrices: SystemMatrices
     rotating: RotatingMatrices | None = None
 
+    def mesh(self) -> tuple[dict[str, Variable], int]:
+        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
+        cells, types, points = self.solid.vtk_mesh()
+        corners = cells.reshape(len(types), -1)[:, 1:]
+        variables = {
+            "coordinates": Variable(points, ("node", "axis"), "m"),
+            "cell": Variable(corners, ("cells", "corner")),
+        }
+        return variables, int(types[0])
+
 
 @stage("mesh and matrices")
 def assemble(case: Case) -> Structure:
@@ -96,12 +108,14 @@ def assemble(case: Case) -> Structure:
         solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature))
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
-        matrices = solid.assemble(case.support.clamped, case.damping_ratio)
+        ring = case.ring
+        statics = Statics() if ring is None else RingStatics(lambda given: ring.sector(given, case.rotation))
+        matrices = solid.assemble(case.support.clamped, case.damping_ratio, statics)
     if label is not None:
         _functional(case, matrices, label)
     if case.rotation is None:
         return Structure(case, solid, matrices)
-    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point)
+    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics)
     return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
 
 
@@ -266,19 +280,9 @@ class ModalAnalysis:
             data["fatigue"] = self.fatigue.to_json()
         return data
 
-    def mesh(self) -> tuple[dict[str, Variable], int]:
-        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
-        cells, types, points = self.structure.solid.vtk_mesh()
-        corners = cells.reshape(len(types), -1)[:, 1:]
-        variables = {
-            "coordinates": Variable(points, ("node", "axis"), "m"),
-            "cell": Variable(corners, ("cells", "corner")),
-        }
-        return variables, int(types[0])
-
     def save(self, path: str | Path) -> None:
         """Write the modes with their masses, the mesh (for pictures) and the rigid model."""
-        mesh, cell_type = self.mesh()
+        mesh, cell_type = self.structure.mesh()
         variables = {
             "axis": Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
             "effective_mass": Variable(self.effective_mass, ("mode", "axis"), "kg"),
@@ -378,7 +382,7 @@ def _cavities(
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
     """Return the case's modes, multiple ones turned to the response coordinate, or else to the bending's direction."""
     table, size = case.modes, matrices.free.size
-    count = table.count or _MODES
+    count = table.count or MODES
     # one more, so that the last of them is not half of a pair
     more = count + 1 if count < size else count
     modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency, table.solver)
@@ -626,7 +630,7 @@ def _of_interest(model: ReducedModel, max_frequency: float | None, case: Case) -
 
 def _mode_of_interest(model: ReducedModel, case: Case) -> int:
     """Return the index of the first bending among a model's elastic modes; the first of them where none is one."""
-    first, modes = model.rigid_modes, case.modes.count or _MODES
+    first, modes = model.rigid_modes, case.modes.count or MODES
     inertia = model.base_load @ unit_direction(case.modes.direction)
     masses = (model.natural[1].T @ inertia) ** 2
     elastic = masses[first : first + modes]

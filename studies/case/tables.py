@@ -14,10 +14,12 @@ from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from vanedamp.coupling.scene.mistuning import DEVIATIONS, Mistuning
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.key_tables import documented
 from vanedamp.files.toml_input import (
     STRICT,
+    Axes,
     Direction,
     InputError,
     NonNegative,
@@ -28,12 +30,14 @@ from vanedamp.files.toml_input import (
     read_toml,
     validate,
 )
-from vanedamp.meshes import benchmarks, vane_cluster
+from vanedamp.meshes import benchmarks, sector, vane_cluster
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
+from vanedamp.meshes.sector import Sector
 from vanedamp.modal.units import absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.operation_tables import CampbellTable, RotationTable, TemperatureTable
+from vanedamp.studies.case.ring_tables import RingTable
 
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
@@ -110,6 +114,21 @@ class BlockMesh(_Generated):
         return benchmarks.build(self.parameters, path)
 
 
+@dataclass(frozen=True, config=STRICT)
+class SectorMesh(_Generated):
+    """A sector of a bladed disk or an annular plate; in the file its parameters are keys of [mesh]."""
+
+    generator: Literal["sector"]
+    """"sector": a sector of a bladed disk or an annular plate, for [ring]"""
+    parameters: Sector
+    degree: Degree = 2
+    """polynomial degree of the displacements"""
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what meshes.sector.build raises."""
+        return sector.build(self.parameters, path)
+
+
 #: keys that name a file: the mesh, and measurements
 FILES = (
     ("mesh", "file"),
@@ -117,10 +136,11 @@ FILES = (
     ("calibration", "damping", "frf"),
     ("calibration", "tune", "shapes"),
     ("temperature", "file"),
+    *(("mistuning", name, "file") for name in DEVIATIONS),
 )
 
 #: the records of the generators' parameters
-GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
+GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block, "sector": Sector}
 
 
 def _kind(table: Any) -> str:
@@ -143,7 +163,8 @@ def _gather(table: Any) -> Any:
 Mesh = Annotated[
     Annotated[MeshFile, Tag("existing")]
     | Annotated[VaneClusterMesh, Tag("vane_cluster")]
-    | Annotated[BlockMesh, Tag("block")],
+    | Annotated[BlockMesh, Tag("block")]
+    | Annotated[SectorMesh, Tag("sector")],
     Discriminator(_kind),
     BeforeValidator(_gather),
 ]
@@ -277,19 +298,11 @@ def _components(clamped: Any) -> Any:
     return merged
 
 
-_Axes = tuple[NonNegative, NonNegative, NonNegative]
-
-
-def _axes(stiffness: Any) -> Any:
-    """Return one number for each of three axes, which a single one stands for."""
-    return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
-
-
 @dataclass(frozen=True, config=STRICT)
 class ElasticTable:
     """Springs spread over a facet group."""
 
-    stiffness: Annotated[_Axes, BeforeValidator(_axes, json_schema_input_type=NonNegative | _Axes)] = (0.0, 0.0, 0.0)
+    stiffness: Axes = (0.0, 0.0, 0.0)
     """stiffness per unit of area, in all directions or [x, y, z] [N/m^3]"""
     normal: NonNegative = 0.0
     """stiffness per unit of area, normal to the facets [N/m^3]"""
@@ -431,6 +444,10 @@ class Case:
     """speeds and engine orders of `vanedamp campbell`"""
     temperature: TemperatureTable | None = None
     """temperature of the structure"""
+    ring: RingTable | None = None
+    """the ring of equal sectors of which the structure is one"""
+    mistuning: Mistuning | None = None
+    """deviations of the sectors of the ring"""
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}
@@ -443,6 +460,10 @@ class Case:
             raise ValueError("campbell: needs a table [rotation] with the axis of the speeds, such as axis = [1, 0, 0]")
         if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
+        if self.ring is not None and self.rotation is not None and (self.ring.axis or self.ring.point):
+            raise ValueError("ring.axis: a ring that rotates has the axis of [rotation]; leave out axis and point")
+        if self.mistuning is not None and self.ring is None:
+            raise ValueError("mistuning: deviations are those of sectors; give [ring] with sectors, low and high")
         stressed = self.temperature is not None or (self.rotation is not None and self.rotation.omega)
         if stressed and self.calibration is not None and self.calibration.tune is not None:
             raise ValueError(
@@ -516,9 +537,10 @@ class Case:
 
     @property
     def facet_groups(self) -> set[str]:
-        """Every group that supports and interfaces name."""
+        """Every group that supports, interfaces and the ring name."""
         named = [group for table in self.interface.values() for group in (*table.groups, *table.guides.values())]
-        return {*self.support.clamped, *self.support.elastic, *named}
+        ring = self.ring.groups.values() if self.ring is not None else ()
+        return {*self.support.clamped, *self.support.elastic, *named, *ring}
 
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
@@ -542,6 +564,10 @@ class Case:
                 )
             for key, group in table.guides.items():
                 _check_group(f"interface.{label}.{key}", group, surfaces)
+        for key, group in (self.ring.groups if self.ring is not None else {}).items():
+            _check_group(f"ring.{key}", group, surfaces)
+        for group in self.ring.deviating if self.ring is not None else ():
+            _check_group("ring.deviating", group, {"volume": [*volumes]})
         for group in self.material:
             if group != "default":
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})

@@ -8,16 +8,19 @@ from __future__ import annotations
 from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
     count,
+    family_count,
     hertz,
     input_file,
     json_file,
     metres_per_second,
     mode_count,
     newtons,
+    order,
     output_file,
     period_count,
     ratio,
     resume,
+    rpm,
     spot_count,
     workers,
 )
@@ -81,6 +84,45 @@ COMMANDS = (
         reads=Function("support.cases:read_campbell_case"),
     ),
     Command(
+        "ring", "modes of a ring of equal sectors by nodal diameter, and the engine orders that meet them", 27,
+        (
+            input_file("CASE.toml"), output_file("RING.h5"), json_file,
+            argument("--picture", metavar="FILE.png", help="the interference diagram as a picture"),
+            argument("--vtu", metavar="FILE.vtu", help="the modes on the whole ring, for ParaView"),
+            argument(
+                "--rpm", type=rpm, nargs=2, metavar=("LOW", "HIGH"),
+                help="speeds of operation (default: those of [campbell], or 5 %% about that of [rotation])",
+            ),
+            argument(
+                "--orders", type=order, nargs="+", metavar="R",
+                help="engine orders (default: those of [campbell], or 1 to the number of sectors)",
+            ),
+        ),
+        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",)},
+        reads=Function("support.cases:read_ring_case"),
+    ),
+    Command(
+        "mistuning", "amplification of a mistuned ring under engine orders, over draws of its deviations", 28,
+        (
+            input_file("CASE.toml"), output_file("MISTUNING.h5"), json_file,
+            argument(
+                "--orders", type=count, nargs="+", metavar="R",
+                help="engine orders (default: 1 to half the number of sectors)",
+            ),
+            argument(
+                "--seeds", type=family_count, default=100, metavar="N",
+                help="draws, by the seeds from that of [mistuning] on (default: %(default)s)",
+            ),
+            argument("--at", metavar="LABEL", help="interface label of force and response (default: the first)"),
+            argument(
+                "--family", type=family_count, default=1, metavar="N",
+                help="family of modes around which peaks count (default: the first)",
+            ),
+            argument("--ring", metavar="RING.h5", help="reduced ring of the case (default: the case is reduced)"),
+        ),
+        writes={"output": _RECORD}, reads=Function("support.cases:read_ring_case"),
+    ),
+    Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,
         (
             input_file("CASE.toml"), output_file("CALIBRATION.h5"),
@@ -114,6 +156,10 @@ COMMANDS = (
             argument(
                 "--max-frequency", type=hertz, metavar="HZ",
                 help="up to which the error is estimated (default: 1.5 times the first bending)",
+            ),
+            argument(
+                "--families", type=family_count, default=3, metavar="N",
+                help="of a ring: modes of every nodal diameter (default: %(default)s), or all up to --max-frequency",
             ),
             argument(
                 "--hot-spots", type=spot_count, default=0, metavar="N",
@@ -157,18 +203,19 @@ COMMANDS = (
         writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
     ),
     Command(
-        "explore", "sliders, and a forced response that follows them, in the browser", 85,
+        "explore", "sliders, and a forced response or the modes of a ring that follow them, in the browser", 85,
         (
             argument(
-                "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|DIR",
-                help="a scene, or files of sweeps and folders of such; default: the rigid model of the shipped cluster",
+                "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|RING.h5|DIR",
+                help="a scene, or files of sweeps and folders of such, or modes of rings; default: the rigid model of "
+                "the shipped cluster",
             ),
-            output_file("SCENE.toml"),
+            output_file("SCENE.toml|RING.html"),
             argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)"),
             argument("--no-browser", action="store_true", help="only print the address"),
             workers,
         ),
-        writes={"output": (".toml",)},
+        writes={"output": (".toml", ".html")},
     ),
     Command(
         "orbits",

@@ -19,8 +19,11 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.modal.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
@@ -142,6 +145,17 @@ def _campbell(record: _Record) -> Iterator[Fact]:
     yield Fact("error", float(of["error"].max()), "", "estimated, relative, of the frequencies")
 
 
+def _ring(record: _Record) -> Iterator[Fact]:
+    found = Interference.load(record.path)
+    yield Fact("sectors", found.modes.sectors)
+    yield Fact("speed", found.speed, "rad/s")
+    rows = [f"diameter {found.label(h)}: " + ", ".join(f"{hz:.6g}" for hz in row if np.isfinite(hz))
+            for h, row in found.by_diameter()]  # fmt: skip
+    yield Fact("frequencies", rows, "Hz", "by family")
+    met = found.in_operation
+    yield Fact("meetings", [f"{found.name(each.mode)} and order {each.order:g} at {each.rpm:.6g} rpm" for each in met])
+
+
 def _reduced(record: _Record) -> Iterator[Fact]:
     made = record.attributes.get("provenance", {})
     frequencies = record.variables["natural_frequency"].values
@@ -153,6 +167,23 @@ def _reduced(record: _Record) -> Iterator[Fact]:
     for line in spot_lines(hot_spots(ReducedModel.load(record.path))):
         name, _, facts = line.partition(" ")
         yield Fact(name, facts)
+
+
+def _ring_model(record: _Record) -> Iterator[Fact]:
+    ring = RingModel.load(record.path)
+    yield Fact("sectors", ring.sectors)
+    yield Fact("frequency_hz", np.unique(ring.frequencies_hz)[:_MOST].tolist(), "Hz", "of the tuned ring at standstill")
+    yield Fact("interface", list(ring.interface), "", "of every sector")
+    yield Fact("modes", ring.modes, "", f"natural modes among {len(ring.squares)} waves")
+    yield Fact("estimate", ring.provenance.get("estimate", {}).get("sentence"))
+
+
+def _mistuning(record: _Record) -> Iterator[Fact]:
+    study = MistuningStudy.load(record.path).to_json()
+    yield Fact("draws", study["seeds"])
+    for row in study["orders"]:
+        top, median = row["amplification"]["largest"], row["quantiles"][0]["value"]
+        yield Fact(f"order {row['order']}", f"amplification up to {top:.4g}, median {median:.4g}")
 
 
 def _response(record: _Record) -> Iterator[Fact]:
@@ -270,7 +301,10 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "modes": ("a modal analysis", "modal", _modes),
     "calibration": ("a case calibrated with measurements", "calibrate", _calibration),
     "campbell": ("a Campbell diagram", "campbell", _campbell),
+    "ring-modes": ("the modes of a ring", "ring", _ring),
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
+    "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
+    "mistuning": ("amplification of a mistuned ring", "mistuning", _mistuning),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
     "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),

@@ -24,8 +24,12 @@ def run(arguments: Namespace, case: Case) -> None:
     result = analysis.to_json()
 
     def vtk(path: str) -> None:
-        mesh, cell_type = analysis.mesh()
-        save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, path)
+        mesh, cell_type = analysis.structure.mesh()
+        pairs = zip(analysis.modes.frequencies_hz, analysis.modes.shapes, strict=True)
+        fields = {
+            f"mode {k}: {frequency:.6g} Hz": shape.reshape(-1, 3) for k, (frequency, shape) in enumerate(pairs, 1)
+        }
+        save_vtk(fields, mesh["coordinates"].values, mesh["cell"].values, cell_type, path)
 
     write_result(arguments, result, _summary(result), analysis.warnings, output=analysis.save, vtk=vtk)
 

@@ -1,4 +1,4 @@
-"""`vanedamp reduce`: a reduced model at the case's interface, with an estimate of its error."""
+"""`vanedamp reduce`: a reduced model at the interface of a structure or a ring, with an estimate of its error."""
 
 from __future__ import annotations
 
@@ -6,17 +6,29 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 
+import numpy as np
+
+from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.studies.case.ring_stages import ring_reduction
 from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
+from vanedamp.studies.terminal import progress
+
+#: defaults of the options that a case with [ring] does not take
+_OF_STRUCTURES = (12, "craig-bampton", 0, False)
 
 
 def run(arguments: Namespace, case: Case) -> None:
     """Reduce the case."""
     started = time.perf_counter()
+    if case.ring is not None:
+        _reduce_ring(arguments, case, started)
+        return
     structure = assemble(case)
     model = reduction(
         structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots,
@@ -40,6 +52,40 @@ def run(arguments: Namespace, case: Case) -> None:
         if case.rotation is not None and case.rotation.gyroscopic:
             result["warnings"].append("rotation.gyroscopic: the reduced model leaves the gyroscopic coupling out")
     write_result(arguments, result, _summary(model, fastest), result["warnings"], output=model.save)
+
+
+def _reduce_ring(arguments: Namespace, case: Case, started: float) -> None:
+    """Reduce the ring of which the case is a sector."""
+    if (arguments.modes, arguments.basis, arguments.hot_spots, arguments.recovery) != _OF_STRUCTURES:
+        raise InputError("--modes, --basis, --hot-spots, --recovery: not for a case with [ring]; it takes --families")
+    structure = assemble(case)
+    with progress("nodal diameters") as report:
+        ring = ring_reduction(structure, arguments.families, arguments.max_frequency, report)
+    result = {
+        "sectors": ring.sectors,
+        "frequency_hz": ring.frequencies_hz.tolist(),
+        "diameters": ring.diameters[: ring.modes].tolist(),
+        "modes": ring.modes,
+        "coordinates": len(ring.squares),
+        "interface": list(ring.interface),
+        "estimate": ring.provenance["estimate"],
+        "greatest_speed": ring.greatest_speed,
+        "warnings": list(unit_doubts(structure, float(ring.frequencies_hz.min()))),
+        "wall_time_s": time.perf_counter() - started,
+    }
+    write_result(arguments, result, _ring_summary(ring), result["warnings"], output=ring.save)
+
+
+def _ring_summary(ring: RingModel) -> Iterator[str]:
+    """Yield sizes, the estimates of errors, and natural frequencies by nodal diameter."""
+    estimate = ring.provenance["estimate"]
+    yield f"{ring.sectors} sectors in {len(ring.squares)} waves; interface of each: {', '.join(ring.interface)}"
+    yield f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz"
+    if ring.greatest_speed:
+        yield f"for speeds up to {ring.greatest_speed:.6g} rad/s; at standstill:"
+    for number in range(ring.sectors // 2 + 1):
+        own = np.unique(ring.frequencies_hz[ring.diameters[: ring.modes] == number])
+        yield f"nodal diameter {number}, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in own)
 
 
 def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:

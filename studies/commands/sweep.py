@@ -14,7 +14,7 @@ from vanedamp.studies.commands.support.ensembles import run_ensemble
 from vanedamp.studies.commands.support.messages import print_note, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
-from vanedamp.studies.report.ring_charts import ring_sentence
+from vanedamp.studies.report.sector_charts import ring_sentence
 from vanedamp.studies.sweep_steps import PEAK_SAMPLES, finish, prepare, run_peak, run_points
 from vanedamp.studies.workers import available_cores, workers
 

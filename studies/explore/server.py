@@ -169,12 +169,12 @@ def serve(
         server = make_server(HOST, port, app.server, threaded=True, request_handler=_Quiet, fd=listening.fileno())
         address = f"http://{HOST}:{port}/?token={token}"
         print(f"{address}\nCtrl-C ends it", flush=True)
-        if browser and _has_display():
+        if browser and has_display():
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         server.serve_forever()
         raise KeyboardInterrupt  # that ends it, and the server has kept it for itself
 
 
-def _has_display() -> bool:
+def has_display() -> bool:
     """Say whether a browser has a window to open; a browser in the terminal would be in its way."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -18,7 +18,7 @@ _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
 _NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
-_EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
+EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 _HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -66,7 +66,7 @@ def screen_of(view: np.ndarray) -> np.ndarray:
 def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (n, 3) moved by a shape, and their displacements (n,) over the largest."""
     magnitude, size = np.linalg.norm(shape, axis=1), float(np.linalg.norm(np.ptp(points, axis=0)))
-    return points + shape * (_EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
+    return points + shape * (EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
 
 
 class Surface(NamedTuple):
@@ -76,13 +76,13 @@ class Surface(NamedTuple):
     triangles: np.ndarray
 
 
-def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
-    """Return the surface of a record of modes, if a page can carry it."""
+def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> Surface | None:
+    """Return the surface of a record of modes, if a page can carry it: so many triangles at most."""
     cells = values["cell"]
     if cells.shape[1] not in _FACES:
         return None
     nodes, triangles = np.unique(surface(cells), return_inverse=True)
-    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
+    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * most else None
 
 
 def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
@@ -120,13 +120,13 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
     shapes = [values["shape"][index].reshape(-1, 3)[nodes] for index in chosen]
     figure = go.Figure([_at_rest(points, triangles)])
     for index, shape in zip(chosen, shapes, strict=True):
-        figure.add_trace(_mesh(points, triangles, shape, visible=index == mode))
+        figure.add_trace(deformed_mesh(*deformed(points, shape), triangles, visible=index == mode))
     names = [f"mode {index + 1}: {values['frequency'][index]:.2f} Hz" for index in chosen]
     menu = [
         {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
-    _dressed(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
+    in_space(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
     figure.update_layout(
         meta=points.T.astype(np.float32).round(4).tolist(),
         updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
@@ -134,7 +134,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
     return figure
 
 
-def _dressed(figure: go.Figure, view: np.ndarray) -> go.Figure:
+def in_space(figure: go.Figure, view: np.ndarray) -> go.Figure:
     """Return a figure of a structure in mm with axes, seen from a direction (3,)."""
     eye = dict(zip("xyz", (_DISTANCE * view).tolist(), strict=True))
     axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
@@ -171,7 +171,7 @@ def spots_figure(
     )  # fmt: skip
     near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
     shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
-    return _dressed(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
+    return in_space(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
 
 
 def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
@@ -194,8 +194,8 @@ def _at_rest(points: np.ndarray, triangles: np.ndarray) -> go.Scatter3d:
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=look, name="edges at rest", showlegend=True, hoverinfo="skip")
 
 
-def _mesh(points: np.ndarray, triangles: np.ndarray, shape: np.ndarray, visible: bool) -> go.Mesh3d:
-    moved, magnitude = deformed(points, shape)
+def deformed_mesh(moved: np.ndarray, magnitude: np.ndarray, triangles: np.ndarray, visible: bool = True) -> go.Mesh3d:
+    """Return the trace of points (n, 3) that a mode moved, in mm, coloured by relative displacements (n,)."""
     (x, y, z), (i, j, k) = moved.astype(np.float32).T, triangles.astype(np.int32).T
     bar: dict[str, Any] = {"title": {"text": "displacement /<br>largest displacement"}, "len": 0.7, "thickness": 16}
     return go.Mesh3d(

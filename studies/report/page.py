@@ -35,7 +35,7 @@ _MOST_COLUMNS = 4
 #: headings of what templates of several sections move to one, by their calls, in the order of the page
 _COMMON = {"strength": "Strength and life", "later": "Where the energy goes"}
 #: scripts of the page by the kind of chart that needs them
-_SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response"}
+_SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response", "ring.js": "ring"}
 _SLIDERS = (
     '{} only along the cavity. Of bodies with corners, shape = "auto" with their length and height tells whether that '
     "is enough."

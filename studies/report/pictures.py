@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,6 @@ from vanedamp.studies.report.forced_response_charts import RELATIVE
 from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges, surface, unit_normals, viewpoint
 
 if TYPE_CHECKING:
-    from vanedamp.modal.eigen import Modes
     from vanedamp.studies.report.forced_response import ForcedResponse
 
 #: names of VTK's cells: linear ones, and of any order, as dolfinx has them
@@ -99,16 +99,15 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
     save(figure, path, dpi=110)
 
 
-def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:
-    """Write all mode shapes as point data on their mesh (.vtu or .vtk, for ParaView). cell_type: VTK's number."""
+def save_vtk(
+    fields: Mapping[str, np.ndarray], coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path
+) -> None:
+    """Write fields by name, such as mode shapes, on their mesh (.vtu or .vtk, for ParaView). cell_type: VTK's."""
     from meshio import Mesh
 
     legacy = Path(path).suffix == ".vtk"
-    fields = {}
-    for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
-        name = f"mode {number}: {frequency:.6g} Hz"
-        # names end at a space in old files, and readers know this sign for it
-        fields[name.replace(" ", "%20") if legacy else name] = shape.reshape(-1, 3)
-    mesh = Mesh(coordinates, [(_CELLS[cell_type], cells)], point_data=fields)
+    # names end at a space in old files, and readers know this sign for it
+    named = {name.replace(" ", "%20") if legacy else name: field for name, field in fields.items()}
+    mesh = Mesh(coordinates, [(_CELLS[cell_type], cells)], point_data=named)
     with replacing(path) as temporary:
         mesh.write(temporary, file_format="vtk" if legacy else "vtu")

@@ -20,7 +20,9 @@ from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
+from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.frf import UNITS
+from vanedamp.modal.interference import Interference
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
@@ -32,6 +34,7 @@ from vanedamp.studies.report.identification_charts import data_figure
 from vanedamp.studies.report.life_charts import life_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
 from vanedamp.studies.report.results import Result, Results, collect
+from vanedamp.studies.report.ring_charts import interference_figure
 from vanedamp.studies.report.sections.calibration import frequencies_figure, response_figure
 from vanedamp.studies.report.sections.campbell import campbell_figure
 from vanedamp.studies.report.sections.orbits import branches_figure
@@ -46,6 +49,7 @@ _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
     Branches: lambda found: (borders_figure if found.borders else branches_figure)(found),
     Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
     Identification: data_figure, LifeRecord: life_figure, Ensemble: ensemble_figure,
+    Interference: interference_figure, RingModes: lambda found: interference_figure(Interference.of(found)),
 }  # fmt: skip
 
 
@@ -56,9 +60,10 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     A Sweep gives its forced responses, the best of many, or its bifurcation diagram if it keeps sections; a
     Response its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and
     Campbell their diagrams, Branches with borders the map of these; an Identification its measurements over the
-    model; a LifeRecord its course over the hours; an Ensemble its curve with bands, of one frequency its indices; a
-    file of `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the
-    tuned frequencies. Raises InputError for anything else, and for a response without samples.
+    model; a LifeRecord its course over the hours; an Ensemble its curve with bands, of one frequency its indices;
+    RingModes and an Interference the frequencies over nodal diameters with the engine orders; a file of `vanedamp
+    modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies.
+    Raises InputError for anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
@@ -87,6 +92,8 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
 @plot.register(Ramp)
 @plot.register(RingDown)
 @plot.register(Campbell)
+@plot.register(Interference)
+@plot.register(RingModes)
 @plot.register(Identification)
 @plot.register(LifeRecord)
 @plot.register(Ensemble)
@@ -108,6 +115,8 @@ def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
 def _of_file(found: Results, file: str, entry: Result) -> go.Figure:
     if file in found.kinds["calibration"]:
         return _of_calibration(file, *entry.record)
+    if file in found.kinds["ring-modes"]:
+        return plot(entry.record[1])
     if file not in found.kinds["modes"]:
         return plot(entry.record)
     values, attributes = entry.record

@@ -1,151 +1,118 @@
-"""Rings in a report: amplitudes and impacts over the sectors, of runs and of sweeps."""
+"""Charts of a ring's modes: interference diagram (SAFE) and Campbell diagram by nodal diameter."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
+from plotly.colors import sample_colorscale
 
-from vanedamp.coupling.response.sector_response import BY_SECTOR
-from vanedamp.coupling.sweep.grid import resonance_axis
-from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.studies.report.charts import COLOURS, dressed
-from vanedamp.studies.report.forced_response import setting
-from vanedamp.studies.report.map_chart import MOST_PANELS, Panel, panel_rows, panels, panels_figure
-from vanedamp.studies.report.page import Page
+from vanedamp.modal.campbell import Crossing
+from vanedamp.modal.interference import Interference
+from vanedamp.modal.speed_range import RPM
+from vanedamp.studies.report.charts import COLOURS, Table, dressed
 
-#: axis of the draws of a mistuned ring
-_SEED = "structure.mistuning.seed"
-_QUANTILES = (0.05, 0.5, 0.95, 1.0)
+_ORDER, _MARK = "#64748b", "#111827"
+#: engine orders with a label at most
+_MOST_LABELS = 40
 
 
-def sectors_shown(file: str, sectors: Mapping[str, Any], page: Page) -> dict[str, Any]:
-    """Return what a run of a ring shows, from the `sectors` of its JSON."""
-    columns = {name: np.array(sectors[name], float) for name in BY_SECTOR}
-    rows = ([sector, *values] for sector, values in enumerate(zip(*columns.values(), strict=True)))
-    chart = page.chart("sectors", sectors_figure(columns), ("sector", *columns), rows, [file])
-    return {"chart": chart, "count": len(columns["amplitude_mean"])} | {
-        name: sectors.get(name) for name in ("largest", "amplification", "localisation")
-    }
+def interference_figure(found: Interference) -> go.Figure:
+    """Draw frequency over nodal diameter by family, the folded lines of engine orders, and where these meet modes.
 
-
-def sectors_figure(columns: Mapping[str, np.ndarray]) -> go.Figure:
-    """Draw amplitudes, m, and impacts per period over the sectors, by the names of BY_SECTOR."""
-    counted = np.isfinite(columns["impacts_per_period"]).all()
-    figure = make_subplots(rows=1 + counted, cols=1, shared_xaxes=True, vertical_spacing=0.08)
-    x = np.arange(len(columns["amplitude_mean"]))
-    figure.add_bar(x=x, y=1e6 * columns["amplitude_mean"], name="mean", marker_color=COLOURS[0], row=1, col=1)
-    for name, title, symbol in (
-        ("amplitude_max", "largest", "line-ew-open"), ("amplitude_undamped", "without bodies", "circle-open"),
-        ("amplitude_fixed", "bodies fixed", "diamond-open"),
-    ):  # fmt: skip
+    The lines are those of the ends of the range of operation. `customdata` of a mode is its number, from 0.
+    """
+    figure, modes = go.Figure(), found.modes
+    for speed, dash in zip(found.folded_speeds, ("solid", "dot"), strict=False):
+        _add_orders(figure, found, speed, dash)
+    for family in np.unique(modes.families).tolist():
+        rows = np.flatnonzero(modes.families == family)
+        rows = rows[np.argsort(modes.diameters[rows])]
         figure.add_scatter(
-            x=x, y=1e6 * columns[name], name=title, mode="markers", marker={"symbol": symbol, "size": 10}, row=1, col=1
-        )
-    figure.update_yaxes(title_text="amplitude, µm", row=1, col=1)
-    if counted:
-        figure.add_bar(
-            x=x,
-            y=columns["impacts_per_period"],
-            name="impacts",
-            showlegend=False,
-            marker_color=COLOURS[1],
-            row=2,
-            col=1,
-        )
-        figure.update_yaxes(title_text="impacts per period", row=2, col=1)
-    figure.update_xaxes(title_text="sector", row=1 + counted, col=1)
-    return dressed(figure, height=280 * (1 + counted))
-
-
-def ring_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return what a sweep of a ring shows: a map of its sectors, their impacts, and quantiles over seeds."""
-    shown: dict[str, Any] = {"file": file, "sentence": ring_sentence(sweep), "map": None, "seeds": list(_seeds(sweep))}
-    if (across := _across(sweep)) is not None:
-        drawn = _panels(sweep, across)
-        figure = panels_figure(
-            sweep, drawn, (across, "sector"), coloraxis="coloraxis",
-            hovertemplate="%{x:.6g}, sector %{y}: %{z:.4g} µm<extra></extra>",
+            x=found.diameters[rows], y=modes.frequencies_hz[rows], customdata=rows, name=f"family {family + 1}",
+            mode="lines+markers", line={"color": COLOURS[family % len(COLOURS)], "width": 1.5}, marker={"size": 8},
+            hovertext=[found.name(row) for row in rows.tolist()],
+            hovertemplate="%{hovertext}<br>%{y:.4f} Hz<extra></extra>",
         )  # fmt: skip
-        bar = {"title": {"text": "mean<br>amplitude, µm"}}
-        figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
-        header = ("panel", across, "sector", "amplitude_um")
-        shown["map"] = page.chart("ring", figure, header, panel_rows(drawn), [file])
-        shown |= {"panels": len(drawn), "drawn": min(len(drawn), MOST_PANELS)}
-    impacts = _ok(sweep, "sector_impacts_per_period")
-    rows = list(_spread(impacts.reshape(-1, impacts.shape[-1])))
-    header = ("sector", "mean_impacts", "least", "most")
-    shown["impacts"] = page.chart("ring-impacts", _impacts_figure(rows), header, rows, [file])
-    return shown
+    met = found.in_operation
+    _add_meetings(figure, found, met, [int(found.diameters[each.mode]) for each in met])
+    dressed(figure, height=620)
+    figure.update_xaxes(
+        title_text="nodal diameter", range=[-0.3, 0.5 * modes.sectors + 0.3], dtick=max(1, round(modes.sectors / 40))
+    )
+    figure.update_yaxes(title_text="natural frequency, Hz", range=[0.0, found.top])
+    return figure.update_layout(hovermode="closest")
 
 
-def ring_sentence(sweep: Sweep) -> str:
-    """Return where a sweep of a ring has its largest amplitude, in words."""
-    mean = _ok(sweep, "sector_amplitude_mean")
-    if not np.isfinite(mean).any():
-        return "no point is ok, and none has a largest sector"
-    *point, sector = np.unravel_index(int(np.nanargmax(mean)), mean.shape)
-    axes = zip(sweep.axes.items(), point, sweep.units().values(), strict=True)
-    where = ", ".join(setting(path, values[place], unit) for (path, values), place, unit in axes)
-    text = f"largest mean amplitude {1e6 * np.nanmax(mean):.4g} µm in sector {sector} of {mean.shape[-1]} at {where}"
-    ratio, uneven = (float(sweep.sectors[name][tuple(point)]) for name in ("amplification", "localisation"))
-    if np.isfinite(ratio):
-        text += f": {ratio:.4g} of the tuned ring without bodies in resonance"
-    return f"{text}, localisation {uneven:.4g}"
+def _add_orders(figure: go.Figure, found: Interference, speed: float, dash: str) -> None:
+    """Add the folded line of a speed, and on it the engine orders that are considered."""
+    name = f"engine orders at {speed * RPM:.6g} rpm"
+    x, y = found.zigzag(speed)
+    look: dict[str, Any] = {"legendgroup": name, "name": name}
+    line = {"color": _ORDER, "width": 1.1, "dash": dash}
+    figure.add_scatter(x=x, y=y, mode="lines", hoverinfo="skip", line=line, **look)
+    orders = [order for order in found.orders if order * speed / (2.0 * np.pi) <= found.top]
+    labelled = len(orders) <= _MOST_LABELS and speed == found.folded_speeds[-1]
+    figure.add_scatter(
+        x=[abs(found.excited(order)) for order in orders], y=[order * speed / (2.0 * np.pi) for order in orders],
+        mode="markers+text", showlegend=False, text=orders if labelled else None, textposition="middle right",
+        textfont={"size": 10, "color": _ORDER}, marker={"size": 4, "color": _ORDER},
+        hovertext=[f"engine order {order}" for order in orders], hoverinfo="text+y", **look,
+    )  # fmt: skip
 
 
-def _ok(sweep: Sweep, name: str) -> np.ndarray:
-    """Return a result by sector of the points that are ok, nan of the others."""
-    return np.where((sweep.status == "ok")[..., None], sweep.sectors[name], np.nan)
+def _add_meetings(figure: go.Figure, found: Interference, meetings: Sequence[Crossing], x: Sequence[float]) -> None:
+    if meetings:
+        figure.add_scatter(
+            x=x, y=[each.frequency_hz for each in meetings], name="meetings", mode="markers", hoverinfo="text",
+            hovertext=[
+                f"{found.name(each.mode)}, meets engine order {each.order:g}<br>{each.rpm:.3f} rpm "
+                f"({each.speed:.4f} rad/s)<br>{each.frequency_hz:.4f} Hz"
+                for each in meetings
+            ],
+            marker={"size": 13, "symbol": "circle-open", "color": _MARK, "line": {"width": 2}},
+        )  # fmt: skip
 
 
-def _across(sweep: Sweep) -> str | None:
-    """Return the axis of the map: that of resonances, or else the longest of numbers; None without any."""
-    numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) > 1]
-    swept = resonance_axis(sweep.scene, numeric)[0]
-    return swept if swept is not None else max(numeric, key=lambda path: len(sweep.axes[path]), default=None)
+def ring_campbell_figure(found: Interference) -> go.Figure:
+    """Draw the modes over the speed, a colour per nodal diameter, lines of engine orders, and their meetings."""
+    figure = go.Figure()
+    top, rpm = 1.06 * float(np.nanmax(found.over_speed_hz)), found.speeds * RPM
+    for order in found.orders:
+        end = min(rpm[-1], 60.0 * top / order)
+        figure.add_scatter(
+            x=[rpm[0], end], y=[order * rpm[0] / 60.0, order * end / 60.0], mode="lines", name="engine orders",
+            legendgroup="engine orders", showlegend=order == found.orders[0], hoverinfo="skip",
+            line={"color": _ORDER, "width": 0.8, "dash": "dash"},
+        )  # fmt: skip
+    diameters = np.unique(found.diameters)
+    colours = sample_colorscale("Viridis", np.linspace(0.0, 0.9, len(diameters)).tolist())
+    for mode, frequencies in enumerate(found.over_speed_hz):
+        diameter = int(found.diameters[mode])
+        colour, name = colours[int(np.searchsorted(diameters, diameter))], f"diameter {diameter}"
+        figure.add_scatter(
+            x=rpm, y=frequencies, mode="lines", name=name, legendgroup=name, line={"color": colour, "width": 2},
+            showlegend=bool(found.modes.families[mode] == 0 <= found.modes.diameters[mode]),
+            hovertemplate=f"{found.name(mode)}<br>%{{x:.1f}} rpm<br>%{{y:.3f}} Hz<extra></extra>",
+        )  # fmt: skip
+    _add_meetings(figure, found, found.meetings, [each.rpm for each in found.meetings])
+    dressed(figure, height=620)
+    figure.update_xaxes(title_text="speed, rpm", range=[rpm[0], rpm[-1]], tickformat=",d")
+    figure.update_yaxes(title_text="natural frequency, Hz", range=[0.0, top])
+    return figure.update_layout(hovermode="closest", legend={"groupclick": "togglegroup"})
 
 
-def _panels(sweep: Sweep, across: str) -> list[Panel]:
-    values = 1e6 * _ok(sweep, "sector_amplitude_mean")
-    return panels(sweep, {**sweep.axes, "sector": np.arange(values.shape[-1])}, values, (across, "sector"))
+def interference_table(found: Interference) -> Table:
+    """Return modes with their diameters and families, and the engine orders that excite them."""
+    header = ["nodal diameter", "family", "frequency, Hz", "engine orders"]
+    modes = found.modes
+    rows = zip(modes.diameters.tolist(), (modes.families + 1).tolist(), modes.frequencies_hz.tolist(), strict=True)
+    return header, [[*row, " ".join(map(str, found.exciting(row[0])))] for row in rows]
 
 
-def _spread(impacts: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-    """Yield number, mean, least and most impacts per period of each sector, over points (k, N)."""
-    for sector, values in enumerate(impacts.T):
-        known = values[np.isfinite(values)]
-        yield (sector, *((known.mean(), known.min(), known.max()) if known.size else (np.nan,) * 3))
-
-
-def _impacts_figure(rows: Sequence[tuple[int, float, float, float]]) -> go.Figure:
-    sector, mean, least, most = np.array(rows).T
-    error = {"type": "data", "symmetric": False, "array": most - mean, "arrayminus": mean - least}
-    figure = go.Figure(go.Bar(x=sector, y=mean, error_y=error, marker_color=COLOURS[1]))
-    figure.update_yaxes(title_text="impacts per period")
-    figure.update_xaxes(title_text="sector")
-    return dressed(figure, height=280)
-
-
-def _seeds(sweep: Sweep) -> Iterator[dict[str, Any]]:
-    """Yield quantiles of the amplification over the seeds, for every combination of axes but the resonances'."""
-    paths, units = list(sweep.axes), sweep.units()
-    if _SEED not in paths:
-        return
-    swept = resonance_axis(sweep.scene, paths)[0]
-    ratio = np.where(sweep.status == "ok", sweep.sectors["amplification"], -np.inf)
-    if swept is not None:
-        ratio = ratio.max(axis=paths.index(swept), keepdims=True)
-    ratio = np.moveaxis(ratio, paths.index(_SEED), -1)
-    others = [path for path in paths if path not in (_SEED, swept)]
-    combinations = itertools.product(*(range(len(sweep.axes[path])) for path in others))
-    for combination, values in zip(combinations, ratio.reshape(-1, ratio.shape[-1]), strict=True):
-        known = values[np.isfinite(values)]
-        if known.size:
-            named = zip(others, combination, strict=True)
-            name = ", ".join(setting(path, sweep.axes[path][place], units[path]) for path, place in named)
-            yield {"name": name, "count": known.size, "quantiles": np.quantile(known, _QUANTILES).tolist()}
+def ring_campbell_table(found: Interference) -> Table:
+    """Return the frequencies of the modes, a row per speed."""
+    header = ["speed, rad/s", "speed, rpm", *(f"{found.name(mode)}, Hz" for mode in range(len(found.diameters)))]
+    return header, np.column_stack([found.speeds, found.speeds * RPM, found.over_speed_hz.T]).tolist()

@@ -32,6 +32,7 @@ def test_areas_of_the_drawing(curved):
         "clamp": sector * parameters.outer_radius * parameters.axial_length,
         "shroud": sector * parameters.inner_radius * parameters.axial_length,
     }
+    areas["shroud_low"] = areas["shroud_high"] = parameters.inner_thickness * parameters.axial_length
     for number in (1, 2, 3):
         areas[f"c{number}_left"] = areas[f"c{number}_right"] = parameters.cavity_height * parameters.cavity_depth
         areas[f"c{number}_floor"] = areas[f"c{number}_roof"] = parameters.cavity_width * parameters.cavity_depth
@@ -77,7 +78,16 @@ def test_cluster_is_centred_on_z(curved):
 
 def test_groups_of_the_shipped_mesh():
     domain = fenicsx.read(SHIPPED)
-    assert set(domain.facets) == {"clamp", "shroud", "c1_left", "c1_right", "c1_floor", "c1_roof"}
+    assert set(domain.facets) == {
+        "clamp",
+        "shroud",
+        "shroud_low",
+        "shroud_high",
+        "c1_left",
+        "c1_right",
+        "c1_floor",
+        "c1_roof",
+    }
     assert set(domain.volumes) == {"outer_shroud", "airfoils", "inner_shroud"}
     facets = [facet for members in domain.facets.values() for facet in members]
     assert len(facets) == len(set(facets))
@@ -85,7 +95,7 @@ def test_groups_of_the_shipped_mesh():
 
 def test_without_cavities(tmp_path):
     domain = fenicsx.read(build(VaneCluster(cavities=0, **COARSE), tmp_path / "solid.msh"))
-    assert set(domain.facets) == {"clamp", "shroud"}
+    assert set(domain.facets) == {"clamp", "shroud", "shroud_low", "shroud_high"}
 
 
 def test_same_parameters_same_file(tmp_path):
@@ -141,7 +151,7 @@ def test_tied_bodies_share_the_nodes_of_the_floor(tmp_path):
 def test_a_body_that_fills_its_cavity_covers_the_walls(tmp_path):
     size = {"damper_width": 0.014, "damper_height": 0.005, "damper_depth": 0.012}
     domain = fenicsx.read(build(VaneCluster(**COARSE, **size), tmp_path / "full.msh"))
-    assert set(domain.facets) == {"clamp", "shroud"}
+    assert set(domain.facets) == {"clamp", "shroud", "shroud_low", "shroud_high"}
 
 
 def test_five_cavities_fit_when_the_message_is_followed():

@@ -46,6 +46,16 @@ def hertz(text: str) -> float:
     return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
 
 
+def rpm(text: str) -> float:
+    """Return a speed of rotation."""
+    return _number(text, "a speed in rpm", lambda value: 0.0 < value < math.inf)
+
+
+def order(text: str) -> int:
+    """Return an engine order."""
+    return count(text, 1)
+
+
 def metres_per_second(text: str) -> float:
     """Return a speed."""
     return _number(text, "a speed in m/s", lambda value: 0.0 < value < math.inf)
@@ -68,6 +78,8 @@ def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
 
 #: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
 spot_count = partial(count, most=1000)
+#: a number of families of modes
+family_count = partial(count, least=1)
 #: periods of Lyapunov exponents (coupling.scene.scene, which would be heavy to import)
 period_count = partial(count, least=32)
 

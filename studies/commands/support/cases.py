@@ -33,3 +33,14 @@ def read_reducible_case(arguments: Namespace) -> Case:
     case = read_case(arguments)
     check_interface(case)
     return case
+
+
+def read_ring_case(arguments: Namespace) -> Case:
+    """Load a case of a sector; as read_case."""
+    case = read_case(arguments)
+    if case.ring is None:
+        raise InputError(
+            f"{arguments.input}: ring: missing; give the number of sectors and the faces, such as sectors = 36, "
+            'low = "low" and high = "high"'
+        )
+    return case

@@ -29,7 +29,7 @@ from vanedamp.files.formats.universal_datasets import (
 )
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.export import Option
-from vanedamp.studies.export.formats.vtkhdf import shapes_of
+from vanedamp.studies.export.formats.vtkhdf import modes_of
 from vanedamp.studies.export.record import Record
 
 SUMMARY = "modes, receptances, curves and histories: Simcenter Testlab, MATLAB toolboxes, pyuff"
@@ -53,12 +53,10 @@ _MOST, _MOST_BYTES = 1_000_000, 8e9
 def modes(record: Record, path: Path) -> None:
     """Write nodes, cells by their corners, and the modes at all nodes, mass-normalised (modal mass 1).
 
-    Of a rotating structure with gyroscopic coupling, the complex modes.
+    Of a rotating structure with gyroscopic coupling, the complex modes; of a ring, its waves on all sectors.
     """
-    for name in ("coordinates", "cell"):
-        if name not in record.variables:
-            raise InputError(f"{record.file}: holds no mesh; `vanedamp modal CASE.toml -o` writes modes with it")
-    points, cells = record.values("coordinates"), record.values("cell")
+    found = modes_of(record)
+    points, cells = found.mesh.points, found.mesh.cells
     labels = np.arange(1, len(points) + 1)
     zero = np.zeros(len(points), dtype=int)
     sets: list[Any] = [
@@ -71,12 +69,11 @@ def modes(record: Record, path: Path) -> None:
     solid = _SOLIDS.get(cells.shape[1])
     if solid is not None:
         sets.append({"type": 2412, solid[1]: list(_elements(cells[:, : solid[0]] + 1, solid[1]))})
-    frequencies, shapes, word = shapes_of(record)
     rigid = record.attributes.get("rigid") or {}  # of a file of an older version
     ratio = float(record.attributes.get("damping_ratio", rigid.get("damping_ratio", 0.0)))
-    for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
-        given = (number, float(frequency), ratio, labels, shape)
-        sets.append(mode_dataset(*given, title=word, quantity="displacement, kg^-0.5", mass=1.0))
+    for place, (name, frequency) in enumerate(found.rows):
+        given = (place + 1, frequency, ratio, labels, found.shape(place))
+        sets.append(mode_dataset(*given, name=name, quantity="displacement, kg^-0.5", mass=1.0))
     write_universal(sets, path)
 
 
@@ -175,7 +172,7 @@ def _troubles(statuses: list[str], what: str) -> tuple[str, ...]:
     return (f"left out: the status; {len(bad)} of {len(statuses)} {what} are not ok, such as: {bad[0]}",)
 
 
-WRITERS = {"modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
+WRITERS = {"modes": modes, "ring-modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
 
 
 def _headers(record: Record) -> list[dict[str, Any]]:

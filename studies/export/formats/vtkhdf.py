@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -19,8 +19,11 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.modal.cyclic_modes import RingModes
+from vanedamp.modal.interference import Interference
 from vanedamp.studies.export.export import INPUT, Option
 from vanedamp.studies.export.record import Record, read_record
+from vanedamp.studies.ring_mesh import whole_ring, with_parts
 
 SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"
 ENDINGS = (".vtkhdf",)
@@ -49,29 +52,24 @@ class Mesh(NamedTuple):
 def modes(record: Record, path: Path, mode: int | None = None, frames: int | None = None) -> None:
     """Write a field a mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
 
-    Of a rotating structure with gyroscopic coupling, the complex modes: their real and imaginary parts as fields, or
-    animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there and too few frames.
+    Complex modes, of a rotating structure with gyroscopic coupling and the waves of a ring, on all of its sectors: real
+    and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there
+    and too few frames.
     """
-    mesh = _mesh(record)
-    frequencies, shapes, word = shapes_of(record)
+    found = modes_of(record)
     if mode is None:
         if frames is not None:
             raise InputError("--frames: is for one mode; name it by --mode")
-        fields: dict[str, np.ndarray] = {}
-        for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
-            name = f"{word} {number}: {frequency:.6g} Hz"
-            if np.iscomplexobj(shape):
-                fields |= {f"{name}, real": shape.real, f"{name}, imaginary": shape.imag}
-            else:
-                fields[name] = shape
-        _write(path, mesh, fields)
+        _check_size(len(found.names), len(found.mesh.points), "take one by --mode")
+        named = ((f"{name}: {hz:.6g} Hz", found.shape(k)) for k, (name, hz) in enumerate(found.rows))
+        _write(path, found.mesh, with_parts(named))
         return
-    if not 1 <= mode <= len(shapes):
-        raise InputError(f"--mode: expected 1 to {len(shapes)}, not {mode}")
+    if not 1 <= mode <= len(found.names):
+        raise InputError(f"--mode: expected 1 to {len(found.names)}, not {mode}")
     steps = 24 if frames is None else frames
     if steps < 2:
         raise InputError(f"--frames: expected at least 2, not {steps}")
-    frequency, shape = frequencies[mode - 1], shapes[mode - 1]
+    mesh, frequency, shape = found.mesh, found.frequencies_hz[mode - 1], found.shape(mode - 1)
     phases = 2.0 * np.pi * np.arange(steps) / steps
     times = phases / (2.0 * np.pi * frequency) if frequency > 0.0 else phases
     _write_steps(path, mesh, times, ((shape * np.exp(1j * phase)).real for phase in phases))
@@ -128,20 +126,42 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     return ("displacements: the yielding of the massless boundary itself is left out",) if residual else ()
 
 
-WRITERS = {"modes": modes, "response": response}
+WRITERS = {"modes": modes, "ring-modes": modes, "response": response}
 
 
-def shapes_of(record: Record) -> tuple[np.ndarray, list[np.ndarray], str]:
-    """Return frequencies (m,), Hz, shapes (n, 3) of the modes in a record, and their names.
+class ModesOnMesh(NamedTuple):
+    """The modes of a record: their mesh, frequencies (m,), names, and a function of a mode's place: shape (n, 3).
 
-    The shapes are complex where the record has those with the gyroscopic coupling.
+    The shapes are complex where the record has those with the gyroscopic coupling, and of waves of a ring.
     """
+
+    mesh: Mesh
+    frequencies_hz: np.ndarray
+    names: list[str]
+    shape: Callable[[int], np.ndarray]
+
+    @property
+    def rows(self) -> Iterator[tuple[str, float]]:
+        """Name and frequency of each mode."""
+        return zip(self.names, self.frequencies_hz.tolist(), strict=True)
+
+
+def modes_of(record: Record) -> ModesOnMesh:
+    """Return the modes in a record of `vanedamp modal`, or of `vanedamp ring` on the whole ring. Raises InputError."""
+    mesh = _mesh(record)
+    if record.kind == "ring-modes":
+        waves = record.source if isinstance(record.source, RingModes) else RingModes.load(record.source)
+        ring = whole_ring(waves, mesh.points, mesh.cells)
+        names = [Interference.of(waves).name(mode) for mode in range(len(waves))]
+        on = Mesh(ring.points, ring.cells, mesh.cell_type)
+        return ModesOnMesh(on, waves.frequencies_hz, names, lambda mode: ring.shape(waves, mode))
     if "gyroscopic_frequency" in record.variables:
         real, imaginary = (record.values(f"gyroscopic_shape_{part}") for part in ("real", "imaginary"))
         frequencies, shapes, word = record.values("gyroscopic_frequency"), real + 1j * imaginary, "gyroscopic mode"
     else:
         frequencies, shapes, word = record.values("frequency"), record.values("shape"), "mode"
-    return frequencies, [shape.reshape(-1, 3) for shape in shapes], word
+    names = [f"{word} {number}" for number in range(1, len(shapes) + 1)]
+    return ModesOnMesh(mesh, frequencies, names, lambda mode: shapes[mode].reshape(-1, 3))
 
 
 def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
@@ -157,7 +177,7 @@ def _differ(values: np.ndarray, others: np.ndarray) -> bool:
 
 def _mesh(record: Record) -> Mesh:
     missing = [name for name in ("coordinates", "cell") if name not in record.variables]
-    if record.kind != "modes" or missing or "vtk_cell_type" not in record.attributes:
+    if record.kind not in ("modes", "ring-modes") or missing or "vtk_cell_type" not in record.attributes:
         raise InputError(f"{record.file}: holds no modes with their mesh; `vanedamp modal CASE.toml -o` writes them")
     return Mesh(record.values("coordinates"), record.values("cell"), int(record.attributes["vtk_cell_type"]))
 
@@ -172,11 +192,7 @@ def _write(path: Path, mesh: Mesh, fields: Mapping[str, np.ndarray]) -> None:
 def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fields: Iterator[np.ndarray]) -> None:
     """Write the field `displacement` at times, s: the mesh is written once, every step names it by its offsets."""
     steps, count = len(times), len(mesh.points)
-    if 24.0 * steps * count > _MOST_BYTES:
-        raise InputError(
-            f"{steps} steps of {count} nodes take {24e-9 * steps * count:.3g} GB; at most {_MOST_BYTES / 1e9:.0f} GB: "
-            "take fewer periods, samples or frames"
-        )
+    _check_size(steps, count, "take fewer periods, samples or frames")
     with _file(path, mesh) as root:
         field = root.create_group("PointData").create_dataset(
             "displacement", shape=(steps * count, 3), dtype=float, chunks=(min(count, 65536), 3), compression="gzip",
@@ -192,6 +208,15 @@ def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fi
         group["NumberOfParts"] = np.ones(steps, np.int64)
         group["CellOffsets"], group["ConnectivityIdOffsets"] = still[:, None], still[:, None]
         group.create_group("PointDataOffsets")["displacement"] = np.arange(steps, dtype=np.int64) * count
+
+
+def _check_size(fields: int, nodes: int, remedy: str) -> None:
+    """Raise InputError for fields that are too large."""
+    if 24.0 * fields * nodes > _MOST_BYTES:
+        raise InputError(
+            f"{fields} fields of {nodes} nodes take {24e-9 * fields * nodes:.3g} GB; at most "
+            f"{_MOST_BYTES / 1e9:.0f} GB: {remedy}"
+        )
 
 
 @contextmanager

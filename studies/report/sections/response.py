@@ -16,7 +16,7 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.ring_charts import sectors_shown
+from vanedamp.studies.report.sector_charts import sectors_shown
 from vanedamp.studies.report.strength import contacts_shown, spots_shown
 from vanedamp.studies.report.time_history import History, history_figure
 

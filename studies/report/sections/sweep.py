@@ -54,7 +54,7 @@ from vanedamp.studies.report.map_chart import (
 )
 from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.ring_charts import ring_shown
+from vanedamp.studies.report.sector_charts import ring_shown
 from vanedamp.studies.report.strength import sweep_shown
 
 ORDER = 50

@@ -1,0 +1,244 @@
+"""A ring of equal sectors from the finite elements of one: a real symmetric problem for every nodal diameter.
+
+Sector j of N is sector 0 turned by j alpha, alpha = 2 pi / N, with displacements u_j in its own, turned axes. The
+ring's motions split into waves u_j = z exp(i h j alpha) of the nodal diameters h = 0 .. N // 2. On the face `high` a
+sector moves as its neighbour on `low`: z(high) = exp(i h alpha) R z(low), R the turn by alpha. With z = T_h y, the
+matrices T_h^H K T_h are Hermitian: symmetric for h = 0 and N / 2, else of a real form with twice as many freedoms, in
+which every frequency is a pair: a cosine and a sine around the ring. Thomas (1979), Int. J. Numer. Methods Eng. 14.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+
+from vanedamp.files import store
+from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, paired, rotation
+from vanedamp.modal.matrices import SystemMatrices, patch_average, unit_direction
+
+# directions in which a node on the axis obeys u = exp(i h alpha) R u to this
+_NULL = 1e-9
+
+
+def aliased(order: int, sectors: int) -> tuple[int, int]:
+    """Return the nodal diameter h that an engine order excites, and its sense.
+
+    Sense: 1 for an order k N + h, whose phase goes from sector to sector as that of the order h; -1 for k N - h, whose
+    phase goes the other way; 0 for h = 0 and N / 2, which have no sense. Raises CyclicError for no whole order.
+    """
+    if order != int(order) or order < 0:
+        raise CyclicError(f"order: expected a whole number of at least 0, not {order}")
+    rest = int(order) % sectors
+    if rest == 0 or 2 * rest == sectors:
+        return rest, 0
+    return (rest, 1) if 2 * rest < sectors else (sectors - rest, -1)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Springs from every sector to the next, between the mean displacements of two patches.
+
+    low, high  patches: `high` of a sector and `low` of the next one
+    stiffness  (3,) N/m along the axes x, y, z of sector 0, turned with the sector of `high`
+
+    Raises CyclicError unless the stiffnesses are finite, not negative and not all zero.
+    """
+
+    low: str
+    high: str
+    stiffness: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        values = self.stiffness
+        if len(values) != 3 or not all(math.isfinite(value) and value >= 0.0 for value in values) or not any(values):
+            raise CyclicError(f"ring.spring.stiffness: expected N/m along x, y, z, not {values}")
+
+
+@dataclass(frozen=True, eq=False)
+class Diameter:
+    """The problem of one nodal diameter.
+
+    number     h
+    matrices   real and symmetric; 3 m freedoms, 6 m of the real form (real parts, then imaginary parts)
+    expansion  (N, 3 m) complex CSR: T_h, from its freedoms to displacements of a sector
+    """
+
+    number: int
+    matrices: SystemMatrices
+    expansion: sparse.csr_array
+
+    @property
+    def travels(self) -> bool:
+        """Whether it has waves of two senses: 0 < h < N / 2."""
+        return self.matrices.size > self.expansion.shape[1]
+
+    def real_form(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """Return T^H A T of a sector's matrix A (N, N), symmetric, skew or Hermitian, as a real matrix."""
+        return _real_form(self.expansion, matrix, self.travels)
+
+    def fields(self, rows: np.ndarray) -> np.ndarray:
+        """Return displacements (k, N), complex, of rows (k, size) of the problem's freedoms, complex ones too."""
+        if not self.travels:
+            return np.asarray((self.expansion @ rows.T).T)
+        half = rows.shape[1] // 2
+        return np.asarray((self.expansion @ (rows[:, :half] + 1j * rows[:, half:]).T).T)
+
+    def forces(self, load: np.ndarray) -> np.ndarray:
+        """Return the load (size,) on the problem's freedoms of a real or complex one (N,) on a sector."""
+        reduced = self.expansion.conj().T @ load
+        return np.concatenate([reduced.real, reduced.imag]) if self.travels else np.asarray(reduced.real)
+
+
+@dataclass(frozen=True, eq=False)
+class CyclicSector:
+    """One sector of a ring.
+
+    matrices     of the sector, with both faces free
+    sectors      N, at least 2
+    axis, point  (3,) unit vector, and (3,) m, a point of the axis: a positive turn brings `low` to `high`
+    low, high    (k,) nodes in pairs; none of separate structures. A node on the axis is paired with itself
+    distance     m, largest of a pair, once turned
+    couplings    springs between neighbours
+    """
+
+    matrices: SystemMatrices
+    sectors: int
+    axis: np.ndarray
+    point: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    distance: float = 0.0
+    couplings: tuple[Spring, ...] = ()
+
+    @property
+    def angle(self) -> float:
+        """Angle of a sector, rad."""
+        return 2.0 * math.pi / self.sectors
+
+    @property
+    def diameters(self) -> range:
+        """All nodal diameters, 0 to N // 2."""
+        return range(self.sectors // 2 + 1)
+
+    def turn(self, sectors: int = 1) -> np.ndarray:
+        """Return the matrix (3, 3) that turns a vector by so many sectors."""
+        return rotation(self.axis, sectors * self.angle)
+
+    def at(self, diameter: int) -> Diameter:
+        """Return the problem of a nodal diameter. Raises CyclicError for one that the ring does not have."""
+        if diameter not in self.diameters:
+            raise CyclicError(f"diameter: expected 0 to {self.sectors // 2} of {self.sectors} sectors, not {diameter}")
+        given, travels = self.matrices, self.travels(diameter)
+        expansion, kept, fixed = self._expansion(diameter, travels)
+        copies = 2 if travels else 1
+        matrices = SystemMatrices(
+            stiffness=_real_form(expansion, self.stiffness(diameter), travels),
+            mass=_real_form(expansion, given.mass, travels),
+            coordinates=np.tile(given.coordinates[kept], (copies, 1)),
+            fixed=np.concatenate([fixed + copy * 3 * kept.size for copy in range(copies)]),
+            patches={},
+            damping_ratio=given.damping_ratio,
+            provenance=dict(given.provenance) | {"sectors": self.sectors, "diameter": diameter},
+        )
+        return Diameter(diameter, matrices, expansion)
+
+    def couplers(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Return for every spring the functionals (3, N) of `high` and of the next sector's `low`, and its stiffness.
+
+        The stretch is high q_j - low q_(j+1), in the axes of sector j.
+        """
+        given, turn = self.matrices, self.turn()
+        return [
+            (
+                np.array([patch_average(given, spring.high, axis) for axis in np.eye(3)]),
+                turn @ np.array([patch_average(given, spring.low, axis) for axis in np.eye(3)]),
+                np.array(spring.stiffness),
+            )
+            for spring in self.couplings
+        ]
+
+    def travels(self, diameter: int) -> bool:
+        """Say whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
+        return 0 < 2 * diameter < self.sectors
+
+    def stiffness(self, diameter: int) -> sparse.csr_array:
+        """Return the stiffness (N, N) for a wave z exp(i h j alpha), Hermitian: with the springs between neighbours."""
+        total = self.matrices.stiffness
+        for high, low, stiffness in self.couplers():
+            stretch = sparse.csr_array(high - np.exp(1j * diameter * self.angle) * low)
+            total = total + stretch.conj().T @ (sparse.diags(stiffness) @ stretch)
+        return sparse.csr_array(total)
+
+    def _expansion(self, diameter: int, travels: bool) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
+        """Return T_h (N, 3 m), the kept nodes (m,), and the fixed ones (f,) of its freedoms."""
+        count, phase = len(self.matrices.coordinates), np.exp(1j * diameter * self.angle)
+        central = self.low[self.low == self.high]
+        off = self.low != self.high
+        low, high = self.low[off], self.high[off]
+        kept = np.setdiff1d(np.arange(count), high)
+        place = np.full(count, -1)
+        place[kept] = np.arange(kept.size)
+        own = np.setdiff1d(kept, central)
+        blocks = [(own, own, np.eye(3)), (high, low, phase * self.turn())]
+        fixed = np.isin(3 * kept[:, None] + np.arange(3), self.matrices.fixed)
+        for node in central:
+            directions = self._on_axis(np.flatnonzero(fixed[place[node]]), phase, travels)
+            blocks.append((np.array([node]), np.array([node]), directions))
+            fixed[place[node]] = ~np.any(directions, axis=0)
+        rows = [3 * node[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 3), int) for node, _, _ in blocks]
+        columns = [3 * place[of][:, None, None] + np.zeros((3, 1), int) + np.arange(3) for _, of, _ in blocks]
+        values = [np.broadcast_to(block, (node.size, 3, 3)) for node, _, block in blocks]
+        joined = (np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns))
+        data, row, column = joined
+        expansion = sparse.csr_array((data, (row, column)), shape=(3 * count, 3 * kept.size), dtype=complex)
+        expansion.eliminate_zeros()
+        return expansion, kept, np.flatnonzero(fixed)
+
+    def _on_axis(self, held: np.ndarray, phase: complex, travels: bool) -> np.ndarray:
+        """Return the motions (3, 3) of a node on the axis, u = exp(i h alpha) R u, as columns, zeros after the last."""
+        bound = np.vstack([phase * self.turn() - np.eye(3), np.eye(3)[held]])
+        free = linalg.null_space(bound if travels else bound.real, rcond=_NULL)
+        return np.pad(free, ((0, 0), (0, 3 - free.shape[1])))
+
+
+def _real_form(expansion: sparse.csr_array, matrix: sparse.csr_array, travels: bool) -> sparse.csr_array:
+    product = expansion.conj().T @ (matrix @ expansion)
+    if not travels:
+        return sparse.csr_array(product.real)
+    return sparse.csr_array(sparse.bmat([[product.real, -product.imag], [product.imag, product.real]], format="csr"))
+
+
+def cyclic_sector(
+    matrices: SystemMatrices,
+    low: str | None,
+    high: str | None,
+    sectors: int,
+    axis: Sequence[float] | np.ndarray = (0.0, 0.0, 1.0),
+    point: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+    couplings: Sequence[Spring] = (),
+    tolerance: float = TOLERANCE,
+) -> CyclicSector:
+    """Return the sector of a ring, the nodes of its faces in pairs.
+
+    low, high  patches: the faces, of which a positive turn about the axis by the angle of a sector brings the first to
+               the second; None of separate structures, which only springs couple
+    tolerance  largest distance of two nodes that are one, over the size of the sector
+
+    Raises CyclicError where the faces do not fit, and MatricesError for unknown patches and no axis.
+    """
+    if sectors != int(sectors) or sectors < 2:
+        raise CyclicError(f"ring.sectors: expected a whole number of at least 2, not {sectors}")
+    if (low is None) != (high is None) or (low is None and not couplings):
+        raise CyclicError("ring.low: give the faces low and high, or springs between separate structures")
+    direction, origin = store.frozen(unit_direction(axis)), store.frozen(point)
+    nodes = ends = np.empty(0, dtype=np.int64)
+    distance = 0.0
+    if low is not None and high is not None:
+        nodes, ends, distance = paired(matrices, low, high, int(sectors), direction, origin, tolerance)
+    for spring in couplings:
+        matrices.patch(spring.low), matrices.patch(spring.high)
+    return CyclicSector(matrices, int(sectors), direction, origin, nodes, ends, distance, tuple(couplings))

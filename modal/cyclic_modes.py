@@ -1,0 +1,244 @@
+"""Modes of a ring of equal sectors: frequencies over nodal diameters, and shapes on one sector."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg, sparse
+
+from vanedamp.files import store
+from vanedamp.files.display import Displayed
+from vanedamp.modal.algebra import first_largest
+from vanedamp.modal.cyclic import CyclicSector, Diameter, aliased
+from vanedamp.modal.cyclic_faces import CyclicError, rotation
+from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
+
+_KIND = "ring-modes"
+# of the squared length of a field: less is round-off of fields that the others determine
+_DEPENDENT = 1e-12
+
+
+class Meeting(NamedTuple):
+    """A natural frequency met by an engine order.
+
+    order, diameter, sense  of the excitation and as `cyclic.aliased` has them
+    family                  of the diameter
+    frequency_hz            of both
+    speed                   rad/s, at which they are equal, if the frequency does not change with the speed
+    """
+
+    order: int
+    diameter: int
+    sense: int
+    family: int
+    frequency_hz: float
+    speed: float
+
+
+class Family(NamedTuple):
+    """Modes of one diameter: frequencies (k,), Hz, residuals (k,) and complex shapes (k, n)."""
+
+    diameter: int
+    frequencies_hz: np.ndarray
+    residuals: np.ndarray
+    shapes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RingModes(Displayed):
+    """Undamped modes of a ring of N sectors, by nodal diameter, lowest first.
+
+    In the axes of sector j, turned with it, a mode moves by u_j = Re(z exp(i (omega t + h j alpha))). For 0 < h < N / 2
+    it is a pair of one frequency, of which z and its conjugate, with -h, are the two waves.
+
+    sectors         N
+    axis, point     (3,) unit vector, and (3,) m, a point of the axis
+    diameters       (m,) h. With gyroscopic coupling h > 0 is the wave against the turn about the axis, -h the one with
+                    it, each with its own frequency
+    families        (m,) order within the diameter, from 0
+    frequencies_hz  (m,)
+    residuals       (m,) as those of modal.eigen.Modes
+    shapes          (m, n) kg^-1/2, complex z on sector 0: the modal mass over the ring is 1, that is N z^H M z = 1 for
+                    h = 0 and N / 2 (real z), and (N / 2) z^H M z = 1 else. Its largest component is real and positive
+    provenance      of the matrices (JSON-able)
+    """
+
+    sectors: int
+    axis: np.ndarray
+    point: np.ndarray
+    diameters: np.ndarray
+    families: np.ndarray
+    frequencies_hz: np.ndarray
+    residuals: np.ndarray
+    shapes: np.ndarray
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("axis", "point", "frequencies_hz", "residuals"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name)))
+        for name in ("diameters", "families"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name), np.int64))
+        object.__setattr__(self, "shapes", store.frozen(self.shapes, complex))
+        lengths = {len(getattr(self, name)) for name in (*_COLUMNS, "shapes")}
+        if len(lengths) != 1 or self.shapes.ndim != 2:
+            raise CyclicError(f"modes: shapes {self.shapes.shape} do not fit {len(self.diameters)} diameters")
+        object.__setattr__(self, "provenance", dict(self.provenance))
+
+    def __len__(self) -> int:
+        return len(self.frequencies_hz)
+
+    @property
+    def angle(self) -> float:
+        """Angle of a sector, rad."""
+        return 2.0 * np.pi / self.sectors
+
+    @property
+    def table(self) -> np.ndarray:
+        """Frequencies (diameters, families), Hz, of the diameters in ascending order; nan where there is none."""
+        known = np.unique(self.diameters)
+        found = np.full((known.size, int(self.families.max()) + 1), np.nan)
+        found[np.searchsorted(known, self.diameters), self.families] = self.frequencies_hz
+        return found
+
+    def interference(self, orders: Iterable[int]) -> tuple[Meeting, ...]:
+        """Return where engine orders, of at least 1, meet the frequencies of the diameters that they excite."""
+        return tuple(
+            Meeting(order, diameter, sense, int(self.families[k]), hz := float(self.frequencies_hz[k]),
+                    2.0 * np.pi * hz / order)
+            for order in orders
+            for diameter, sense in [aliased(order, self.sectors)]
+            for k in np.flatnonzero(self.diameters == (diameter if diameter in self.diameters else -diameter))
+        )  # fmt: skip
+
+    def whole(self, mode: int, phase: float = 0.0) -> np.ndarray:
+        """Return the displacements (N, n_nodes, 3) of all sectors in the global axes, at a phase omega t (rad)."""
+        steps = np.arange(self.sectors) * self.angle
+        turned = np.exp(1j * (phase + self.diameters[mode] * steps))
+        own = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
+        turns = np.array([rotation(self.axis, step) for step in steps])
+        return np.einsum("sij,snj->sni", turns, own)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        variables: Mapping[str, store.Variable] | None = None,
+        attributes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write an HDF5 record; further variables (over "mode", "dof") and attributes, as of the mesh, ride along."""
+        own = {
+            name: store.Variable(getattr(self, column), ("mode",), units) for column, (name, units) in _COLUMNS.items()
+        }
+        own |= {
+            "shape_real": store.Variable(self.shapes.real, ("mode", "dof"), "kg^-0.5"),
+            "shape_imaginary": store.Variable(self.shapes.imag, ("mode", "dof"), "kg^-0.5"),
+        }
+        named = {"sectors": self.sectors, "axis": self.axis, "point": self.point, "provenance": dict(self.provenance)}
+        store.save(path, _KIND, own | dict(variables or {}), named | dict(attributes or {}))
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> RingModes:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, _KIND)
+        return cls(
+            sectors=int(attributes["sectors"]),
+            axis=np.array(attributes["axis"]),
+            point=np.array(attributes["point"]),
+            **{column: values[name] for column, (name, _) in _COLUMNS.items()},
+            shapes=values["shape_real"] + 1j * values["shape_imaginary"],
+            provenance=json.loads(attributes["provenance"]),
+        )
+
+
+#: arrays by their fields: name and unit in the record
+_COLUMNS = {
+    "diameters": ("diameter", "1"), "families": ("family", "1"), "frequencies_hz": ("frequency", "Hz"),
+    "residuals": ("residual", "1"),
+}  # fmt: skip
+
+
+def ring_modes(
+    sector: CyclicSector,
+    count: int = 10,
+    max_frequency: float | None = None,
+    diameters: Iterable[int] | None = None,
+    report: Callable[[int, int], None] | None = None,
+    solver: str = "auto",
+) -> RingModes:
+    """Return the lowest `count` modes of every nodal diameter, or all up to `max_frequency` (Hz).
+
+    diameters  the ones wanted (default: all)
+    report     called with the number of diameters done, and of all
+    solver     as in modal.eigen.solve_modes, whose counts prove that no mode of a diameter is missed
+
+    Raises CyclicError for a diameter that the ring does not have, and SolverError.
+    """
+    wanted = list(sector.diameters if diameters is None else diameters)
+    found: list[Family] = []
+    for done, number in enumerate(wanted):
+        if report is not None:
+            report(done, len(wanted))
+        problem = sector.at(number)
+        copies = 2 if problem.travels else 1
+        try:
+            most = min(copies * count, problem.matrices.free.size)
+            modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
+        except NoModesError:
+            continue
+        found.append(_of_diameter(sector, problem, modes))
+        provenance = modes.provenance
+    if not found:
+        raise NoModesError(f"max_frequency: the ring has no mode up to {max_frequency} Hz; raise it")
+    return gathered(sector, found, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})
+
+
+def gathered(sector: CyclicSector, found: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
+    """Return the record of modes by diameter."""
+    numbers, frequencies, residuals, shapes = zip(*found, strict=True)
+    counts = [len(values) for values in frequencies]
+    return RingModes(
+        sector.sectors,
+        sector.axis,
+        sector.point,
+        np.repeat(numbers, counts),
+        np.concatenate([np.arange(size) for size in counts]),
+        np.concatenate(frequencies),
+        np.concatenate(residuals),
+        np.concatenate(shapes),
+        provenance,
+    )
+
+
+def _of_diameter(sector: CyclicSector, problem: Diameter, modes: Modes) -> Family:
+    """Return the modes of one diameter, each pair once."""
+    fields, frequencies, residuals = problem.fields(modes.shapes), modes.frequencies_hz, modes.residuals
+    if problem.travels:
+        # both vectors of a pair lead to one complex field times some factor; Ritz vectors separate the families
+        residuals = residuals.reshape(-1, 2).max(axis=1)
+        basis = independent(fields, sector.matrices.mass)
+        _, vectors = linalg.eigh(basis.conj() @ (sector.stiffness(problem.number) @ basis.T))
+        fields = vectors.T[: residuals.size] @ basis
+        frequencies = np.sqrt(np.mean(frequencies.reshape(-1, 2) ** 2, axis=1))
+    return Family(problem.number, frequencies, residuals, scaled(sector, fields, problem.travels))
+
+
+def independent(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """Return mass-orthonormal combinations (r, n) of complex fields (k, n), r of which are independent."""
+    for _ in range(2):  # once more, as the smallest have few digits at first
+        values, turns = linalg.eigh(fields.conj() @ (mass @ fields.T))
+        own = values > _DEPENDENT * values[-1]
+        fields = (turns[:, own] / np.sqrt(values[own])).T @ fields
+    return fields
+
+
+def scaled(sector: CyclicSector, fields: np.ndarray, travels: bool) -> np.ndarray:
+    """Return complex fields (k, n) of a sector with modal mass 1 over the ring, the largest component positive."""
+    masses = np.einsum("ij,ij->i", fields.conj(), (sector.matrices.mass @ fields.T).T).real
+    masses = masses * sector.sectors * (0.5 if travels else 1.0)
+    largest = np.array([field[first_largest(np.abs(field))] for field in fields])
+    return np.asarray(fields * (np.abs(largest) / largest / np.sqrt(masses))[:, None])

@@ -1,0 +1,34 @@
+"""Static solutions and stability of a ring, from one of its sectors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import sparse
+
+from vanedamp.modal.cyclic import CyclicSector
+from vanedamp.modal.eigen import stable_share, static_shape
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.statics import Statics
+
+
+class RingStatics(Statics):
+    """Those of a ring whose sectors are all loaded alike.
+
+    sector_of  returns the sector of the ring from its matrices
+    """
+
+    def __init__(self, sector_of: Callable[[SystemMatrices], CyclicSector]) -> None:
+        self._sector_of = sector_of
+
+    def shape(self, matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
+        """Return the displacements (N,), m, of a sector under a load (N,), N, on each."""
+        problem = self._sector_of(matrices).at(0)
+        return problem.fields(static_shape(problem.matrices, problem.forces(load))[None])[0].real
+
+    def stable_share(self, matrices: SystemMatrices, added: sparse.csr_array) -> float:
+        """Return the largest fraction that leaves the ring stable in every nodal diameter."""
+        sector = self._sector_of(matrices)
+        problems = (sector.at(diameter) for diameter in sector.diameters)
+        return min(stable_share(problem.matrices, problem.real_form(added)) for problem in problems)

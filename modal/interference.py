@@ -1,0 +1,188 @@
+"""Interference of engine orders with the modes of a ring: the diameter that each order excites, and where they meet.
+
+An engine order r has r periods around the circumference and r speed / (2 pi) Hz in the ring's frame. On N equal sectors
+it acts as the nodal diameter h with r = k N + h or r = k N - h, and excites no mode of another one. Over diameter and
+frequency the orders of a speed lie on a line through the origin that is folded at N/2 and 0 (SAFE diagram: Singh,
+Vargo, Schiffer and Dello (1988), Proceedings of the 17th Turbomachinery Symposium).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from vanedamp.files import store
+from vanedamp.files.display import Plotted
+from vanedamp.modal.campbell import Crossing
+from vanedamp.modal.cyclic import aliased
+from vanedamp.modal.cyclic_modes import RingModes
+from vanedamp.modal.speed_range import RPM
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Interference(Plotted):
+    """Modes of a ring, and the engine orders that meet them.
+
+    modes          of the ring, at `speed`, which is in rad/s; None: the ring does not turn
+    orders         engine orders that are considered, whole numbers from 1
+    operating      lowest and highest speed of operation, rad/s; None: not known
+    speeds         (s,) rad/s, ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds
+    over_speed_hz  (m, s) frequencies there; nan where a mode is not among those computed
+    """
+
+    modes: RingModes
+    orders: tuple[int, ...]
+    speed: float | None = None
+    operating: tuple[float, float] | None = None
+    speeds: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    over_speed_hz: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        for name in ("speeds", "over_speed_hz"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name)))
+
+    @classmethod
+    def of(cls, modes: RingModes, orders: Sequence[int] | None = None, **known: Any) -> Interference:
+        """Return the modes of a ring with engine orders, by default 1 to N; known: further fields."""
+        return cls(modes, tuple(orders or range(1, modes.sectors + 1)), **known)
+
+    @property
+    def diameters(self) -> np.ndarray:
+        """Nodal diameters (m,) of the modes, without the sense of waves."""
+        return np.abs(self.modes.diameters)
+
+    @property
+    def top(self) -> float:
+        """The highest frequency that a diagram shows, Hz."""
+        return 1.06 * float(self.modes.frequencies_hz.max())
+
+    def excited(self, order: int) -> int:
+        """Return the only nodal diameter that an engine order excites, signed as those of the modes.
+
+        To a ring that turns, a load at rest runs backwards: the order h excites the wave against the turn (h), N - h
+        the one with it (-h), where gyroscopic coupling parts them.
+        """
+        diameter, sense = aliased(order, self.modes.sectors)
+        return -diameter if sense < 0 and -diameter in self.modes.diameters else diameter
+
+    def exciting(self, diameter: int) -> list[int]:
+        """Return the engine orders that excite a nodal diameter of the modes."""
+        return [order for order in self.orders if self.excited(order) == diameter]
+
+    def label(self, diameter: int) -> str:
+        """Return a nodal diameter of the modes for people."""
+        if diameter == 0 or -diameter not in self.modes.diameters:
+            return str(diameter)
+        return f"{diameter} backward" if diameter > 0 else f"{-diameter} forward"
+
+    def name(self, mode: int) -> str:
+        """Return a mode's diameter and family for people, families from 1."""
+        return f"diameter {self.label(int(self.modes.diameters[mode]))}, family {self.modes.families[mode] + 1}"
+
+    def by_diameter(self) -> list[tuple[int, list[float]]]:
+        """Return the diameters of the modes, ascending, each with its frequencies, Hz; nan where there is none."""
+        return list(zip(np.unique(self.modes.diameters).tolist(), self.modes.table.tolist(), strict=True))
+
+    @cached_property
+    def meetings(self) -> tuple[Crossing, ...]:
+        """Where an order has the frequency of a mode whose diameter it excites, by speed.
+
+        Over the speeds of the Campbell diagram, or of operation without one. Between its speeds the squared frequencies
+        are interpolated over the squared speed, on which those of one mode depend linearly.
+        """
+        found = [
+            Crossing(mode, float(order), speed, order * speed / (2.0 * np.pi))
+            for mode, diameter in enumerate(self.modes.diameters.tolist())
+            for order in self.exciting(diameter)
+            for speed in self._speeds_met(mode, order)
+        ]
+        return tuple(sorted(found, key=lambda each: (each.speed, each.mode)))
+
+    @property
+    def in_operation(self) -> tuple[Crossing, ...]:
+        """The meetings at speeds of operation."""
+        operating = self.operating
+        return () if operating is None else tuple(each for each in self.meetings if each.margin(operating) == 0.0)
+
+    def _speeds_met(self, mode: int, order: int) -> Iterator[float]:
+        """Yield the speeds, rad/s, at which an order has the frequency of a mode."""
+        per_speed = order / (2.0 * np.pi)
+        if not self.speeds.size:
+            speed = float(self.modes.frequencies_hz[mode]) / per_speed
+            if self.operating is not None and self.operating[0] <= speed <= self.operating[1] and speed > 0.0:
+                yield speed
+            return
+        known = np.isfinite(self.over_speed_hz[mode])
+        squares = self.speeds[known] ** 2
+        if squares.size < 2:
+            return
+        curve = CubicSpline(squares, self.over_speed_hz[mode, known] ** 2 - per_speed**2 * squares)
+        for root in np.unique(curve.roots(extrapolate=False)):
+            if root > 0.0:
+                yield float(np.sqrt(root))
+
+    @property
+    def folded_speeds(self) -> list[float]:
+        """The ends of the range of operation above zero, rad/s, whose engine orders a diagram shows."""
+        return [speed for speed in dict.fromkeys(self.operating or ()) if speed > 0.0]
+
+    def zigzag(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return diameters and frequencies (Hz) of the corners of the folded line of a speed, up to `top`."""
+        half = 0.5 * self.modes.sectors
+        fold = half * speed / (2.0 * np.pi)  # Hz between two corners
+        places = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
+        return half * (1.0 - np.abs(places % 2.0 - 1.0)), fold * places
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        modes = self.modes
+        return {
+            "sectors": modes.sectors,
+            "diameter": modes.diameters.tolist(),
+            "family": modes.families.tolist(),
+            "frequency_hz": modes.frequencies_hz.tolist(),
+            "residual": modes.residuals.tolist(),
+            "speed": self.speed,
+            "operating": self.operating,
+            "excited": {order: self.excited(order) for order in self.orders},
+            "meetings": [
+                asdict(each)
+                | {"diameter": int(modes.diameters[each.mode]), "family": int(modes.families[each.mode])}
+                | {"order": int(each.order), "rpm": each.rpm}
+                | {"margin": self.operating and each.margin(self.operating)}
+                for each in self.meetings
+            ],
+            "campbell": {"rpm": (self.speeds * RPM).tolist(), "frequency_hz": self.over_speed_hz.tolist()},
+        }
+
+    def riding(self) -> tuple[dict[str, store.Variable], dict[str, Any]]:
+        """Return the variables and attributes that ride along in the file of the ring's modes."""
+        variables = {"engine_order": store.Variable(np.array(self.orders, dtype=np.int64), ("engine_order",))}
+        if self.speeds.size:
+            variables |= {
+                "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
+                "frequency_over_speed": store.Variable(self.over_speed_hz, ("mode", "speed"), "Hz"),
+            }
+        given = {"at_speed": self.speed, "operating": self.operating and list(self.operating)}
+        return variables, {name: value for name, value in given.items() if value is not None}
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> Interference:
+        """Read the record of a ring's modes. Raises files.store.StoreError."""
+        modes = RingModes.load(path)
+        values, attributes = store.load(path, "ring-modes")
+        return cls.of(
+            modes,
+            values["engine_order"].tolist() if "engine_order" in values else None,
+            speed=attributes.get("at_speed"),
+            operating=tuple(attributes["operating"]) if "operating" in attributes else None,
+            speeds=values.get("speed", np.zeros(0)),
+            over_speed_hz=values.get("frequency_over_speed", np.zeros((0, 0))),
+        )

@@ -1,0 +1,179 @@
+"""Linear response of every sector of a ring to an engine order, its peaks, and localised modes.
+
+An engine order r loads sector j by F sin(omega t - 2 pi r j / N). Responses are sums over poles,
+
+    U(omega) = sum of residues / (i omega - pole) + residual,
+
+U the complex amplitudes (N,) with the phase of the load on sector 0 as reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from vanedamp.files import store
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.ring_model import RingModel, sector_label
+
+# half-bandwidths around every resonance at which a response is sampled, and halvings of the bracket of a peak
+_AROUND = np.array([-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
+_ROUNDS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Forced:
+    """Response of N sectors over the frequency.
+
+    poles (p,) rad/s; residues (p, N); residual (N,) m: per force F of 1 N.
+    """
+
+    poles: np.ndarray
+    residues: np.ndarray
+    residual: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("poles", "residues", "residual"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name), complex))
+
+    def at(self, frequencies_hz: np.ndarray) -> np.ndarray:
+        """Return complex amplitudes (f, N), m/N."""
+        s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
+        return np.asarray((1.0 / (s[:, None] - self.poles)) @ self.residues + self.residual)
+
+    def peaks(self, low_hz: float, high_hz: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the largest amplitude (N,), m/N, of every sector between two frequencies, and where (N,), Hz."""
+        natural, width = np.abs(self.poles), np.maximum(-self.poles.real, 1e-6 * np.abs(self.poles))
+        near = (natural[:, None] + width[:, None] * _AROUND).ravel() / (2.0 * np.pi)
+        grid = np.unique(np.r_[low_hz, high_hz, near[(near > low_hz) & (near < high_hz)]])
+        best = np.argmax(np.abs(self.at(grid)), axis=0)
+        low, high = grid[np.maximum(best - 1, 0)], grid[np.minimum(best + 1, len(grid) - 1)]
+        for _ in range(_ROUNDS):  # the amplitude rises and falls once between neighbours of the largest sample
+            points = np.linspace(low, high, 5)
+            best = np.clip(np.argmax(self._own(points), axis=0), 1, 3)
+            sector = np.arange(points.shape[1])
+            low, high = points[best - 1, sector], points[best + 1, sector]
+        points = np.stack([low, 0.5 * (low + high), high])
+        values = self._own(points)
+        best = np.argmax(values, axis=0)
+        return values.max(axis=0), points[best, np.arange(points.shape[1])]
+
+    def _own(self, points: np.ndarray) -> np.ndarray:
+        """Return amplitudes (q, N) of every sector at its own frequencies (q, N)."""
+        terms = self.residues / (2j * np.pi * points[:, None, :] - self.poles[:, None])
+        return np.abs(terms.sum(axis=1) + self.residual)
+
+
+def forced_response(
+    model: RingModel | ReducedModel, order: int, frequencies_hz: np.ndarray, label: str, at: str | None = None,
+    deviations: Deviations | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Return the complex amplitudes (f, N), m/N, of every sector under an engine order of unit force at a label.
+
+    model       a reduced ring, or the ReducedModel of a whole one
+    label, at   interface labels of a sector where the force acts, and the response is taken (default: where it acts)
+    deviations  of the sectors of a reduced ring
+
+    Raises RingError for an unknown label, and a model that is no ring.
+    """
+    response = forced(model, order, label, at, deviations)
+    return response.at(np.asarray(frequencies_hz, dtype=float))
+
+
+def forced(
+    model: RingModel | ReducedModel, order: int, label: str, at: str | None = None,
+    deviations: Deviations | None = None, speed: float = 0.0,
+) -> Forced:  # fmt: skip
+    """Return the response to an engine order over all frequencies. Arguments and errors: see `forced_response`.
+
+    speed: of a reduced ring that rotates, rad/s.
+    """
+    if isinstance(model, RingModel):
+        return Natural.of(model, deviations, speed).forced(model, order, label, at)
+    ring = model.provenance.get("ring")
+    if ring is None:
+        raise RingError("model: no reduced ring; a force that turns around needs the sectors of one")
+    sectors = int(ring["sectors"])
+    places = [[place_of(model.interface, sector_label(one, j)) for j in range(sectors)] for one in (label, at or label)]
+    phases = _phases(order, sectors)
+    squares, shapes = model.natural
+    rows = model.selection @ shapes
+    residual = np.zeros(sectors, complex)
+    if model.residual_flexibility is not None:
+        residual = model.residual_flexibility[np.ix_(places[1], places[0])] @ phases
+    damping = shapes.T @ model.damping @ shapes
+    return _superposed(squares, damping, rows[places[1]], rows[places[0]].T @ phases, residual)
+
+
+class Natural(NamedTuple):
+    """All natural modes of a ring with deviations: squares (n,), shapes (n, n) in its waves, modal damping (n, n)."""
+
+    squares: np.ndarray
+    shapes: np.ndarray
+    damping: np.ndarray
+
+    @classmethod
+    def of(cls, ring: RingModel, deviations: Deviations | None = None, speed: float = 0.0) -> Natural:
+        """Return those of a ring at a speed, rad/s. Raises RingError where it can move freely or is unstable."""
+        deviations = deviations or Deviations()
+        mass, stiffness = ring.matrices(deviations, speed)
+        squares, shapes = linalg.eigh(stiffness, mass)
+        if squares[0] <= 0.0:
+            raise RingError("the ring can move freely, or is unstable at that speed: it has no response to compare")
+        damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
+        if (added := ring.added_damping(deviations)) is not None:
+            damping = damping + shapes.T @ added @ shapes
+        return cls(squares, shapes, damping)
+
+    def forced(self, ring: RingModel, order: int, label: str, at: str | None = None) -> Forced:
+        """Return the response to an engine order. Raises RingError for an unknown label."""
+        load = self.shapes.T @ load_of(ring, order, label)
+        rows = ring.rows[:, place_of(ring.interface, at or label)] @ self.shapes
+        return _superposed(self.squares, self.damping, rows, load, np.zeros(ring.sectors))
+
+
+def _superposed(
+    squares: np.ndarray, damping: np.ndarray, rows: np.ndarray, load: np.ndarray, residual: np.ndarray
+) -> Forced:
+    """Return the response rows @ q of modes (m,) with modal damping (m, m) to modal loads (m,)."""
+    count = len(squares)
+    diagonal = np.diag(damping)
+    if np.abs(damping - np.diag(diagonal)).max() <= 1e-9 * np.abs(damping).max():
+        root = np.sqrt(0.25 * diagonal**2 - squares + 0j)
+        poles = np.concatenate([-0.5 * diagonal + root, -0.5 * diagonal - root])
+        shares = np.concatenate([load / (2.0 * root), -load / (2.0 * root)])
+        return Forced(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual)
+    first = np.block([[np.zeros((count, count)), np.eye(count)], [-np.diag(squares), -damping]])
+    poles, vectors = linalg.eig(first)
+    shares = np.linalg.solve(vectors, np.concatenate([np.zeros(count), load]))
+    return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual)
+
+
+def load_of(ring: RingModel, order: int, label: str) -> np.ndarray:
+    """Return the load (n,), complex, of an engine order of unit force at a label on the waves of a reduced ring."""
+    return np.asarray(ring.rows[:, place_of(ring.interface, label)].T @ _phases(order, ring.sectors))
+
+
+def participation(shapes: np.ndarray) -> np.ndarray:
+    """Return the number of sectors (m,) that take part in shapes over sectors (N, m): (sum a^2)^2 / sum a^4.
+
+    1: one sector moves; N: all by the same amplitude; 2 N / 3: a standing wave of many sectors.
+    """
+    squares = np.abs(shapes) ** 2
+    return np.asarray(squares.sum(axis=0) ** 2 / (squares**2).sum(axis=0))
+
+
+def _phases(order: int, sectors: int) -> np.ndarray:
+    """Return the factors (N,) of the load on the sectors."""
+    return np.exp(-2j * np.pi / sectors * (order * np.arange(sectors) % sectors))
+
+
+def place_of(labels: tuple[str, ...], label: str) -> int:
+    """Return the number of an interface label. Raises RingError for an unknown one."""
+    if label not in labels:
+        raise RingError(f"label: no interface coordinate {label!r}; there are: {', '.join(labels)}")
+    return labels.index(label)

@@ -1,0 +1,161 @@
+"""Deviations of a ring's sectors from its measured modes, or from measured responses to an engine order.
+
+In the waves of the tuned ring, deviations d_j of the stiffness act on a motion beta at omega by
+
+    sum of d_j K_j beta = load - (Lambda - omega^2 + 2 i zeta omega sqrt(Lambda)) beta,
+
+linear in the deviations, with load and damping left out for natural modes: the fundamental mistuning model (Feiner and
+Griffin 2004, J. Turbomach. 126(1)) with the sectors' own stiffness. The displacement of one coordinate in every
+sector gives the N waves of one family; the other waves follow from deviations found before, in a few rounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vanedamp.files import store
+from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.forced import load_of, place_of
+from vanedamp.rom.ring.ring_model import RingModel
+
+_ROUNDS = 30
+_CONVERGED = 1e-10
+# of the largest singular value: a sector that no measured motion strains leaves the equations without its deviation
+_UNSEEN = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Deviations of a ring's stiffness from measurements.
+
+    stiffness  (N,) relative deviations of the part that deviates
+    errors     (N,) their standard deviations, from the misfit; nan without more equations than deviations
+    misfit     root mean square of what the equations leave, relative to omega^2 beta
+    force      N per unit of the responses' load as given, complex; 0 for natural modes
+    """
+
+    stiffness: np.ndarray
+    errors: np.ndarray
+    misfit: float
+    force: complex = 0j
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "errors"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name)))
+
+    @property
+    def deviations(self) -> Deviations:
+        """The same as deviations of the stiffness."""
+        return Deviations(stiffness=self.stiffness)
+
+
+def deviations_of_modes(
+    ring: RingModel, frequencies_hz: np.ndarray, shapes: np.ndarray, label: str, family: int = 0
+) -> Identified:
+    """Return deviations from measured natural frequencies (m,) and shapes (m, N) over the sectors, of any scale.
+
+    label   interface label of a sector where the shapes were measured
+    family  of the tuned ring to which the modes belong, from 0
+
+    Raises RingError for shapes that do not fit, an unknown label, and motions that leave a sector at rest.
+    """
+    return _identified(ring, np.asarray(frequencies_hz, float), np.asarray(shapes, complex), label, family, None)
+
+
+def deviations_of_responses(
+    ring: RingModel, frequencies_hz: np.ndarray, responses: np.ndarray, label: str, order: int, family: int = 0
+) -> Identified:
+    """Return deviations from measured complex responses (f, N) to an engine order at a label, of unknown amplitude.
+
+    The force is the same at all frequencies. Other arguments and errors: see `deviations_of_modes`.
+    """
+    return _identified(ring, np.asarray(frequencies_hz, float), np.asarray(responses, complex), label, family, order)
+
+
+def _identified(
+    ring: RingModel, frequencies_hz: np.ndarray, motions: np.ndarray, label: str, family: int, order: int | None
+) -> Identified:
+    if motions.shape != (len(frequencies_hz), ring.sectors):
+        raise RingError(f"shapes: expected {(len(frequencies_hz), ring.sectors)} values, not {motions.shape}")
+    own, rows = _family(ring, family), ring.rows[:, place_of(ring.interface, label)]
+    others = np.setdiff1d(np.arange(len(ring.squares)), own)
+    squares = (2.0 * np.pi * frequencies_hz) ** 2
+    found, rest = np.zeros(ring.sectors), np.zeros((len(squares), len(others)), complex)
+    for _ in range(_ROUNDS):
+        betas = np.zeros((len(squares), len(ring.squares)), complex)
+        betas[:, own] = np.linalg.solve(rows[:, own], (motions - rest @ rows[:, others].T).T).T
+        betas[:, others] = rest
+        equations, right = _equations(ring, squares, betas, own, label, order)
+        solution, errors, misfit = _least_squares(equations, right, ring.sectors)
+        before, found = found, solution[: ring.sectors]
+        force = complex(*solution[ring.sectors :]) if order is not None else 0j
+        load = force * load_of(ring, order or 0, label)[others]
+        rest = _others(ring, found, squares, betas[:, own], own, others, load)
+        if np.abs(found - before).max() <= _CONVERGED:
+            break
+    return Identified(found, errors, misfit, force)
+
+
+def _family(ring: RingModel, family: int) -> np.ndarray:
+    """Return the places (N,) of a family's waves among the coordinates of a ring."""
+    diameters = ring.diameters[: ring.modes]
+    pairs = [1 + (0 < 2 * number < ring.sectors) for number in range(ring.sectors // 2 + 1)]
+    found = [np.flatnonzero(diameters == number)[family * size :][:size] for number, size in enumerate(pairs)]
+    if any(len(places) < size for places, size in zip(found, pairs, strict=True)):
+        raise RingError(f"family: the ring has no family {family} of all nodal diameters; keep more, or name another")
+    return np.concatenate(found)
+
+
+def _equations(
+    ring: RingModel, squares: np.ndarray, betas: np.ndarray, own: np.ndarray, label: str, order: int | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return matrix and right-hand side of the real equations of the family's waves, relative to omega^2 beta."""
+    scale = 1.0 / (squares * np.linalg.norm(betas[:, own], axis=1))
+    waves, forces = ring.waves, np.empty((len(squares), len(own), ring.sectors), complex)
+    for sector in range(ring.sectors):  # K_j beta: to the sector's fields and back
+        strained = waves.at_sector(betas, -sector) @ ring.stiffness
+        forces[:, :, sector] = waves.at_sector(strained, sector)[:, own]
+    tuned = ring.squares[own] - squares[:, None]
+    columns = [forces]
+    if order is not None:
+        tuned = tuned + 2j * ring.damping_ratio * np.sqrt(squares[:, None] * ring.squares[own])
+        load = load_of(ring, order, label)[own]
+        columns.append(-np.broadcast_to(np.stack([load, 1j * load], axis=-1), (len(squares), len(own), 2)))
+    left = scale[:, None, None] * np.concatenate(columns, axis=2)
+    right = -scale[:, None] * tuned * betas[:, own]
+    left, right = left.reshape(-1, left.shape[2]), right.ravel()
+    return np.vstack([left.real, left.imag]), np.concatenate([right.real, right.imag])
+
+
+def _least_squares(left: np.ndarray, right: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the solution, standard deviations (N,) of the deviations, and the misfit."""
+    size = np.linalg.norm(left, axis=0)
+    if not np.all(size > 0.0):
+        raise RingError(f"shapes: sector {int(np.argmin(size))} is at rest in all of them; measure more modes")
+    u, values, v = np.linalg.svd(left / size, full_matrices=False)
+    if values[-1] <= _UNSEEN * values[0]:
+        raise RingError("shapes: they do not determine all deviations; measure more modes or frequencies")
+    solution = v.T @ ((u.T @ right) / values) / size
+    rest = left @ solution - right
+    active = int(np.count_nonzero(np.abs(left).max(axis=1) > 0.0))
+    spread = np.linalg.norm(v.T / values, axis=1) / size * np.linalg.norm(rest)
+    freedom = active - left.shape[1]
+    errors = spread / np.sqrt(freedom) if freedom > 0 else np.full(len(spread), np.nan)
+    return solution, errors[:sectors], float(np.linalg.norm(rest) / np.sqrt(max(active, 1)))
+
+
+def _others(
+    ring: RingModel, found: np.ndarray, squares: np.ndarray, betas: np.ndarray, own: np.ndarray, others: np.ndarray,
+    load: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return the other waves (m, r), complex, by a load (r,) and what deviations make of a family's (m, N)."""
+    added = ring.around("stiffness", found)
+    rigid = np.diag(ring.squares[others]) + added[np.ix_(others, others)]
+    forces = load - betas @ added[np.ix_(own, others)]
+    solved = [
+        np.linalg.solve(rigid - square * np.eye(len(others)), force)
+        for square, force in zip(squares, forces, strict=True)
+    ]
+    return np.array(solved).reshape(len(squares), len(others))

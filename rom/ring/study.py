@@ -1,0 +1,262 @@
+"""Amplification of a mistuned ring: one draw, and the statistics of many."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, NamedTuple, Protocol, cast
+
+import numpy as np
+
+from vanedamp.files import store
+from vanedamp.files.display import Displayed
+from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
+from vanedamp.rom.ring.forced import Forced, Natural, participation
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.whitehead import whitehead_bound
+
+_KIND = "mistuning"
+#: probabilities of the quantiles of a study
+PROBABILITIES = (0.5, 0.95, 0.99)
+# relative margins of the band around the frequencies of a family
+_MARGIN = 0.05
+_ARRAYS = {
+    "orders": (("order",), "1"),
+    "seeds": (("seed",), "1"),
+    "band_hz": (("edge",), "Hz"),
+    "tuned_amplitude": (("order",), "m/N"),
+    "tuned_frequency_hz": (("order",), "Hz"),
+    "amplification": (("order", "seed"), "1"),
+    "peak_frequency_hz": (("order", "seed"), "Hz"),
+    "worst_sector": (("order", "seed"), "1"),
+    "participation": (("order", "seed"), "1"),
+    "frequencies_hz": (("frequency",), "Hz"),
+    "amplitude": (("order", "frequency", "sector"), "m/N"),
+    "amplitude_tuned": (("order", "frequency"), "m/N"),
+    "stiffness": (("sector",), "1"),
+    "mass": (("sector",), "1"),
+    "damping": (("sector",), "1"),
+}
+_WHOLE = ("orders", "seeds", "worst_sector")
+
+
+class Amplification(NamedTuple):
+    """Largest amplitude over the sectors of a mistuned ring, and over the tuned ring's.
+
+    factor        of the largest amplitude over the tuned one
+    sector        where it is
+    frequency_hz  at which it is
+    amplitude     m/N
+    participation number of sectors that take part in the response there (rom.ring.forced.participation)
+    """
+
+    factor: float
+    sector: int
+    frequency_hz: float
+    amplitude: float
+    participation: float
+
+
+class Table(Protocol):
+    """What draws deviations: a scene's or a case's table [mistuning], a dataclass."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of what is drawn."""
+
+    def deviations(self, sectors: int) -> Deviations:
+        """Return deviations of so many sectors."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MistuningStudy(Displayed):
+    """Amplification of a ring under engine orders, over draws of its deviations.
+
+    sectors, label                 N; interface label where forces act and responses are taken
+    orders, seeds                  (o,) engine orders; (s,) seeds of the draws
+    band_hz                        (2,) frequencies between which peaks count
+    tuned_amplitude                (o,) m/N, largest of the tuned ring; tuned_frequency_hz (o,): where
+    amplification                  (o, s) largest amplitude of a sector over that
+    peak_frequency_hz              (o, s), worst_sector (o, s): where it is
+    participation                  (o, s) sectors that take part in the response there: 1 to N
+    frequencies_hz                 (f,) of the responses that follow
+    amplitude, amplitude_tuned     (o, f, N) m/N of the first draw, and (o, f) of the tuned ring
+    stiffness, mass, damping       (N,) deviations of the first draw
+    """
+
+    sectors: int
+    label: str
+    orders: np.ndarray
+    seeds: np.ndarray
+    band_hz: np.ndarray
+    tuned_amplitude: np.ndarray
+    tuned_frequency_hz: np.ndarray
+    amplification: np.ndarray
+    peak_frequency_hz: np.ndarray
+    worst_sector: np.ndarray
+    participation: np.ndarray
+    frequencies_hz: np.ndarray
+    amplitude: np.ndarray
+    amplitude_tuned: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    damping: np.ndarray
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            object.__setattr__(self, name, store.frozen(getattr(self, name), np.int64 if name in _WHOLE else None))
+
+    @property
+    def bound(self) -> float:
+        """Whitehead's bound of the amplification."""
+        return whitehead_bound(self.sectors)
+
+    def fit(self, order: int) -> Weibull | None:
+        """Return Weibull's distribution of the amplification under the engine order of that index.
+
+        None for fewer than ten draws, equal ones, or one beyond the bound, as several families of modes allow.
+        """
+        try:
+            return weibull(self.amplification[order], self.bound)
+        except RingError:
+            return None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the results by order as plain data: largest, mean, quantiles with intervals, and the fit."""
+        rows = []
+        for index, order in enumerate(self.orders.tolist()):
+            factors, fit = self.amplification[index], self.fit(index)
+            worst = int(np.argmax(factors))
+            found = [(probability, *quantile(factors, probability)) for probability in PROBABILITIES]
+            rows.append({
+                "order": order,
+                "tuned_amplitude": float(self.tuned_amplitude[index]),
+                "tuned_frequency_hz": float(self.tuned_frequency_hz[index]),
+                "amplification": {"largest": float(factors[worst]), "mean": float(factors.mean())},
+                "worst": {"seed": int(self.seeds[worst]), "sector": int(self.worst_sector[index, worst]),
+                          "frequency_hz": float(self.peak_frequency_hz[index, worst]),
+                          "participation": float(self.participation[index, worst])},
+                "quantiles": [
+                    {"probability": probability, "value": value, "low": low, "high": high,
+                     "weibull": None if fit is None else fit.quantile(probability)}
+                    for probability, value, low, high in found
+                ],
+                "weibull": None if fit is None else asdict(fit),
+            })  # fmt: skip
+        data = {
+            "sectors": self.sectors, "label": self.label, "seeds": len(self.seeds), "band_hz": self.band_hz.tolist(),
+            "whitehead_bound": self.bound, "orders": rows,
+        }  # fmt: skip
+        return cast("dict[str, Any]", store.finite(data))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an HDF5 record that xarray opens."""
+        variables = {name: store.Variable(getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
+        attributes = {"sectors": self.sectors, "label": self.label, "provenance": dict(self.provenance)}
+        store.save(path, _KIND, variables, attributes)
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> MistuningStudy:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, _KIND)
+        return cls(
+            sectors=int(attributes["sectors"]), label=str(attributes["label"]),
+            **{name: values[name] for name in _ARRAYS}, provenance=json.loads(attributes["provenance"]),
+        )  # fmt: skip
+
+
+def amplification(
+    ring: RingModel, deviations: Deviations, order: int, label: str, band_hz: Sequence[float] | None = None,
+    speed: float = 0.0,
+) -> Amplification:  # fmt: skip
+    """Return the amplification of a ring with deviations under an engine order at an interface label.
+
+    band_hz: two frequencies between which the peaks count (default: around the first family); speed: rad/s, of a ring
+    that rotates. The response includes all waves of the ring. Raises RingError.
+    """
+    tuned = Natural.of(ring, speed=speed)
+    low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
+    reference = float(tuned.forced(ring, order, label).peaks(low, high)[0].max())
+    return _amplified(Natural.of(ring, deviations, speed).forced(ring, order, label), reference, low, high)
+
+
+def mistuning_study(
+    ring: RingModel,
+    table: Table,
+    orders: Sequence[int],
+    seeds: int | Sequence[int],
+    label: str | None = None,
+    family: int = 0,
+    band_hz: Sequence[float] | None = None,
+    speed: float = 0.0,
+    points: int = 401,
+    report: Callable[[int, int], None] | None = None,
+) -> MistuningStudy:
+    """Return the amplification under engine orders over draws of a table of deviations.
+
+    table    draws them (`Mistuning`)
+    seeds    of the draws, or their number, from the table's seed on
+    label    interface label of force and response (default: the first)
+    family   around whose frequencies the peaks count; or band_hz, two frequencies
+    points   of the frequencies of the first draw's responses
+    report   called with the number of draws done, and of all
+
+    Raises RingError, and what the table raises.
+    """
+    label = ring.interface[0] if label is None else label
+    numbers = list(range(table.seed, table.seed + seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
+    if not numbers or not len(orders):
+        raise RingError("seeds: expected at least one draw, and one engine order")
+    tuned = Natural.of(ring, speed=speed)
+    low, high = _band(ring, tuned, family) if band_hz is None else band_hz
+    nominal = [tuned.forced(ring, order, label) for order in orders]
+    peaks = [one.peaks(low, high) for one in nominal]
+    largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
+    references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
+    frequencies = np.linspace(low, high, points)
+    first: tuple[Deviations, list[Forced]] | None = None
+    found = []
+    for done, seed in enumerate(numbers):
+        if report is not None:
+            report(done, len(numbers))
+        deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
+        natural = Natural.of(ring, deviations, speed)
+        responses = [natural.forced(ring, order, label) for order in orders]
+        first = first or (deviations, responses)
+        found.append([_amplified(one, top, low, high) for one, top in zip(responses, references, strict=True)])
+    assert first is not None
+    columns = np.array(found, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
+    drawn, responses = first
+    return MistuningStudy(
+        sectors=ring.sectors, label=label, orders=np.array(orders), seeds=np.array(numbers),
+        band_hz=np.array([low, high]), tuned_amplitude=np.array(references),
+        tuned_frequency_hz=np.array([at[place] for (_, at), place in zip(peaks, largest, strict=True)]),
+        amplification=columns[0], worst_sector=columns[1], peak_frequency_hz=columns[2], participation=columns[4],
+        frequencies_hz=frequencies, amplitude=np.abs([one.at(frequencies) for one in responses]),
+        amplitude_tuned=np.abs([one.at(frequencies)[:, 0] for one in nominal]),
+        **{name: drawn.of(name, ring.sectors) for name in ("stiffness", "mass", "damping")},
+        provenance={"ring": dict(ring.provenance), "speed": speed},
+    )  # fmt: skip
+
+
+def _band(ring: RingModel, tuned: Natural, family: int) -> tuple[float, float]:
+    """Return the edges of the band, Hz, around a family's frequencies, of families apart from each other."""
+    own = np.sqrt(tuned.squares[family * ring.sectors : (family + 1) * ring.sectors]) / (2.0 * np.pi)
+    if len(own) < ring.sectors or not 0 <= family < ring.modes // ring.sectors:
+        raise RingError(f"family: the ring has families 0 to {ring.modes // ring.sectors - 1}, not {family}")
+    return float((1.0 - _MARGIN) * own[0]), float((1.0 + _MARGIN) * own[-1])
+
+
+def _amplified(response: Forced, reference: float, low: float, high: float) -> Amplification:
+    amplitudes, frequencies = response.peaks(low, high)
+    sector = int(np.argmax(amplitudes))
+    there = response.at(frequencies[[sector]])[0]
+    top = float(amplitudes[sector])
+    return Amplification(
+        top / reference, sector, float(frequencies[sector]), top, float(participation(there[:, None])[0])
+    )

@@ -1,0 +1,83 @@
+"""The table [ring] of a case: the structure is one sector of a ring of equal ones."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import STRICT, Axes, Direction, Positive, Real, Whole
+from vanedamp.studies.case.operation_tables import RotationTable
+
+if TYPE_CHECKING:
+    from vanedamp.modal.cyclic import CyclicSector
+    from vanedamp.modal.matrices import SystemMatrices
+
+
+@dataclass(frozen=True, config=STRICT)
+class RingSpringTable:
+    """Springs from every sector to the next, between the mean displacements of two facet groups."""
+
+    low: str
+    """facet group of the next sector"""
+    high: str
+    """facet group of the sector itself"""
+    stiffness: Axes
+    """stiffness in all directions, or along [x, y, z], axes that turn with the sector [N/m]"""
+
+    def __post_init__(self) -> None:
+        if self.low == self.high:
+            raise ValueError(f"high: expected another group than low, {self.low!r}")
+        if not any(self.stiffness):
+            raise ValueError("stiffness: expected N/m above zero, such as 1e7 or [1e7, 5e6, 1e7]")
+
+
+@dataclass(frozen=True, config=STRICT)
+class RingTable:
+    """The structure is one sector of a ring, the others are equal and turned about an axis."""
+
+    sectors: Annotated[Whole, Field(ge=2)]
+    """number of sectors around the ring"""
+    low: str | None = None
+    """facet group of the face that a positive turn about the axis by a sector's angle brings to `high`, whose nodes it
+    meets; without faces the sectors are separate structures that springs couple"""
+    high: str | None = None
+    """facet group of the other face"""
+    axis: Direction | None = None
+    """direction of the axis, of any length (default: that of [rotation], or else z) [-]"""
+    point: tuple[Real, Real, Real] | None = None
+    """a point of the axis (default: that of [rotation], or else the origin) [m]"""
+    tolerance: Annotated[Positive, Field(le=1e-2)] = 1e-6
+    """largest distance of two nodes that are one, over the size of the sector [-]"""
+    spring: tuple[RingSpringTable, ...] = ()
+    """springs between neighbours"""
+    deviating: tuple[str, ...] = ()
+    """volume groups that the deviations of mistuning change, such as ["blade"] (default: the whole sector)"""
+
+    def __post_init__(self) -> None:
+        if (self.low is None) != (self.high is None):
+            raise ValueError("give both faces, low and high, or none of separate structures")
+        if self.low is None and not self.spring:
+            raise ValueError("low: missing; give the faces low and high, or [[ring.spring]] of separate structures")
+        if self.low is not None and self.low == self.high:
+            raise ValueError(f"high: expected another group than low, {self.low!r}")
+
+    @property
+    def groups(self) -> dict[str, str]:
+        """Facet groups by their keys."""
+        faces = {} if self.low is None or self.high is None else {"low": self.low, "high": self.high}
+        for number, spring in enumerate(self.spring):
+            faces |= {f"spring.{number}.low": spring.low, f"spring.{number}.high": spring.high}
+        return faces
+
+    def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
+        """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""
+        from vanedamp.modal.cyclic import Spring, cyclic_sector
+
+        own: RingTable | RotationTable = self if rotation is None else rotation
+        springs = [Spring(spring.low, spring.high, spring.stiffness) for spring in self.spring]
+        return cyclic_sector(
+            matrices, self.low, self.high, self.sectors, own.axis or (0.0, 0.0, 1.0), own.point or (0.0, 0.0, 0.0),
+            springs, self.tolerance,
+        )  # fmt: skip

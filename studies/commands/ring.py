@@ -1,0 +1,87 @@
+"""`vanedamp ring`: modes of a ring by nodal diameter, and the engine orders that meet them."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from pathlib import Path
+
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.interference import Interference
+from vanedamp.modal.speed_range import RPM
+from vanedamp.studies.case.ring_interference import ring_interference
+from vanedamp.studies.case.ring_stages import ring_analysis
+from vanedamp.studies.case.stages import assemble, unit_doubts
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.headline import format_margin
+from vanedamp.studies.ring_mesh import whole_ring, with_parts
+from vanedamp.studies.terminal import progress
+
+#: families, and engine orders of a diameter, that are printed at most; meetings
+_MOST_FAMILIES, _MOST_ORDERS, _MOST_MEETINGS = 8, 4, 40
+
+
+def run(arguments: Namespace, case: Case) -> None:
+    """Compute the modes, and where engine orders meet them."""
+    if arguments.vtu:  # reports missing packages before the work
+        from vanedamp.studies.report.pictures import save_vtk
+    operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
+    if operating is not None and not operating[0] <= operating[1]:
+        raise InputError("--rpm: expected the lowest speed, then the highest")
+    started = time.perf_counter()
+    structure = assemble(case)
+    modes = ring_analysis(structure)
+    with progress("speeds") as report:
+        found = ring_interference(structure, modes, operating, arguments.orders, report)
+    seconds = time.perf_counter() - started
+    mesh, cell_type = structure.mesh()
+
+    def save(path: str) -> None:
+        variables, attributes = found.riding()
+        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": case.damping_ratio}
+        modes.save(path, mesh | variables, attributes)
+
+    def vtu(path: str) -> None:
+        ring = whole_ring(modes, mesh["coordinates"].values, mesh["cell"].values)
+        named = ((f"{found.name(k)}: {hz:.6g} Hz", ring.shape(modes, k)) for k, hz in enumerate(modes.frequencies_hz))
+        save_vtk(with_parts(named), ring.points, ring.cells, cell_type, path)
+
+    def picture(path: str) -> None:
+        from vanedamp.studies.report.ring_picture import interference_picture  # matplotlib, for this file only
+
+        interference_picture(found, Path(path))
+
+    warnings = unit_doubts(structure)
+    result = found.to_json() | {"warnings": warnings, "wall_time_s": seconds}
+    write_result(arguments, result, _summary(found), warnings, output=save, vtu=vtu, picture=picture)
+
+
+def _summary(found: Interference) -> Iterator[str]:
+    """Yield frequencies by nodal diameter, the engine orders of each, and the meetings."""
+    rows, modes = found.by_diameter(), found.modes
+    families = min(len(rows[0][1]), _MOST_FAMILIES)
+    at = "" if found.speed is None else f" at {found.speed * RPM:.6g} rpm"
+    yield f"natural frequencies in Hz of {modes.sectors} sectors by nodal diameter{at}"
+    yield "diameter  engine orders     " + "".join(f"  family {family + 1:2}" for family in range(families))
+    for diameter, row in rows:
+        orders = found.exciting(diameter)
+        listed = ", ".join(map(str, orders[:_MOST_ORDERS])) + (" ..." if len(orders) > _MOST_ORDERS else "")
+        yield f"{found.label(diameter):>8}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
+    if found.operating is None and not found.speeds.size:
+        yield "no speed is known at which engine orders could meet them: [rotation], [campbell] or --rpm gives it"
+        return
+    margin = "" if found.operating is None else "  margin to operation"
+    yield f"meetings with engine orders\n  diameter  family  order         rpm       rad/s          Hz{margin}"
+    for each in found.meetings[:_MOST_MEETINGS]:
+        told = "" if found.operating is None else f"  {format_margin(each.margin(found.operating)):>19}"
+        yield (
+            f"{found.label(int(modes.diameters[each.mode])):>10}{modes.families[each.mode] + 1:8}{each.order:7g}"
+            f"{each.rpm:12.3f}{each.speed:12.4f}{each.frequency_hz:12.4f}{told}"
+        )
+    more = len(found.meetings) - _MOST_MEETINGS
+    if more > 0:
+        yield f"  and {more} more, in the result's file and its report"
+    if not found.meetings:
+        yield "  none"

@@ -1,0 +1,73 @@
+"""The mesh of a whole ring: that of one sector turned N times, with the nodes of the joints once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from vanedamp.modal.cyclic_modes import RingModes
+
+#: distance up to which nodes of two sectors are one, over the sector's size
+_SAME = 1e-4
+
+
+class WholeRing(NamedTuple):
+    """A ring's mesh.
+
+    sector, node  (n,) of each node, the sector and its place in the sector's mesh
+    points        (n, 3) m
+    cells         (c, k) places of their nodes
+    """
+
+    sector: np.ndarray
+    node: np.ndarray
+    points: np.ndarray
+    cells: np.ndarray
+
+    def shape(self, modes: RingModes, mode: int) -> np.ndarray:
+        """Return the complex shape (n, 3) of a mode: the wave is Re(shape exp(i phase)); real where it stands."""
+        real, imaginary = (modes.whole(mode, phase)[self.sector, self.node] for phase in (0.0, -np.pi / 2.0))
+        return real if 2 * abs(modes.diameters[mode]) in (0, modes.sectors) else real + 1j * imaginary
+
+
+def joints(modes: RingModes, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes (k,) of a sector's low face and, in the same order, those of its high face, which they meet."""
+    away, nearest = cKDTree(coordinates).query(_turned(modes, coordinates, 1))
+    low = np.flatnonzero(away <= _SAME * np.linalg.norm(np.ptp(coordinates, axis=0)))
+    return low, nearest[low]
+
+
+def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> WholeRing:
+    """Return the mesh of a ring from its sector's nodes (n, 3), m, and cells (c, k)."""
+    sectors, count = modes.sectors, len(coordinates)
+    low, high = joints(modes, coordinates)
+    numbers = np.arange(sectors * count).reshape(sectors, count)
+    # the high face of a sector is the low face of the next; nodes on the axis are those of all sectors
+    numbers[:, high] = np.roll(numbers[:, low], -1, axis=0)
+    on_axis = low[low == high]
+    numbers[:, on_axis] = on_axis
+    kept, places = np.unique(numbers, return_inverse=True)
+    sector, node = np.divmod(kept, count)
+    points = np.array([_turned(modes, coordinates, place) for place in range(sectors)])[sector, node]
+    return WholeRing(sector, node, points, places.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
+
+
+def _turned(modes: RingModes, coordinates: np.ndarray, sectors: int) -> np.ndarray:
+    """Return the nodes of sector 0 at their places in another one."""
+    turn = Rotation.from_rotvec(2.0 * np.pi * sectors / modes.sectors * modes.axis)
+    return np.asarray(turn.apply(coordinates - modes.point) + modes.point)
+
+
+def with_parts(shapes: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return real fields by name: of a complex shape its real and its imaginary part."""
+    fields: dict[str, np.ndarray] = {}
+    for name, shape in shapes:
+        if np.iscomplexobj(shape):
+            fields |= {f"{name}, real": shape.real, f"{name}, imaginary": shape.imag}
+        else:
+            fields[name] = shape
+    return fields

@@ -1,0 +1,193 @@
+"""`vanedamp ring`: its figures, files, pictures and exports, of a small bladed disk."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+
+import vanedamp as vd
+from tests.commands.test_export import of_vtk
+from vanedamp.modal.interference import Interference
+from vanedamp.studies.case.ring_stages import ring_analysis
+from vanedamp.studies.case.stages import assemble
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.ring_mesh import whole_ring
+
+DISK = """
+[mesh]
+generator = "sector"
+degree = 1
+sectors = 6
+inner_radius = 0.05
+outer_radius = 0.1
+thickness = 0.01
+element_size = 0.03
+blade_length = 0.06
+blade_thickness = 0.01
+[material.default]
+young = 2e11
+poisson = 0.3
+density = 8000.0
+damping_ratio = 0.001
+[support]
+clamped = ["bore"]
+[modes]
+count = 2
+[ring]
+sectors = 6
+low = "low"
+high = "high"
+"""
+TURNING = """
+[rotation]
+axis = [0, 0, 1]
+rpm = 30000
+[campbell]
+rpm = [0, 15000, 30000, 45000]
+engine_orders = [1, 4, 5, 7, 10]
+operating = [28000, 33000]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ring")
+    (folder / "case.toml").write_text(DISK + TURNING)
+    outputs = ["-o", "ring.h5", "--json", "ring.json", "--picture", "ring.png", "--vtu", "ring.vtu"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["ring", "case.toml", *outputs]) == 0
+        assert main(["report", "ring.h5", "-o", "report.html"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    return Interference.load(folder / "ring.h5")
+
+
+def test_modes_are_those_at_the_speed(folder, found):
+    modes = ring_analysis(assemble(vd.Case.load(folder / "case.toml")))
+    np.testing.assert_allclose(found.modes.frequencies_hz, modes.frequencies_hz, rtol=1e-9)
+    assert found.speed == pytest.approx(1000 * np.pi) and found.orders == (1, 4, 5, 7, 10)
+    column = found.over_speed_hz[:, found.speeds == found.speed].ravel()
+    np.testing.assert_allclose(column, modes.frequencies_hz, rtol=1e-9)
+
+
+def test_meetings_are_those_of_solutions_at_their_speeds(folder, found):
+    """The curves between the speeds of the diagram, against the sector at the speeds at which they are met."""
+    structure = assemble(vd.Case.load(folder / "case.toml"))
+    assert len(found.meetings) > 3
+    for each in found.meetings[::2]:
+        case = vd.Case.load(folder / "case.toml")
+        there = vd.ring_modes(case.ring.sector(structure.rotating.at(each.speed), case.rotation), 2)
+        at = (there.diameters == found.diameters[each.mode]) & (there.families == found.modes.families[each.mode])
+        assert there.frequencies_hz[at] == pytest.approx([each.frequency_hz], rel=1e-4)
+        assert min(each.order % 6, -each.order % 6) == found.diameters[each.mode]
+
+
+def test_json_summary_and_report(folder, found, capsys):
+    result = json.loads((folder / "ring.json").read_text())
+    assert result["meetings"] == found.to_json()["meetings"] and result["frequency_hz"] == list(
+        found.modes.frequencies_hz
+    )
+    assert result["excited"] == {"1": 1, "4": 2, "5": 1, "7": 1, "10": 2}
+    assert main(["ring", str(folder / "case.toml")]) == 0
+    printed = capsys.readouterr().out
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for frequency in found.modes.frequencies_hz:
+        assert f"{frequency:.2f}" in printed and f"{frequency:.4f}" in page
+    for each in found.meetings:
+        assert f"{each.rpm:.3f}" in printed and f"{each.rpm:.3f}" in page
+    assert '<h2 id="section-0">Ring of 6 sectors</h2>' in page and 'data-view="ring-0"' in page
+    assert (folder / "ring.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_orders_and_speeds_of_the_command_line(folder, tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(DISK)
+    assert main(["ring", str(tmp_path / "case.toml")]) == 0
+    assert "no speed is known" in capsys.readouterr().out
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "7", "--rpm", "1", "1e6", "--json", "-"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["excited"] == {"7": 1} and {each["diameter"] for each in result["meetings"]} == {1}
+    assert [each["rpm"] for each in result["meetings"]] == pytest.approx(
+        [60 * hz / 7 for h, hz in zip(result["diameter"], result["frequency_hz"], strict=True) if h == 1]
+    )
+
+
+def test_whole_ring_in_vtu_is_that_of_the_modes(folder, found):
+    mesh = meshio.read(folder / "ring.vtu")
+    values = vd.files.store.load(folder / "ring.h5", "ring-modes")[0]
+    ring = whole_ring(found.modes, values["coordinates"], values["cell"])
+    np.testing.assert_allclose(mesh.points, ring.points, atol=1e-12)
+    assert len(mesh.point_data) == sum(1 if h in (0, 3) else 2 for h in found.diameters)
+    for mode, hz in enumerate(found.modes.frequencies_hz):
+        name, wave = f"{found.name(mode)}: {hz:.6g} Hz", found.modes.whole(mode, 1.0)[ring.sector, ring.node]
+        parts = (
+            [mesh.point_data[f"{name}, {part}"] for part in ("real", "imaginary")]
+            if found.diameters[mode] in (1, 2)
+            else None
+        )
+        if parts is not None:
+            np.testing.assert_allclose(np.cos(1.0) * parts[0] - np.sin(1.0) * parts[1], wave, atol=1e-12)
+        else:
+            np.testing.assert_allclose(np.cos(1.0) * mesh.point_data[name], wave, atol=1e-12)
+
+
+def test_wave_over_a_cycle_in_vtkhdf(folder, found, tmp_path):
+    """Frame k of 8 is the ring at the phase 2 pi k / 8."""
+    mode = int(np.flatnonzero(found.diameters == 2)[0])
+    target = tmp_path / "wave.vtkhdf"
+    assert main(["export", str(folder / "ring.h5"), "-o", str(target), "--mode", str(mode + 1), "--frames", "8"]) == 0
+    read = of_vtk(target)
+    values = vd.files.store.load(folder / "ring.h5", "ring-modes")[0]
+    ring = whole_ring(found.modes, values["coordinates"], values["cell"])
+    for k in (0, 3):
+        expected = found.modes.whole(mode, 2 * np.pi * k / 8)[ring.sector, ring.node]
+        np.testing.assert_allclose(read[f"displacement|{k}"], expected, atol=1e-12)
+    assert main(["export", str(folder / "ring.h5"), "-o", str(tmp_path / "all.vtkhdf")]) == 0
+    assert f"{found.name(mode)}: {found.modes.frequencies_hz[mode]:.6g} Hz, imaginary|0" in of_vtk(
+        tmp_path / "all.vtkhdf"
+    )
+
+
+def test_universal_file_has_the_complex_waves(folder, found, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    assert main(["export", str(folder / "ring.h5"), "-o", str(tmp_path / "ring.uff")]) == 0
+    sets = [one for one in pyuff.UFF(str(tmp_path / "ring.uff")).read_sets() if one["type"] == 55]
+    assert len(sets) == len(found.modes)
+    for one, hz, h in zip(sets, found.modes.frequencies_hz, found.diameters, strict=True):
+        assert np.iscomplexobj(one["r3"]) == (h in (1, 2))
+        frequency = abs(one["eig"]) / (2 * np.pi) if h in (1, 2) else one["freq"]
+        assert frequency == pytest.approx(hz, rel=1e-5)
+
+
+def test_info(folder, found, capsys):
+    assert main(["info", str(folder / "ring.h5")]) == 0
+    said = capsys.readouterr().out
+    assert "vanedamp ring" in said and f"{found.modes.frequencies_hz[0]:.6g}" in said
+    for each in found.in_operation:
+        assert f"{found.name(each.mode)} and order {each.order:g} at {each.rpm:.6g} rpm" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (DISK.partition("[ring]")[0], [], "ring: missing; give the number of sectors"),
+        (DISK, ["--rpm", "2000", "1000"], "--rpm: expected the lowest speed, then the highest"),
+        (DISK.replace('high = "high"', 'high = "hgih"'), [], "ring.high: no facet group 'hgih'"),
+        (
+            DISK.replace("[ring]\nsectors = 6", "[ring]\nsectors = 7"),
+            [],
+            "ring.sectors: the faces are 60 degrees apart",
+        ),
+        (DISK + TURNING.replace("[1, 4, 5, 7, 10]", "[1.5]"), [], "engine orders: expected whole numbers from 1"),
+    ],
+)
+def test_bad_input_is_one_line(text, options, message, tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(text)
+    target = tmp_path / "ring.h5"
+    assert main(["ring", str(tmp_path / "case.toml"), "-o", str(target), *options]) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert message in error and not target.exists() and error.count("\n") == 1

@@ -1,0 +1,89 @@
+"""Engine orders and modes of a ring: the diameters that they excite, and where they meet."""
+
+import numpy as np
+import pytest
+
+from tests.tools.plate_rings import plate_waves
+from vanedamp.modal.interference import Interference
+
+
+@pytest.mark.parametrize("sectors", [8, 9])
+def test_an_order_excites_the_wave_that_it_is_at_the_sectors(sectors):
+    """Sampled at N sectors, cos(r j alpha) has no part in any cosine or sine but those of one diameter."""
+    found = Interference.of(plate_waves(sectors), range(1, 3 * sectors + 1))
+    angles = 2 * np.pi * np.arange(sectors) / sectors
+    for order in found.orders:
+        load = np.exp(1j * order * angles)
+        parts = [abs(np.vdot(np.exp(1j * h * angles), load)) + abs(np.vdot(np.exp(-1j * h * angles), load))
+                 for h in range(sectors // 2 + 1)]  # fmt: skip
+        assert np.flatnonzero(np.array(parts) > 1e-9).tolist() == [found.excited(order)]
+        assert order in found.exciting(found.excited(order))
+
+
+@pytest.mark.parametrize("sectors", [8, 9])
+def test_orders_lie_on_the_folded_line(sectors):
+    """Order r at r speed / (2 pi): on the line through the corners, at the diameter that it excites."""
+    found = Interference.of(plate_waves(sectors), range(1, 40))
+    speed = 150.0
+    corners, heights = found.zigzag(speed)
+    assert heights[-1] == pytest.approx(found.top) and set(corners[:-1]) == {0.0, sectors / 2}
+    for order in found.orders:
+        frequency = order * speed / (2 * np.pi)
+        if frequency < found.top:
+            assert np.interp(frequency, heights, corners) == pytest.approx(found.excited(order), abs=1e-9)
+
+
+def test_meetings_at_constant_frequencies():
+    """Speed = 2 pi f / r, of all orders and modes within the range of operation."""
+    modes = plate_waves(8)
+    found = Interference.of(modes, operating=(100.0, 400.0))
+    expected = sorted(
+        2 * np.pi * f / r
+        for h, f in zip(modes.diameters, modes.frequencies_hz, strict=True) for r in range(1, 9)
+        if min(r % 8, -r % 8) == h and 100.0 <= 2 * np.pi * f / r <= 400.0
+    )  # fmt: skip
+    assert len(expected) > 5
+    assert [each.speed for each in found.meetings] == pytest.approx(expected, rel=1e-12)
+    assert found.in_operation == found.meetings
+    assert Interference.of(modes).meetings == ()
+
+
+def test_meetings_over_the_speed():
+    """f^2 = f0^2 + B (speed / 2 pi)^2 is met by the order r at (speed / 2 pi)^2 = f0^2 / (r^2 - B)."""
+    modes, stiffening = plate_waves(8), 1.7
+    speeds = np.linspace(0.0, 500.0, 5)
+    over = np.sqrt(modes.frequencies_hz[:, None] ** 2 + stiffening * (speeds / (2 * np.pi)) ** 2)
+    found = Interference.of(modes, operating=(200.0, 300.0), speeds=speeds, over_speed_hz=over)
+    expected = {
+        (mode, r): 2 * np.pi * np.sqrt(f**2 / (r**2 - stiffening))
+        for mode, (h, f) in enumerate(zip(modes.diameters, modes.frequencies_hz, strict=True)) for r in range(2, 9)
+        if min(r % 8, -r % 8) == h and 2 * np.pi * np.sqrt(f**2 / (r**2 - stiffening)) <= 500.0
+    }  # fmt: skip
+    assert len(expected) > 5
+    assert {(each.mode, each.order): each.speed for each in found.meetings} == pytest.approx(expected, rel=1e-9)
+    within = [each for each in found.meetings if 200.0 <= each.speed <= 300.0]
+    assert list(found.in_operation) == within and 0 < len(within) < len(found.meetings)
+
+
+def test_waves_that_turn_apart_are_met_by_their_own_orders():
+    """Ring that turns: the order h runs against the turn, N - h with it."""
+    modes = plate_waves(8, families=1)
+    signed = np.concatenate([modes.diameters, -modes.diameters[1:4]])
+    rows = np.r_[0:5, 1:4]
+    split = type(modes)(8, modes.axis, modes.point, signed, np.zeros(8, int), modes.frequencies_hz[rows],
+                        np.zeros(8), modes.shapes[rows])  # fmt: skip
+    found = Interference.of(split)
+    assert [found.excited(order) for order in range(1, 9)] == [1, 2, 3, 4, -3, -2, -1, 0]
+    assert found.name(1) == "diameter 1 backward, family 1" and found.name(5) == "diameter 1 forward, family 1"
+    assert found.exciting(-2) == [6]
+
+
+def test_file_keeps_it(tmp_path):
+    modes = plate_waves(8)
+    given = Interference.of(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
+                            over_speed_hz=np.ones((10, 2)))  # fmt: skip
+    modes.save(tmp_path / "ring.h5", *given.riding())
+    found = Interference.load(tmp_path / "ring.h5")
+    assert found.to_json() == given.to_json() and found.orders == (3, 5)
+    modes.save(tmp_path / "bare.h5")
+    assert Interference.load(tmp_path / "bare.h5").to_json() == Interference.of(modes).to_json()

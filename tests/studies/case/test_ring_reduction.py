@@ -1,0 +1,142 @@
+"""Reduced ring of a bladed disk's finite elements against the whole ring's, of which the same blades deviate."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import eigsh, splu
+
+from tests.tools.rings import whole_ring
+from vanedamp.files.store import kind_of
+from vanedamp.rom.ring.deviations import Deviations
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.study import MistuningStudy, amplification
+from vanedamp.studies.case.ring_stages import ring_reduction, ring_sector
+from vanedamp.studies.case.stages import assemble, interface
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.cli import main
+
+CASE = """
+[mesh]
+generator = "sector"
+sectors = 6
+inner_radius = 0.1
+outer_radius = 0.16
+thickness = 0.02
+element_size = 0.03
+blade_length = 0.12
+blade_thickness = 0.012
+degree = 1
+[material.default]
+young = 2.0e11
+poisson = 0.3
+density = 7800.0
+damping_ratio = 0.001
+[support]
+clamped = ["bore"]
+[ring]
+sectors = 6
+low = "low"
+high = "high"
+deviating = ["blade"]
+[mistuning.frequency]
+std = 0.01
+[interface.tip]
+facets = "tip"
+direction = [0, 1, 0]
+"""
+
+
+@pytest.fixture(scope="module")
+def structure(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ring") / "case.toml"
+    path.write_text(CASE)
+    return assemble(Case.load(path))
+
+
+def modes_of(stiffness, mass, count):
+    values, shapes = eigsh(stiffness.tocsc(), count, mass.tocsc(), sigma=0.0, v0=np.ones(mass.shape[0]))
+    order = np.argsort(values)
+    return values[order], shapes[:, order]
+
+
+@pytest.mark.parametrize("size", [0.05, 0.3])
+def test_frequencies_and_amplification_of_deviating_blades(structure, size):
+    ring, sector = ring_reduction(structure), ring_sector(structure)
+    deviations = Deviations(size * np.random.default_rng(1).uniform(-1.0, 1.0, 6))
+    part = structure.solid.part(["blade"])
+    stiffness, mass, place = whole_ring(sector, part, deviations)
+    squares, shapes = modes_of(stiffness, mass, 24)
+    tuned = np.sqrt(modes_of(*whole_ring(sector, part)[:2], 6)[0])
+    exact, found = np.sqrt(squares), np.sqrt(ring.model(deviations).squares)
+    assert np.abs(exact[:6] - tuned).max() > 0.2 * size * tuned[0]
+    assert np.abs(found[:6] - exact[:6]).max() < 1e-4 * np.abs(exact[:6] - tuned).max()
+
+    vector = interface(structure.case, sector.matrices).vectors[:, 0]
+    tips = np.array([one.T @ vector for one in place])
+    load = np.exp(-2j * np.pi * np.arange(6) / 6)
+    modal, static = tips @ shapes, splu(sparse.csc_matrix(stiffness)).solve(tips.T)
+    rest = tips @ static - (modal / squares) @ modal.T
+    low, high = 0.9 * exact[0], 1.1 * exact[5]
+    omegas = np.linspace(low, high, 20001)[:, None]
+    transfer = 1 / (squares - omegas**2 + 2j * 0.001 * np.sqrt(squares) * omegas)
+    response = np.abs((transfer * (modal.T @ load)) @ modal.T + rest @ load)
+    band = [low / 2 / np.pi, high / 2 / np.pi]
+    one = amplification(ring, deviations, 1, "tip", band)
+    assert one.amplitude == pytest.approx(response.max(), rel=1e-3)
+    assert one.sector == np.argmax(response.max(axis=0))
+
+
+def test_command(tmp_path: Path, capsys):
+    case, output = tmp_path / "case.toml", tmp_path / "ring.h5"
+    case.write_text(CASE)
+    assert main(["reduce", str(case), "-o", str(output), "--families", "2", "--json", "-"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    ring = RingModel.load(output)
+    assert kind_of(output) == "ring-model" and ring.sectors == result["sectors"] == 6 and ring.modes == 12
+    np.testing.assert_array_equal(result["frequency_hz"], ring.frequencies_hz)
+    assert result["estimate"]["receptance"] < 0.05
+    assert main(["info", str(output), "--json", "-"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["sectors"] == 6 and facts["interface"] == ["tip"]
+    assert main(["reduce", str(case), "-o", str(output), "--basis", "rubin"]) == 2
+    assert "--families" in capsys.readouterr().err
+
+
+def test_mistuning_command(tmp_path: Path, capsys):
+    case, output = tmp_path / "case.toml", tmp_path / "mistuning.h5"
+    case.write_text(CASE)
+    ring = tmp_path / "ring.h5"
+    assert main(["reduce", str(case), "-o", str(ring)]) == 0
+    words = ["mistuning", str(case), "--orders", "1", "--seeds", "12", "-o", str(output)]
+    assert main([*words, "--ring", str(ring), "--json", "-"]) == 0
+    result = json.loads(capsys.readouterr().out.partition("nodal diameter 3")[2].partition("\n")[2])
+    study = MistuningStudy.load(output)
+    assert study.to_json()["orders"] == result["orders"] and study.seeds.tolist() == list(range(12))
+    deviations = Case.load(case).mistuning.deviations(6)
+    np.testing.assert_array_equal(study.stiffness, deviations.stiffness)
+    one = amplification(RingModel.load(ring), deviations, 1, "tip", study.band_hz)
+    assert study.amplification[0, 0] == pytest.approx(one.factor, rel=1e-9)
+    assert main(["info", str(output)]) == 0
+    assert "amplification up to" in capsys.readouterr().out
+    assert main([*words[:2], "--ring", str(ring), "--at", "top"]) == 2
+    assert "no interface coordinate 'top'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "put", "message"),
+    [
+        ('deviating = ["blade"]', 'deviating = ["vane"]', "ring.deviating"),
+        ('[ring]\nsectors = 6\nlow = "low"\nhigh = "high"\ndeviating = ["blade"]', "", "mistuning: deviations are"),
+    ],
+)
+def test_wrong_input_in_a_line(tmp_path: Path, capsys, given, put, message):
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace(given, put))
+    assert main(["reduce", str(case), "-o", str(tmp_path / "ring.h5")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
