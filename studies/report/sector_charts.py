@@ -13,6 +13,7 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.response.sector_response import BY_SECTOR
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.rom.ring.extremes import quantile
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.forced_response import setting
 from vanedamp.studies.report.map_chart import MOST_PANELS, Panel, panel_rows, panels, panels_figure
@@ -20,7 +21,7 @@ from vanedamp.studies.report.page import Page
 
 #: axis of the draws of a mistuned ring
 _SEED = "structure.mistuning.seed"
-_QUANTILES = (0.05, 0.5, 0.95, 1.0)
+_QUANTILES = (0.05, 0.5, 0.95)
 
 
 def sectors_shown(file: str, sectors: Mapping[str, Any], page: Page) -> dict[str, Any]:
@@ -35,7 +36,7 @@ def sectors_shown(file: str, sectors: Mapping[str, Any], page: Page) -> dict[str
 
 def sectors_figure(columns: Mapping[str, np.ndarray]) -> go.Figure:
     """Draw amplitudes, m, and impacts per period over the sectors, by the names of BY_SECTOR."""
-    counted = np.isfinite(columns["impacts_per_period"]).all()
+    counted = bool(np.isfinite(columns["impacts_per_period"]).all())
     figure = make_subplots(rows=1 + counted, cols=1, shared_xaxes=True, vertical_spacing=0.08)
     x = np.arange(len(columns["amplitude_mean"]))
     figure.add_bar(x=x, y=1e6 * columns["amplitude_mean"], name="mean", marker_color=COLOURS[0], row=1, col=1)
@@ -132,7 +133,10 @@ def _impacts_figure(rows: Sequence[tuple[int, float, float, float]]) -> go.Figur
 
 
 def _seeds(sweep: Sweep) -> Iterator[dict[str, Any]]:
-    """Yield quantiles of the amplification over the seeds, for every combination of axes but the resonances'."""
+    """Yield quantiles of the amplification over the seeds, for every combination of axes but the resonances'.
+
+    They have intervals of 95 % confidence, nan where these are open.
+    """
     paths, units = list(sweep.axes), sweep.units()
     if _SEED not in paths:
         return
@@ -148,4 +152,9 @@ def _seeds(sweep: Sweep) -> Iterator[dict[str, Any]]:
         if known.size:
             named = zip(others, combination, strict=True)
             name = ", ".join(setting(path, sweep.axes[path][place], units[path]) for path, place in named)
-            yield {"name": name, "count": known.size, "quantiles": np.quantile(known, _QUANTILES).tolist()}
+            yield {
+                "name": name,
+                "count": known.size,
+                "largest": known.max(),
+                "quantiles": [quantile(known, one) for one in _QUANTILES],
+            }
