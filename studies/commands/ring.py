@@ -7,12 +7,14 @@ from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
+from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.interference import Interference
 from vanedamp.modal.speed_range import RPM
+from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_interference import ring_interference
-from vanedamp.studies.case.ring_stages import ring_analysis
-from vanedamp.studies.case.stages import assemble, unit_doubts
+from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
+from vanedamp.studies.case.stages import Structure, assemble, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.headline import format_margin
@@ -21,6 +23,8 @@ from vanedamp.studies.terminal import progress
 
 #: families, and engine orders of a diameter, that are printed at most; meetings
 _MOST_FAMILIES, _MOST_ORDERS, _MOST_MEETINGS = 8, 4, 40
+#: families of a reduced ring at least
+_FAMILIES = 3
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -30,11 +34,14 @@ def run(arguments: Namespace, case: Case) -> None:
     operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
     if operating is not None and not operating[0] <= operating[1]:
         raise InputError("--rpm: expected the lowest speed, then the highest")
+    if arguments.mistuning and case.mistuning is None:
+        raise InputError("--mistuning: the case has no table [mistuning], such as frequency = {std = 0.01}")
     started = time.perf_counter()
     structure = assemble(case)
     modes = ring_analysis(structure)
     with progress("speeds") as report:
         found = ring_interference(structure, modes, operating, arguments.orders, report)
+    study = None if case.mistuning is None else _study(arguments, structure, found)
     seconds = time.perf_counter() - started
     mesh, cell_type = structure.mesh()
 
@@ -55,7 +62,29 @@ def run(arguments: Namespace, case: Case) -> None:
 
     warnings = unit_doubts(structure)
     result = found.to_json() | {"warnings": warnings, "wall_time_s": seconds}
-    write_result(arguments, result, _summary(found), warnings, output=save, vtu=vtu, picture=picture)
+    lines, files = [*_summary(found)], {"output": save, "vtu": vtu, "picture": picture}
+    if study is not None:
+        result["mistuning"] = study.to_json()
+        lines += _amplification(study)
+        files["mistuning"] = study.save
+    write_result(arguments, result, lines, warnings, **files)
+
+
+def _study(arguments: Namespace, structure: Structure, found: Interference) -> MistuningStudy:
+    """Return the amplification over draws, of the orders that are named, or one for each diameter from 1.
+
+    Raises InputError for a case without an interface, and RingError.
+    """
+    table, half = structure.case.mistuning, found.modes.sectors // 2
+    assert table is not None
+    named = arguments.orders or (structure.case.campbell is not None and structure.case.campbell.engine_orders)
+    ring = ring_reduction(structure, max(arguments.family, _FAMILIES))
+    drawn = any(each is not None and each.std is not None for each in (getattr(table, name) for name in DEVIATIONS))
+    with progress("draws") as report:
+        return mistuning_study(
+            ring, table, found.orders if named else range(1, half + 1), arguments.draws if drawn else 1,
+            family=arguments.family - 1, speed=found.speed or 0.0, report=report,
+        )  # fmt: skip
 
 
 def _summary(found: Interference) -> Iterator[str]:
@@ -85,3 +114,18 @@ def _summary(found: Interference) -> Iterator[str]:
         yield f"  and {more} more, in the result's file and its report"
     if not found.meetings:
         yield "  none"
+
+
+def _amplification(study: MistuningStudy) -> Iterator[str]:
+    """Yield the amplification by engine order."""
+    told, (low, high) = study.to_json(), study.band_hz
+    draws = f"{len(study.seeds)} draw{'s' if len(study.seeds) > 1 else ''}"
+    yield f"amplification at {study.label}, {draws} of [mistuning], peaks from {low:.6g} to {high:.6g} Hz"
+    yield "  order   tuned/Hz     median       95 %    largest  sector       seed"
+    for row in told["orders"]:
+        median, high_quantile, _ = (each["value"] for each in row["quantiles"])
+        yield (
+            f"{row['order']:7}{row['tuned_frequency_hz']:11.2f}{median:11.4f}{high_quantile:11.4f}"
+            f"{row['amplification']['largest']:11.4f}{row['worst']['sector']:8}{row['worst']['seed']:11}"
+        )
+    yield f"one family of modes stays below {study.bound:.4f} (Whitehead)"

@@ -9,9 +9,11 @@ import pytest
 import vanedamp as vd
 from tests.commands.test_export import of_vtk
 from vanedamp.modal.interference import Interference
-from vanedamp.studies.case.ring_stages import ring_analysis
+from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
+from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.report.mistuning_charts import sectors_figure
 from vanedamp.studies.ring_mesh import whole_ring
 
 DISK = """
@@ -47,6 +49,16 @@ rpm = 30000
 rpm = [0, 15000, 30000, 45000]
 engine_orders = [1, 4, 5, 7, 10]
 operating = [28000, 33000]
+"""
+
+
+MISTUNED = """
+[interface.tip]
+facets = "tip"
+direction = [0, 1, 0]
+[mistuning]
+seed = 3
+frequency = {std = 0.01}
 """
 
 
@@ -175,6 +187,8 @@ def test_info(folder, found, capsys):
     ("text", "options", "message"),
     [
         (DISK.partition("[ring]")[0], [], "ring: missing; give the number of sectors"),
+        (DISK, ["--mistuning", "m.h5"], "--mistuning: the case has no table [mistuning]"),
+        (DISK + MISTUNED.partition("[mistuning]")[1] + "\nmass = {std = 0.1}", [], "interface: missing"),
         (DISK, ["--rpm", "2000", "1000"], "--rpm: expected the lowest speed, then the highest"),
         (DISK.replace('high = "high"', 'high = "hgih"'), [], "ring.high: no facet group 'hgih'"),
         (
@@ -191,3 +205,48 @@ def test_bad_input_is_one_line(text, options, message, tmp_path, capsys):
     assert main(["ring", str(tmp_path / "case.toml"), "-o", str(target), *options]) == BAD_INPUT
     error = capsys.readouterr().err
     assert message in error and not target.exists() and error.count("\n") == 1
+
+
+def test_mistuning_is_that_of_the_study(tmp_path, monkeypatch, capsys):
+    """The table of the command, its file and the report, against the study in Python."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED)
+    options = [
+        "--orders",
+        "1",
+        "2",
+        "--draws",
+        "12",
+        "--family",
+        "2",
+        "--mistuning",
+        "mistuning.h5",
+        "--json",
+        "ring.json",
+    ]
+    assert main(["ring", "case.toml", *options]) == 0
+    printed = capsys.readouterr().out
+    case = vd.Case.load("case.toml")
+    study = mistuning_study(ring_reduction(assemble(case)), case.mistuning, [1, 2], 12, family=1)
+    told = json.loads((tmp_path / "ring.json").read_text())["mistuning"]
+    for index, row in enumerate(told["orders"]):
+        largest = study.amplification[index].max()
+        assert row["amplification"]["largest"] == pytest.approx(largest, rel=1e-6) and f"{largest:.4f}" in printed
+    found = MistuningStudy.load("mistuning.h5")
+    figure = vd.plot("mistuning.h5")
+    for index, order in enumerate((1, 2)):
+        (shown,) = (t for t in figure.data if t.name == f"engine order {order}" and t.mode == "markers")
+        assert sorted(shown.x) == pytest.approx(sorted(study.amplification[index]), rel=1e-6)
+        assert [found.amplification[index][int(seed) - 3] for seed in shown.customdata[:, 0]] == list(shown.x)
+    sectors = sectors_figure(found, 0)
+    curves = np.reshape(sectors.data[0].y, (6, -1))[:, :-1]
+    np.testing.assert_allclose(curves.T * found.tuned_amplitude[0], found.amplitude[0], rtol=1e-12)
+    assert main(["report", "mistuning.h5", "-o", "report.html"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Mistuned ring of 6 sectors" in page and f"{found.amplification[1].max():.4f}" in page
+
+
+def test_deviations_that_are_given_are_one_draw(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED.replace("std = 0.01", "pattern = [0.02, -0.02]"))
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1"]) == 0
+    assert "1 draw of [mistuning]" in capsys.readouterr().out
