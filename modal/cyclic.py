@@ -17,7 +17,6 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
-from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, paired, rotation
 from vanedamp.modal.matrices import SystemMatrices, patch_average, unit_direction
 
@@ -133,13 +132,12 @@ class CyclicSector:
         """Return the problem of a nodal diameter. Raises CyclicError for one that the ring does not have."""
         if diameter not in self.diameters:
             raise CyclicError(f"diameter: expected 0 to {self.sectors // 2} of {self.sectors} sectors, not {diameter}")
-        given, travels = self.matrices, 0 < 2 * diameter < self.sectors
+        given, travels = self.matrices, self.travels(diameter)
         expansion, kept, fixed = self._expansion(diameter, travels)
-        stiffness = given.stiffness + self.coupling(diameter) if self.couplings else given.stiffness
         copies = 2 if travels else 1
         matrices = SystemMatrices(
-            stiffness=symmetric_part(_real_form(expansion, stiffness, travels)),
-            mass=symmetric_part(_real_form(expansion, given.mass, travels)),
+            stiffness=_real_form(expansion, self.stiffness(diameter), travels),
+            mass=_real_form(expansion, given.mass, travels),
             coordinates=np.tile(given.coordinates[kept], (copies, 1)),
             fixed=np.concatenate([fixed + copy * 3 * kept.size for copy in range(copies)]),
             patches={},
@@ -163,10 +161,13 @@ class CyclicSector:
             for spring in self.couplings
         ]
 
-    def coupling(self, diameter: int) -> sparse.csr_array:
-        """Return the stiffness (N, N), Hermitian, of the springs between neighbours in a wave z exp(i h j alpha)."""
-        size = self.matrices.size
-        total = sparse.csr_array((size, size), dtype=complex)
+    def travels(self, diameter: int) -> bool:
+        """Say whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
+        return 0 < 2 * diameter < self.sectors
+
+    def stiffness(self, diameter: int) -> sparse.csr_array:
+        """Return the stiffness (N, N) for a wave z exp(i h j alpha), Hermitian: with the springs between neighbours."""
+        total = self.matrices.stiffness
         for high, low, stiffness in self.couplers():
             stretch = sparse.csr_array(high - np.exp(1j * diameter * self.angle) * low)
             total = total + stretch.conj().T @ (sparse.diags(stiffness) @ stretch)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
 
 _KIND = "ring-modes"
 # of the squared length of a field: less is round-off of fields that the others determine
-_DEPENDENT = 1e-6
+_DEPENDENT = 1e-12
 
 
 class Meeting(NamedTuple):
@@ -38,6 +38,15 @@ class Meeting(NamedTuple):
     family: int
     frequency_hz: float
     speed: float
+
+
+class Family(NamedTuple):
+    """Modes of one diameter: frequencies (k,), Hz, residuals (k,) and complex shapes (k, n)."""
+
+    diameter: int
+    frequencies_hz: np.ndarray
+    residuals: np.ndarray
+    shapes: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,7 +179,7 @@ def ring_modes(
     Raises CyclicError for a diameter that the ring does not have, and SolverError.
     """
     wanted = list(sector.diameters if diameters is None else diameters)
-    found: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
+    found: list[Family] = []
     for done, number in enumerate(wanted):
         if report is not None:
             report(done, len(wanted))
@@ -181,10 +190,15 @@ def ring_modes(
             modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
         except NoModesError:
             continue
-        found.append((number, *_of_diameter(sector, problem, modes)))
+        found.append(_of_diameter(sector, problem, modes))
         provenance = modes.provenance
     if not found:
         raise NoModesError(f"max_frequency: the ring has no mode up to {max_frequency} Hz; raise it")
+    return gathered(sector, found, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})
+
+
+def gathered(sector: CyclicSector, found: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
+    """Return the record of modes by diameter."""
     numbers, frequencies, residuals, shapes = zip(*found, strict=True)
     counts = [len(values) for values in frequencies]
     return RingModes(
@@ -196,34 +210,35 @@ def ring_modes(
         np.concatenate(frequencies),
         np.concatenate(residuals),
         np.concatenate(shapes),
-        dict(sector.matrices.provenance) | {"solver": provenance["solver"]},
+        provenance,
     )
 
 
-def _of_diameter(sector: CyclicSector, problem: Diameter, modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frequencies (k,), residuals (k,) and complex shapes (k, n) of one diameter, each pair once."""
+def _of_diameter(sector: CyclicSector, problem: Diameter, modes: Modes) -> Family:
+    """Return the modes of one diameter, each pair once."""
     fields, frequencies, residuals = problem.fields(modes.shapes), modes.frequencies_hz, modes.residuals
     if problem.travels:
         # both vectors of a pair lead to one complex field times some factor; Ritz vectors separate the families
         residuals = residuals.reshape(-1, 2).max(axis=1)
-        stiffness = sector.matrices.stiffness + sector.coupling(problem.number)
-        fields = _ritz_vectors(stiffness, sector.matrices.mass, fields)[: residuals.size]
+        basis = independent(fields, sector.matrices.mass)
+        _, vectors = linalg.eigh(basis.conj() @ (sector.stiffness(problem.number) @ basis.T))
+        fields = vectors.T[: residuals.size] @ basis
         frequencies = np.sqrt(np.mean(frequencies.reshape(-1, 2) ** 2, axis=1))
-    return frequencies, residuals, scaled(fields, sector.matrices.mass, sector.sectors, problem.travels)
+    return Family(problem.number, frequencies, residuals, scaled(sector, fields, problem.travels))
 
 
-def _ritz_vectors(stiffness: sparse.csr_array, mass: sparse.csr_array, fields: np.ndarray) -> np.ndarray:
-    """Return the Ritz vectors (r, n) in the span of complex fields (k, n), by ascending frequency."""
-    values, turns = linalg.eigh(fields.conj() @ (mass @ fields.T))
-    own = values > _DEPENDENT * values[-1]
-    basis = (turns[:, own] / np.sqrt(values[own])).T @ fields
-    _, vectors = linalg.eigh(basis.conj() @ (stiffness @ basis.T))
-    return np.asarray(vectors.T @ basis)
+def independent(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """Return mass-orthonormal combinations (r, n) of complex fields (k, n), r of which are independent."""
+    for _ in range(2):  # once more, as the smallest have few digits at first
+        values, turns = linalg.eigh(fields.conj() @ (mass @ fields.T))
+        own = values > _DEPENDENT * values[-1]
+        fields = (turns[:, own] / np.sqrt(values[own])).T @ fields
+    return fields
 
 
-def scaled(fields: np.ndarray, mass: sparse.csr_array, sectors: int, travels: bool) -> np.ndarray:
+def scaled(sector: CyclicSector, fields: np.ndarray, travels: bool) -> np.ndarray:
     """Return complex fields (k, n) of a sector with modal mass 1 over the ring, the largest component positive."""
-    masses = np.einsum("ij,ij->i", fields.conj(), (mass @ fields.T).T).real
-    masses = masses * sectors * (0.5 if travels else 1.0)
+    masses = np.einsum("ij,ij->i", fields.conj(), (sector.matrices.mass @ fields.T).T).real
+    masses = masses * sector.sectors * (0.5 if travels else 1.0)
     largest = np.array([field[first_largest(np.abs(field))] for field in fields])
     return np.asarray(fields * (np.abs(largest) / largest / np.sqrt(masses))[:, None])

@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.modal import petsc
-from vanedamp.modal.algebra import orthonormal, symmetric_part
+from vanedamp.modal.algebra import orthonormal
 from vanedamp.modal.eigen import SPARE, SolverError, factorize, shape_signs, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
@@ -124,12 +124,13 @@ def _within(pencil: _Pencil, space: np.ndarray, count: int) -> tuple[np.ndarray,
 def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return all positive frequencies (m,), rad/s, ascending, and complex shapes (m, m) of length one, of unit masses.
 
-    stiffness, coupling: (m, m), K and W G. In the modes of K, of frequencies kappa, velocities v and scaled
-    displacements y = kappa x obey the skew system v' + W G v + kappa y = 0, y' = kappa v.
+    stiffness, coupling: (m, m), K and W G, symmetric and skew, or Hermitian and skew-Hermitian. In the modes of K, of
+    frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system v' + W G v + kappa y = 0,
+    y' = kappa v.
     """
-    squares, turn = linalg.eigh(symmetric_part(stiffness))
-    kappa, coupled = np.sqrt(squares), turn.T @ coupling @ turn
-    skew = np.block([[0.5 * (coupled - coupled.T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
+    squares, turn = linalg.eigh(0.5 * (stiffness + stiffness.conj().T))
+    kappa, coupled = np.sqrt(squares), turn.conj().T @ coupling @ turn
+    skew = np.block([[0.5 * (coupled - coupled.conj().T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)
     size = len(kappa)
     shapes = vectors[size:, size:] / kappa[:, None]

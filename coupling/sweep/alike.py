@@ -25,7 +25,7 @@ from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.scene.structures import Ring, Rom
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
@@ -177,7 +177,7 @@ def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list
     telling = [values for path, values in kept.items() if path not in paths]
     telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
     keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)
-    if not paths or "exponents" in base.kept or hot_spots_in_file(base.structure):
+    if not paths or "exponents" in base.kept or isinstance(base.structure, Ring) or hot_spots_in_file(base.structure):
         yield from (([], [place]) for place in range(len(points)))
     elif linked:
         yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), keys.__getitem__))

@@ -1,5 +1,5 @@
 """What a sweep keeps of a point besides its measures: Poincare sections and Lyapunov exponents if its table asks for
-them, stresses of a model with hot spots, and wear."""
+them, stresses of a model with hot spots, wear, and the response of the sectors of a ring."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.exponents.lyapunov import Motion, lyapunov
 from vanedamp.coupling.response.contact_work import ContactWear
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.sector_response import BY_SECTOR, OF_RING, SectorResponse
 from vanedamp.coupling.response.spot_stress import LINEAR, SCALARS, SpotStress
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
+from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file, ring_in_file
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.store import frozen, read_only
 from vanedamp.rom.recovery import COMPONENTS
 
@@ -37,6 +39,8 @@ STRESSES = {
 #: wear of a scene with [wear] and its units, each an array over the grid: largest depth rate of a contact, volume and
 #: work rate of all contacts
 WEARS = {"wear_depth_rate": "m/h", "wear_volume_rate": "m^3/h", "wear_work_rate": "W"}
+#: response of a ring and its units: of each sector, an array over the grid and the sectors, and of the ring
+SECTORS = {f"sector_{name}": unit for name, unit in BY_SECTOR.items()} | OF_RING
 _OF_COMPONENTS = ("stress_amplitude", "stress_static")
 _WIDTH = len(STRESSES) + (len(COMPONENTS) - 1) * len(_OF_COMPONENTS)
 
@@ -61,6 +65,28 @@ def _columns(spot: SpotStress) -> list[float]:
         columns += [(getattr(spot, curve) or {name: np.nan})[name] for curve in LINEAR]
     static = np.full(len(COMPONENTS), np.nan) if spot.static is None else spot.static
     return [*columns, *spot.amplitude.values(), *static, *(spot.strength.get(name, np.nan) for name in STRENGTHS)]
+
+
+def sector_width(base: Scene) -> int:
+    """Return the number of columns of a point's sectors."""
+    ring = ring_in_file(base.structure)
+    return 0 if ring is None else len(OF_RING) + len(BY_SECTOR) * ring.sectors
+
+
+def put_sectors(row: np.ndarray, found: SectorResponse | None) -> None:
+    """Put the response of the sectors of a run into a row."""
+    if found is not None:
+        row[:] = np.concatenate([
+            np.array([getattr(found, name) for name in OF_RING], float), *(getattr(found, name) for name in BY_SECTOR)
+        ])  # fmt: skip
+
+
+def sectors_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the response of the sectors over a grid from the columns (points, n) of its points."""
+    if values.shape[1]:
+        yield from ((name, frozen(values[:, place].reshape(shape))) for place, name in enumerate(OF_RING))
+        by_sector = values[:, len(OF_RING) :].reshape(*shape, len(BY_SECTOR), -1)
+        yield from ((f"sector_{name}", frozen(by_sector[..., place, :])) for place, name in enumerate(BY_SECTOR))
 
 
 def put_wear(row: np.ndarray, found: Sequence[ContactWear] | None) -> None:
@@ -96,9 +122,14 @@ def exponent_width(base: Scene) -> int:
     return len(EXPONENTS) + len(WORDS) if "exponents" in base.kept else 0
 
 
+def bodies_of(base: Scene) -> int:
+    """Return the number of bodies of a point, of a ring in all their sectors."""
+    return len(unrolled(base).damper)
+
+
 def section_width(base: Scene) -> int:
     """Return the number of columns of a point's sections."""
-    return base.kept.get("sections", 0) * (2 + 2 * len(base.damper))
+    return base.kept.get("sections", 0) * (2 + 2 * bodies_of(base))
 
 
 def put_sections(row: np.ndarray, section: np.ndarray) -> None:

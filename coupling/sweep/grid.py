@@ -21,6 +21,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import structure_basis
+from vanedamp.coupling.system.reduced_model_file import ring_in_file
 from vanedamp.files.toml_input import InputError, nearest, validate
 
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
@@ -213,6 +214,7 @@ def grid(scene: Scene, empty: bool = False) -> Grid:
         linked = linked or made.continuation.direction != "independent"
         undecided = undecided or leaves_open(made)
         _check_method(made)
+        _check_ring(made, first, axes)
     along = _along(scene, axes) if linked else None
     base = base_scene(scene)
     points = Points(base)
@@ -289,6 +291,16 @@ def _check_method(scene: Scene) -> None:
         raise InputError(
             f'sweep.exponents: derivatives are those of the exact engine, not of "{scene.solver.method}"; leave it out'
         )
+
+
+def _check_ring(scene: Scene, first: Scene, axes: Mapping[str, Sequence[Any]]) -> None:
+    """Raise InputError where points of a ring have no columns in common."""
+    if ring_in_file(scene.structure) != ring_in_file(first.structure):
+        raise InputError("sweep.structure.file: rings of different sectors or labels; sweep them one by one")
+    changes = [path for path in axes if path.endswith(".sectors")]
+    if changes and (scene.planar or "sections" in scene.kept):
+        what = "results of bodies in the plane" if scene.planar else "sections"
+        raise InputError(f"sweep.{changes[0]}: changes the number of bodies, and with it that of {what}; leave it out")
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:

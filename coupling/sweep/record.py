@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WEARS, WORDS
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, SECTORS, STRESSES, WEARS, WORDS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Plotted, html_table
@@ -24,7 +24,7 @@ PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
     "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
-_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES | WEARS
+_FURTHER = IN_PLANE | EXPONENTS | PEAKS | dict.fromkeys(WORDS, "1") | STRESSES | WEARS | SECTORS
 #: columns of the table in a notebook, beside the axes, and its rows
 _SHOWN = (
     "amplitude_mean", "amplitude_mean_dynamic", "amplitude_undamped", "amplitude_fixed", "impacts_per_period", "status",
@@ -62,6 +62,8 @@ class Sweep(SceneRecord, Plotted):
                           of the material (strength.assessment); empty without hot spots
     wear                  by the names of WEARS, over the grid: fastest depth rate of a contact, volume and work rate of
                           all; empty without [wear]
+    sectors               by the names of SECTORS, (*grid, N) of each sector of a ring, over the grid of the whole ring
+                          (response.sector_response); empty for other structures
     peaks                 by the names of PEAKS: maxima of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency, or the speed along an engine order;
@@ -94,6 +96,7 @@ class Sweep(SceneRecord, Plotted):
     sections: Mapping[str, np.ndarray] = field(default_factory=dict)
     stress: Mapping[str, np.ndarray] = field(default_factory=dict)
     wear: Mapping[str, np.ndarray] = field(default_factory=dict)
+    sectors: Mapping[str, np.ndarray] = field(default_factory=dict)
     peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -130,7 +133,7 @@ class Sweep(SceneRecord, Plotted):
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
         notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
-        further = {**self.in_plane, **self.exponents, **self.stress, **self.wear, **self.peaks}
+        further = {**self.in_plane, **self.exponents, **self.stress, **self.wear, **self.sectors, **self.peaks}
         units = self.units() | MEASURES | {name: _FURTHER[name] for name in further}
         return (
             {"axes": axes, "units": units}
@@ -162,6 +165,8 @@ class Sweep(SceneRecord, Plotted):
         for name, values in self.stress.items():
             own = (*dims, "hot_spot", "stress_component")
             variables[name] = Variable(values, own[: values.ndim], STRESSES[name])
+        for name, values in self.sectors.items():
+            variables[name] = Variable(values, (*dims, "sector")[: values.ndim], SECTORS[name])
         swept = resonance_axis(self.scene, self.axes)[0]
         others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
@@ -192,6 +197,7 @@ class Sweep(SceneRecord, Plotted):
             sections={name: frozen(values[name]) for name in SECTIONS if name in values},
             stress={name: frozen(values[name]) for name in STRESSES if name in values},
             wear={name: frozen(values[name]) for name in WEARS if name in values},
+            sectors={name: frozen(values[name]) for name in SECTORS if name in values},
             **given,
         )
 

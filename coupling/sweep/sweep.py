@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.further import exponents_of, sections_of, stresses_of, wear_of
+from vanedamp.coupling.sweep.further import bodies_of, exponents_of, sections_of, sectors_of, stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
@@ -119,9 +119,10 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
         exponents=dict(exponents_of(parts["exponents"], grid.shape)),
-        sections=dict(sections_of(parts["sections"], grid.shape, len(grid.base.damper))),
+        sections=dict(sections_of(parts["sections"], grid.shape, bodies_of(grid.base))),
         stress=dict(stresses_of(parts["stress"], grid.shape)),
         wear=dict(wear_of(parts["wear"], grid.shape)),
+        sectors=dict(sectors_of(parts["sectors"], grid.shape)),
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})

@@ -22,12 +22,15 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.further import (
     WEARS,
+    bodies_of,
     exponent_width,
     put_exponents,
     put_sections,
+    put_sectors,
     put_stresses,
     put_wear,
     section_width,
+    sector_width,
     stress_width,
 )
 from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
@@ -136,18 +139,18 @@ def _status(code: int, figures: np.ndarray) -> Status:
 
 
 def parts_of(base: Scene) -> dict[str, slice]:
-    """Return the columns of a point behind COLUMNS: "in_plane", "exponents", "sections", "wear" and "stress"."""
-    in_plane = len(IN_PLANE) * len(base.damper) if base.planar else 0
+    """Return the columns of a point behind COLUMNS, by the names of what further.py keeps, and "in_plane"."""
+    in_plane = len(IN_PLANE) * bodies_of(base) if base.planar else 0
     wear = len(WEARS) if base.wear is not None else 0
-    widths = in_plane, exponent_width(base), section_width(base), wear, stress_width(base)
+    widths = in_plane, exponent_width(base), section_width(base), wear, stress_width(base), sector_width(base)
     ends = np.cumsum([len(COLUMNS), *widths]).tolist()
-    names = ("in_plane", "exponents", "sections", "wear", "stress")
+    names = ("in_plane", "exponents", "sections", "wear", "stress", "sectors")
     return {name: slice(*between) for name, between in zip(names, itertools.pairwise(ends), strict=True)}
 
 
 def width_of(base: Scene) -> int:
     """Return the number of columns of a scene's points."""
-    return int(parts_of(base)["stress"].stop)
+    return int(parts_of(base)["sectors"].stop)
 
 
 def broken(error: BaseException, width: int = len(COLUMNS), points: int = 1) -> TaskResult:
@@ -229,6 +232,7 @@ def _run(
     put_sections(row[parts["sections"]], section[response.transient :])
     put_stresses(row[parts["stress"]], maker.base, response.stress)
     put_wear(row[parts["wear"]], response.wear)
+    put_sectors(row[parts["sectors"]], response.sectors)
     return response.final, (response.status.value, response.classification)
 
 

@@ -42,8 +42,8 @@ def ring_in_file(structure: Structure) -> RingFacts | None:
     """Return the facts of a structure that is a ring; None for any other."""
     if not isinstance(structure, Ring):
         return None
-    facts = _whole(structure).provenance["ring"]
-    return RingFacts(int(facts["sectors"]), tuple(facts["labels"]))
+    ring = _ring(structure.file, file_stamp(structure.file))
+    return RingFacts(ring.sectors, ring.interface)
 
 
 def reduced_model(structure: Rom, speed: float) -> ReducedModel:

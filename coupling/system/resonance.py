@@ -19,6 +19,8 @@ from vanedamp.files.toml_input import InputError
 
 #: fraction of the largest product of response and loads below which loads do not excite a mode
 _UNMOVED = 1e-9
+#: entries of the matrices that are solved together
+_TOGETHER = 1 << 22
 
 
 def excitation_force(scene: Scene) -> float:
@@ -78,9 +80,16 @@ def steady_motion(
 
     Raises LinAlgError at a resonance without damping.
     """
+    loads = np.broadcast_to(force, (len(omega), force.shape[-1]))[:, :, None]
+    parts = np.array_split(np.arange(len(omega)), 1 + len(omega) * len(stiffness) ** 2 // _TOGETHER)
+    return np.concatenate([_solved(stiffness, damping, mass, loads[part], omega[part]) for part in parts])
+
+
+def _solved(
+    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, loads: np.ndarray, omega: np.ndarray
+) -> np.ndarray:
     omega = omega[:, None, None]
     dynamic = np.diag(stiffness) + 1j * omega * damping - omega**2 * mass
-    loads = np.broadcast_to(force[..., None], (len(omega), force.shape[-1], 1))
     return np.asarray(np.linalg.solve(dynamic, loads)[:, :, 0])
 
 

@@ -161,7 +161,7 @@ class _Statics:
         matrices = self.problem.matrices
         self._free = matrices.free
         self._factors = factorize(matrices.of_free(matrices.stiffness))
-        self._stiffness = sector.matrices.stiffness + sector.coupling(number)
+        self._stiffness = sector.stiffness(number)
         self._mass = sector.matrices.mass
         self.factor = sector.sectors * (0.5 if self.problem.travels else 1.0)
 

@@ -180,7 +180,7 @@ def amplification(
     that rotates. The response includes all waves of the ring. Raises RingError.
     """
     tuned = Natural.of(ring, speed=speed)
-    low, high = band_hz or _band(ring, tuned, 0)
+    low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
     reference = float(tuned.forced(ring, order, label).peaks(low, high)[0].max())
     return _amplified(Natural.of(ring, deviations, speed).forced(ring, order, label), reference, low, high)
 
@@ -213,7 +213,7 @@ def mistuning_study(
     if not numbers or not len(orders):
         raise RingError("seeds: expected at least one draw, and one engine order")
     tuned = Natural.of(ring, speed=speed)
-    low, high = band_hz or _band(ring, tuned, family)
+    low, high = _band(ring, tuned, family) if band_hz is None else band_hz
     nominal = [tuned.forced(ring, order, label) for order in orders]
     peaks = [one.peaks(low, high) for one in nominal]
     largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.modal.cyclic_modes import RingModes, ring_modes
+from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes
 from vanedamp.modal.eigen import factorize
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
@@ -27,14 +28,16 @@ def ring_sector(structure: Structure) -> CyclicSector:
 
 @stage("modes of the ring")
 def ring_analysis(structure: Structure, report: Callable[[int, int], None] | None = None) -> RingModes:
-    """Return the modes of every nodal diameter, as many as [modes] asks for.
+    """Return the modes of every nodal diameter, as many as [modes] asks for, with the gyroscopic coupling if the case
+    wants it.
 
     report: called with the number of diameters done, and of all. Raises what `ring_sector` and `ring_modes` raise.
     """
-    table = structure.case.modes
-    return ring_modes(
-        ring_sector(structure), table.count or MODES, table.max_frequency, report=report, solver=table.solver
-    )
+    table, rotation, sector = structure.case.modes, structure.case.rotation, ring_sector(structure)
+    count = table.count or MODES
+    if rotation is not None and structure.rotating is not None and rotation.gyroscopic:
+        return gyroscopic_ring_modes(sector, structure.rotating, rotation.omega, count, report=report)
+    return ring_modes(sector, count, table.max_frequency, report=report, solver=table.solver)
 
 
 @stage("reduced ring")

@@ -18,7 +18,7 @@ def ledger(result: Reference) -> dict[str, float]:
     y = result.solution(t)
     _, _, qd, rd = system.split(y)
     bodies = rd + system.W.T @ qd
-    load = (system.force @ qd) * system.wave(system.shares, t)
+    load = ((system.force @ qd) * system.phasor(system.shares, t)).imag
     load -= ((system.m * system.base) @ bodies) * system.wave(system.base_shares, t)
     terms = {
         "excitation": load,

@@ -148,6 +148,8 @@ class System:
         self._functionals(scene, row, len(M))
         self.M, self.C, self.K = M, C / self.omega, K / self.omega**2
         self.force = self.output * (excitation.force or 0.0) / unit - load * base
+        if excitation.load:  # of order 1, complex: sines of several phases
+            self.force = excitation.level / unit * sum(each.amplitude * row(each.at) for each in excitation.load)
         self.q0 = np.full(len(M), scene.initial.displacement / self.length)
         self.qd0 = np.full(len(M), scene.initial.velocity / (self.length * self.omega))
         self.inverse = np.linalg.inv(M)
@@ -208,7 +210,11 @@ class System:
 
     def wave(self, shares: np.ndarray, t: np.ndarray | float) -> np.ndarray:
         """Im sum_k shares_k exp(i orders_k t) at times of any shape."""
-        return np.tensordot(shares, np.exp(1j * np.multiply.outer(self.orders, t)), 1).imag
+        return self.phasor(shares, t).imag
+
+    def phasor(self, shares: np.ndarray, t: np.ndarray | float) -> np.ndarray:
+        """sum_k shares_k exp(i orders_k t) at times of any shape."""
+        return np.tensordot(shares, np.exp(1j * np.multiply.outer(self.orders, t)), 1)
 
     def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Views of q, r, q', r' in a state."""
