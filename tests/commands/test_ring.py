@@ -88,15 +88,34 @@ def test_modes_are_those_at_the_speed(folder, found):
 
 
 def test_meetings_are_those_of_solutions_at_their_speeds(folder, found):
-    """The curves between the speeds of the diagram, against the sector at the speeds at which they are met."""
+    """Against full solutions of the sector at the speeds at which they are met."""
     structure = assemble(vd.Case.load(folder / "case.toml"))
     assert len(found.meetings) > 3
     for each in found.meetings[::2]:
         case = vd.Case.load(folder / "case.toml")
         there = vd.ring_modes(case.ring.sector(structure.rotating.at(each.speed), case.rotation), 2)
         at = (there.diameters == found.diameters[each.mode]) & (there.families == found.modes.families[each.mode])
-        assert there.frequencies_hz[at] == pytest.approx([each.frequency_hz], rel=1e-4)
+        assert there.frequencies_hz[at] == pytest.approx([each.frequency_hz], rel=2e-8)
         assert min(each.order % 6, -each.order % 6) == found.diameters[each.mode]
+
+
+def test_gyroscopic_coupling_parts_the_waves(tmp_path, capsys):
+    """Each order meets the wave of its sense: order 1 and 7 the backward one of diameter 1, order 5 the forward one."""
+    (tmp_path / "case.toml").write_text(DISK + TURNING.replace("rpm = 30000", "rpm = 30000\ngyroscopic = true"))
+    assert main(["ring", str(tmp_path / "case.toml"), "--json", str(tmp_path / "ring.json")]) == 0
+    result = json.loads((tmp_path / "ring.json").read_text())
+    assert result["excited"] == {"1": 1, "4": -2, "5": -1, "7": 1, "10": -2}
+    assert {(each["order"], each["diameter"]) for each in result["meetings"]} <= {
+        (1, 1),
+        (4, -2),
+        (5, -1),
+        (7, 1),
+        (10, -2),
+    }
+    assert len(result["meetings"]) > 3
+    waves = {(h, f): hz for h, f, hz in zip(result["diameter"], result["family"], result["frequency_hz"], strict=True)}
+    assert abs(waves[1, 0] / waves[-1, 0] - 1.0) > 1e-4
+    assert "1 backward" in capsys.readouterr().out
 
 
 def test_json_summary_and_report(folder, found, capsys):
