@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
@@ -28,9 +28,9 @@ _FAMILIES = 3
 
 
 def run(arguments: Namespace, case: Case) -> None:
-    """Compute the modes, and where engine orders meet them."""
+    """Compute the modes, where engine orders meet them, and the amplification of a mistuned ring."""
     if arguments.vtu:  # reports missing packages before the work
-        from vanedamp.studies.report.pictures import save_vtk
+        import vanedamp.studies.report.pictures  # noqa: F401
     operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
     if operating is not None and not operating[0] <= operating[1]:
         raise InputError("--rpm: expected the lowest speed, then the highest")
@@ -39,18 +39,31 @@ def run(arguments: Namespace, case: Case) -> None:
     started = time.perf_counter()
     structure = assemble(case)
     modes = ring_analysis(structure)
-    with progress("speeds") as report:
+    with progress("diameters") as report:
         found = ring_interference(structure, modes, operating, arguments.orders, report)
     study = None if case.mistuning is None else _study(arguments, structure, found)
-    seconds = time.perf_counter() - started
-    mesh, cell_type = structure.mesh()
+    warnings = unit_doubts(structure)
+    result = found.to_json() | {"warnings": warnings, "wall_time_s": time.perf_counter() - started}
+    lines, files = [*_summary(found)], _files(structure, found)
+    if study is not None:
+        result["mistuning"] = study.to_json()
+        lines += _amplification(study)
+        files["mistuning"] = study.save
+    write_result(arguments, result, lines, warnings, **files)
+
+
+def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str], object]]:
+    """Return by its option what writes a file of the modes."""
+    modes, (mesh, cell_type) = found.modes, structure.mesh()
 
     def save(path: str) -> None:
         variables, attributes = found.riding()
-        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": case.damping_ratio}
+        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": structure.matrices.damping_ratio}
         modes.save(path, mesh | variables, attributes)
 
     def vtu(path: str) -> None:
+        from vanedamp.studies.report.pictures import save_vtk
+
         ring = whole_ring(modes, mesh["coordinates"].values, mesh["cell"].values)
         named = ((f"{found.name(k)}: {hz:.6g} Hz", ring.shape(modes, k)) for k, hz in enumerate(modes.frequencies_hz))
         save_vtk(with_parts(named), ring.points, ring.cells, cell_type, path)
@@ -60,14 +73,7 @@ def run(arguments: Namespace, case: Case) -> None:
 
         interference_picture(found, Path(path))
 
-    warnings = unit_doubts(structure)
-    result = found.to_json() | {"warnings": warnings, "wall_time_s": seconds}
-    lines, files = [*_summary(found)], {"output": save, "vtu": vtu, "picture": picture}
-    if study is not None:
-        result["mistuning"] = study.to_json()
-        lines += _amplification(study)
-        files["mistuning"] = study.save
-    write_result(arguments, result, lines, warnings, **files)
+    return {"output": save, "vtu": vtu, "picture": picture}
 
 
 def _study(arguments: Namespace, structure: Structure, found: Interference) -> MistuningStudy:

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
 from vanedamp.studies.report.mode_chart import (
-    EXAGGERATION,
     MOST_TRIANGLES,
     deformed_mesh,
     in_space,
@@ -25,6 +24,8 @@ from vanedamp.studies.ring_mesh import WholeRing, joints, whole_ring
 _ELEVATIONS = (55.0, 30.0)
 #: the longest side of the scene, as the eye's distance counts it
 _SIDE = 1.8
+#: largest displacement over the ring's size
+_EXAGGERATION = 0.03
 #: of the shapes in a page, which are whole numbers
 _STEPS = 32767
 
@@ -75,7 +76,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     largest = np.sqrt((np.abs(shapes) ** 2).sum(axis=2)).max(axis=1)
     relative = np.stack([shapes.real, shapes.imag], axis=-1) / largest[:, None, None, None]
     moved = modes.whole(mode)[ring.sector, ring.node] / largest[mode]
-    scale = EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
+    scale = _EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
     turns = Rotation.from_rotvec(np.outer(2.0 * np.pi * np.arange(modes.sectors) / modes.sectors, modes.axis))
     figure = go.Figure(deformed_mesh(points + scale * moved, np.linalg.norm(moved, axis=1), ring.cells))
     in_space(figure, viewpoint(points, moved, _ELEVATIONS))
