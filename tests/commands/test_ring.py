@@ -269,3 +269,9 @@ def test_deviations_that_are_given_are_one_draw(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(DISK + MISTUNED.replace("std = 0.01", "pattern = [0.02, -0.02]"))
     assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1"]) == 0
     assert "1 draw of [mistuning]" in capsys.readouterr().out
+
+
+def test_pages_are_of_rings_only(tmp_path, capsys):
+    """`vanedamp explore` writes a page of a ring's modes; of scenes it serves one."""
+    assert main(["explore", "-o", str(tmp_path / "page.html"), "--no-browser"]) == BAD_INPUT
+    assert "is written of a ring's modes" in capsys.readouterr().err and not (tmp_path / "page.html").exists()
