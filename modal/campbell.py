@@ -200,11 +200,13 @@ _OF_RING: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
     "diameters": ("diameter", ("mode",), "1", np.int64),
     "families": ("family", ("mode",), "1", np.int64),
 }
-#: crossings and approaches: columns by their fields, in order, with type and unit
+#: columns of crossings by their fields, in order, with type and unit
+CROSSINGS: dict[str, tuple[Any, str]] = {
+    "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
+}  # fmt: skip
+#: the same of crossings and approaches
 _TABLES: dict[str, tuple[Callable[..., Any], dict[str, tuple[Any, str]]]] = {
-    "crossing": (Crossing, {
-        "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
-    }),
+    "crossing": (Crossing, CROSSINGS),
     "approach": (Approach, {
         "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
         "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),

@@ -7,13 +7,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.ring_model import RingModel
 
 #: by model, which never changes; the files stay until the program ends
-_FILES: weakref.WeakKeyDictionary[ReducedModel, str] = weakref.WeakKeyDictionary()
+_FILES: weakref.WeakKeyDictionary[ReducedModel | RingModel, str] = weakref.WeakKeyDictionary()
 _FOLDERS: list[TemporaryDirectory[str]] = []
 
 
-def file_of(model: ReducedModel) -> str:
+def file_of(model: ReducedModel | RingModel) -> str:
     """Return the file of a model in memory, written on the first call to a temporary folder of this process."""
     if model not in _FILES:
         if not _FOLDERS:

@@ -91,6 +91,8 @@ def _impact_exponent(scene: Scene) -> float | None:
 
 def _check_bodies(scene: Scene, system: System) -> None:
     """Raise InputError for bodies in the plane, or a contact law of theirs, that a method does not take."""
+    if scene.repeats:
+        raise InputError("structure: sectors of the ring are still to be written out; model_order.choices.choose does")
     for number, damper in enumerate(scene.damper):
         if damper.shape == "auto":
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')

@@ -55,7 +55,11 @@ def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[
         if int(head) >= len(nodes):
             raise InputError(f"scene: {path}: there are only {len(nodes)} entries, counted from 0")
         return [nodes[int(head)]], steps[1:]
-    named = [node for node in nodes if node.get("name") == head]
+    named = [node for node in nodes if node.get("name") == head] or [
+        node
+        for node in nodes
+        if str(node.get("name")).partition("@")[0] == head  # its copies in sectors of a ring
+    ]
     if named:
         return named, steps[1:]
     if len(steps) > 1:

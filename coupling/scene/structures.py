@@ -64,19 +64,23 @@ class Rigid:
         return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness_at(speed))
 
 
+#: models of a scene by the types of those in memory
+_KINDS = {"ReducedModel": "rom", "RingModel": "ring"}
+
+
 def _file(model: Any) -> Any:
-    """Return the file of a reduced model in memory; anything else as it is."""
+    """Return the file of a reduced model, or of a reduced ring, in memory; anything else as it is."""
     if isinstance(model, str | Mapping):
         return model
-    from vanedamp.rom.in_memory import ReducedModel, file_of
+    from vanedamp.rom.in_memory import ReducedModel, RingModel, file_of
 
-    return file_of(model) if isinstance(model, ReducedModel) else model
+    return file_of(model) if isinstance(model, ReducedModel | RingModel) else model
 
 
 def _structure(structure: Any) -> Any:
     """Return the table of a reduced model in memory; anything else as it is."""
     file = _file(structure)
-    return structure if file is structure else {"model": "rom", "file": file}
+    return structure if file is structure else {"model": _KINDS[type(structure).__name__], "file": file}
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -16,6 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.resonance import steady_motion
+from vanedamp.coupling.system.sectors import unrolled
 
 #: R omega^2 over the acceleration of friction from which on a body slips without a stop (Code_Aster, SDND104)
 NEVER_STICKS = math.sqrt(1.0 + math.pi**2 / 4.0)
@@ -69,6 +70,7 @@ def onsets(scene: Scene) -> list[Onset | None]:
     In the ratio of the linear response without bodies, at the excitation's frequency. None for a body that a spring or
     a track binds, that rolls or begins tilted, that its neighbours do not follow, and under other loads than a sine.
     """
+    scene = unrolled(scene)
     system, count = assemble(scene), len(scene.damper)
     if scene.excitation.signal is not None or len(system.frequency) != 1:
         return [None] * count

@@ -13,11 +13,12 @@ import numpy as np
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.rom.checks import shaped, symmetric, unit
+from vanedamp.rom.checks import shaped, symmetric
 from vanedamp.rom.dense_modes import modal_damping
-from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.waves import Waves, turns
+from vanedamp.rom.ring.placement import Ring, turns
+from vanedamp.rom.ring.waves import Waves
 from vanedamp.rom.truncation import massless
 
 _KIND = "ring-model"
@@ -41,7 +42,7 @@ _SYMMETRIC = ("stiffness", "mass", "centrifugal_stiffness")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingModel(Displayed):
+class RingModel(Ring, Displayed):
     """A reduced ring of N equal sectors: n real waves of modal mass 1, and one sector's fields in them.
 
     The first `modes` waves are natural modes of the tuned ring at standstill; the others add the static response to
@@ -97,10 +98,13 @@ class RingModel(Displayed):
                 found = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
                 object.__setattr__(self, name, found)
         object.__setattr__(self, "diameters", store.frozen(self.diameters, np.int64))
-        object.__setattr__(self, "directions", unit(self.directions))
-        object.__setattr__(self, "interface", tuple(str(label) for label in self.interface))
-        object.__setattr__(self, "provenance", dict(self.provenance))
+        self._settle()
         _check_waves(self)
+
+    @property
+    def size(self) -> int:
+        """Number of waves n."""
+        return len(self.squares)
 
     @property
     def waves(self) -> Waves:
@@ -137,9 +141,10 @@ class RingModel(Displayed):
         added = self.added_damping(deviations)
         lighter = deviations.of("mass", self.sectors)
         return ReducedModel(
-            mass=mass, stiffness=stiffness, damping=damping if added is None else damping + added, **self._placed,
+            mass=mass, stiffness=stiffness, damping=damping if added is None else damping + added, **self.placed(),
+            selection=self.rows.reshape(-1, len(self.squares)),
             base_load=self._load(1.0, self.base_load) + self._load(lighter, self.part_load),
-            damping_ratio=self.damping_ratio if added is None else None, provenance=self._provenance, **self._rotation,
+            damping_ratio=self.damping_ratio if added is None else None, **self._rotation,
         )  # fmt: skip
 
     def matrices(self, deviations: Deviations, speed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -177,28 +182,6 @@ class RingModel(Displayed):
     def _travelling(self) -> dict[str, np.ndarray]:
         return {name: self.waves.travelling(getattr(self, name)) for name in ("stiffness", "mass")}
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """The N k labels, sector by sector."""
-        return tuple(sector_label(label, sector) for sector in range(self.sectors) for label in self.interface)
-
-    @cached_property
-    def _placed(self) -> dict[str, Any]:
-        """Interface and base load of the whole ring, as fields of a ReducedModel."""
-        rotations = turns(self.axis, self.sectors)
-
-        def turned(vectors: np.ndarray) -> np.ndarray:
-            return np.einsum("sij,kj->ski", rotations, vectors).reshape(-1, 3)
-
-        return {
-            "interface": self.labels,
-            "selection": self.rows.reshape(-1, len(self.squares)),
-            "directions": turned(self.directions),
-            "normals": turned(self.normals),
-            "positions": self.point + turned(self.positions - self.point),
-            "arms": np.tile(self.arms, self.sectors),
-        }
-
     def _load(self, weights: np.ndarray | float, load: np.ndarray) -> np.ndarray:
         """Return the load (n, 3) of the whole ring by an acceleration of the base, from a sector's by weights."""
         weighted = np.broadcast_to(weights, self.sectors)[:, None, None] * self.waves.in_sectors(load.T)
@@ -212,14 +195,6 @@ class RingModel(Displayed):
             "centrifugal_stiffness": self.centrifugal_stiffness, "rotation_axis": self.axis,
             "rotation_point": self.point, "greatest_speed": self.greatest_speed,
         }  # fmt: skip
-
-    @property
-    def _provenance(self) -> dict[str, Any]:
-        ring = {
-            "sectors": self.sectors, "axis": self.axis.tolist(), "point": self.point.tolist(),
-            "labels": list(self.interface),
-        }  # fmt: skip
-        return dict(self.provenance) | {"ring": ring}
 
     def _of_waves(self, whole: ReducedModel) -> ReducedModel:
         """Return the tuned ring in its natural modes as they stand, pair by pair, with residual flexibility."""
@@ -256,18 +231,8 @@ class RingModel(Displayed):
         )
 
 
-def sector_label(label: str, sector: int) -> str:
-    """Return the label of a sector's interface coordinate in the whole ring, such as "c1@3" or "c1@3.normal"."""
-    for suffix in (NORMAL, ROTATION):
-        if label.endswith(suffix):
-            return f"{label.removesuffix(suffix)}@{sector}{suffix}"
-    return f"{label}@{sector}"
-
-
 def _check_waves(ring: RingModel) -> None:
     """Raise RingError unless the waves of a ring are whole pairs."""
-    if not ring.interface:
-        raise RingError("interface: empty; a reduced ring needs a coordinate that loads can act on")
     if ring.sectors < 1 or np.any(2 * ring.diameters > ring.sectors) or np.any(ring.diameters < 0):
         raise RingError(f"diameters: expected 0 to {ring.sectors // 2}, half of the {ring.sectors} sectors")
     paired = np.flatnonzero((ring.diameters > 0) & (2 * ring.diameters < ring.sectors))

@@ -49,6 +49,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
             f"{'motion':26} {found['motion']}: largest exponent {found['exponent']:.4g} +- {found['confidence']:.2g} "
             f"1/s, {found['exponent_per_period']:.4g} per period ({found['status']}, {found['periods']} periods)"
         )
+    if response.sectors is not None:
+        lines.append(f"{'sectors':26} {response.sectors.sentence}")
     lines += [f"{'contact':26} {contact.sentence}" for contact in response.contacts or ()]
     lines += wear_lines(response)
 

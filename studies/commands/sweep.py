@@ -14,6 +14,7 @@ from vanedamp.studies.commands.support.ensembles import run_ensemble
 from vanedamp.studies.commands.support.messages import print_note, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
+from vanedamp.studies.report.sector_charts import ring_sentence
 from vanedamp.studies.sweep_steps import PEAK_SAMPLES, finish, prepare, run_peak, run_points
 from vanedamp.studies.workers import available_cores, workers
 
@@ -65,6 +66,8 @@ def _summary(result: Sweep, responses: Sequence[ForcedResponse]) -> Iterator[str
             )
             continue
         yield response.sentence
+    if result.sectors:
+        yield ring_sentence(result)
     bad = [status for status in result.status.ravel() if status != "ok"]
     if bad:
         yield f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}"

@@ -78,7 +78,7 @@ def panels_figure(sweep: Sweep, drawn: list[Panel], two: tuple[str, str] | None,
         shared_yaxes="all", horizontal_spacing=0.05, vertical_spacing=_BETWEEN / (rows * tall),
     )  # fmt: skip
     across, up = two
-    units = sweep.units()
+    units = sweep.units() | {"sector": "1"}
     (wide, wide_units), (high, high_units) = for_people(units[across]), for_people(units[up])
     for number, (_, x, y, values) in enumerate(drawn):
         figure.add_heatmap(

@@ -15,6 +15,7 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.response.response import PlanarSamples, Response
 from vanedamp.coupling.scene.registration import meets_body
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
@@ -31,7 +32,7 @@ from vanedamp.studies.report.plane_history import (
 _MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
 #: results of a run that are nested data
-_NESTED = ("stress", "strength", "wear")
+_NESTED = ("stress", "strength", "wear", "sectors")
 #: distance of lines of impacts below the displacement, over its range
 _TICKS = 0.07
 
@@ -46,7 +47,7 @@ class History:
     hits          time (s) and place, as of an event, of the impacts
     by_place      impacts of planar bodies in the evaluated periods, by contact
     measures      plain results and energies of the run, as `vanedamp run --json` has them
-    scene         what was run; None if the file does not say
+    scene         what was run, of a ring written out by sector; None if the file does not say, or its ring is gone
     """
 
     time: np.ndarray
@@ -68,7 +69,7 @@ class History:
         energy = json.loads(attributes.pop("energy", "{}"))
         strength = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
         begin = attributes.get("transient", 0) / attributes["frequency"]
-        scene = validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None
+        scene = _scene(provenance["scene"], path) if "scene" in provenance else None
         return cls(
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
@@ -94,7 +95,7 @@ class History:
             by_place=[],
             measures=response.to_json(),
             provenance={},
-            scene=scene,
+            scene=scene and unrolled(scene),
         )
 
     @property
@@ -145,6 +146,14 @@ class History:
             except (VanedampError, OSError):
                 return None
         return motion_of(self.scene, self.time, self.displacement, self.bodies, plane, self.hits)
+
+
+def _scene(data: Mapping[str, Any], path: str | Path) -> Scene | None:
+    scene = validate(Scene, data, str(path))
+    try:
+        return unrolled(scene)
+    except (VanedampError, OSError):
+        return None
 
 
 def history_figure(history: History) -> go.Figure:

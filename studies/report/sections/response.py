@@ -16,6 +16,7 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.sector_charts import sectors_shown
 from vanedamp.studies.report.strength import contacts_shown, spots_shown
 from vanedamp.studies.report.time_history import History, history_figure
 
@@ -27,7 +28,7 @@ HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_
 def load(path: Path) -> Result:
     """Read what `vanedamp run` wrote."""
     history = History.load(path)
-    return Result.of(history, None if history.scene is None else history.scene.to_dict())
+    return Result.of(history, history.provenance.get("scene"))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
@@ -42,9 +43,11 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
     shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
     shown["static"] = history.measures.get("static_deflection", 0.0)  # earlier files have none
     shown |= {"hits": bool(history.hits), "note": body_note(history.measures, history.scene)}
-    shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear"))
+    shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear", "sectors"))
     if stress := history.measures.get("stress"):
         shown["stress"] = spots_shown(file, stress, history.measures.get("strength", {}), page)
+    if sectors := history.measures.get("sectors"):
+        shown["sectors"] = sectors_shown(file, sectors, page)
     if wear := history.measures.get("wear"):
         shown["wear"] = contacts_shown(file, wear, page)
     if len(history.time):

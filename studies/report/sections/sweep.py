@@ -54,6 +54,7 @@ from vanedamp.studies.report.map_chart import (
 )
 from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.sector_charts import ring_shown
 from vanedamp.studies.report.strength import sweep_shown
 
 ORDER = 50
@@ -84,6 +85,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
         "diagrams": [_diagram(file, sweep, page) for file, sweep in sweeps.items() if diagram_axis(sweep)],
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
+        "rings": [ring_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.sectors],
         "strength": [sweep_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.stress or sweep.wear],
         "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
     }

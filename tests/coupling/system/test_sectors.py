@@ -1,11 +1,14 @@
 """Scenes of rings, written out by sector."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.tools.rings import Chain
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.body_loads import body_loads
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force, force_shapes
@@ -153,6 +156,32 @@ def test_paths_of_the_compact_scene_change_all_sectors(file):
     changed = unrolled(made.replace({"cavity.c.gap": 2e-4, "damper.1.mass": 0.03}))
     assert {cavity.gap for cavity in changed.cavity} == {2e-4}
     assert [body.mass for body in changed.damper] == [0.01, 0.03] * 6
+
+
+def test_a_path_names_the_copies_of_a_cavity(file):
+    made = unrolled(scene(file, cavity__c__sectors=[0, 3]))
+    changed = made.replace({"cavity.c.gap": 3e-4})
+    assert [cavity.gap for cavity in changed.cavity] == [3e-4, 3e-4]
+    assert made.replace({"cavity.c@3.gap": 2e-4}).cavity[0] == made.cavity[0]
+
+
+def test_a_ring_in_memory_is_a_structure():
+    made = validate(
+        Scene, {"structure": CHAIN.ring(), "excitation": {"frequency": 1.0, "force": 1.0, "at": "tip"}}, "scene"
+    )
+    assert made.structure.model == "ring"
+    assert basis_of(made).stiffness == pytest.approx(np.sort(CHAIN.squares(CHAIN.diameters)))
+
+
+def test_rotation_presses_the_bodies_of_all_sectors_by_their_radius(tmp_path):
+    # the bodies slide along the axis, at the radius of their label
+    path = tmp_path / "turning.h5"
+    ring = CHAIN.ring()
+    replace(ring, centrifugal_stiffness=0.0 * ring.stiffness, greatest_speed=800.0).save(path)
+    made = unrolled(scene(str(path), rotation={"speed": 300.0}, damper__friction=0.3))
+    loads = body_loads(made, basis_of(made))
+    assert loads.across == pytest.approx(np.full(12, 300.0**2 * CHAIN.radius))
+    assert loads.along == pytest.approx(np.zeros(12), abs=1e-9)
 
 
 def test_a_compact_scene_is_assembled_written_out(file):

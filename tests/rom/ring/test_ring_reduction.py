@@ -12,9 +12,9 @@ from tests.tools.rings import LumpedDisk
 from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.forced import forced
+from vanedamp.rom.ring.placement import turns
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
-from vanedamp.rom.ring.waves import turns
 
 TIP = [InterfaceCoordinate("tip", "tip", (0, 1, 0), "node"), InterfaceCoordinate("root", "root", (1, 0, 0), "node")]
 # the first family, apart from the others

@@ -22,6 +22,7 @@ from vanedamp.coupling.system.linear_response import glued_mass, linear_amplitud
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds, points_of
@@ -65,7 +66,7 @@ def facts_of(scene: Scene) -> list[Fact]:
     if scene.axes and not leaves_open(scene):
         points = grid(scene)
         scene, warnings = points.base, list(points.warnings)
-    scene = replace(scene, sweep={})
+    scene = unrolled(replace(scene, sweep={}))
     if leaves_open(scene):
         warnings.append('modes or shape = "auto" is chosen by the run: figures here are of all modes, and of sliders')
         scene = _closed(scene)
