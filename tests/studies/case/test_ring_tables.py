@@ -71,14 +71,14 @@ def test_case_that_rotates_has_the_axis_and_waves_of_its_rotation(tmp_path):
 
 
 def test_separate_structures_are_coupled_by_springs(tmp_path):
-    """Without springs that matter every diameter is alike; with them they part."""
+    """With springs too soft to matter every diameter is alike; with stiff ones they differ."""
     spring = '[[ring.spring]]\nlow = "low"\nhigh = "high"\nstiffness = '
     weak, strong = (
         ring_analysis(assemble(load(changed(CASE, (FACES, "")) + spring + stiffness, tmp_path))).table
         for stiffness in ("1e-3", "[1e8, 1e8, 1e8]")
     )
     assert np.ptp(weak, axis=0).max() < 1e-6 * weak.max()
-    assert np.ptp(strong[:, 0]) > 0.01 * strong[0, 0] and np.all(strong > weak)
+    assert np.ptp(strong[:, 0]) > 0.01 * strong[0, 0] and np.all(strong[1:] > 1.001 * weak[1:])
 
 
 @pytest.mark.parametrize(
