@@ -64,7 +64,7 @@ def test_case_that_rotates_has_the_axis_and_waves_of_its_rotation(tmp_path):
     diagram = campbell_diagram(structure)
     assert np.array_equal(diagram.diameters, found.diameters) and diagram.gyroscopic
     assert diagram.frequencies_hz[:, -1] == pytest.approx(found.frequencies_hz, rel=1e-8)
-    assert diagram.label(2) == "1 of h=+1"
+    assert diagram.label(2) == "1 of h=1"
     diagram.save(tmp_path / "campbell.h5")
     again = type(diagram).load(tmp_path / "campbell.h5")
     assert again.to_json() == diagram.to_json()
