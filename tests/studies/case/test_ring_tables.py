@@ -8,7 +8,7 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_sector
-from vanedamp.studies.case.stages import assemble, campbell_diagram
+from vanedamp.studies.case.stages import assemble, campbell_diagram, modal_analysis
 from vanedamp.studies.case.tables import Case
 
 CASE = """
@@ -55,6 +55,12 @@ def test_modes_of_a_case(tmp_path):
     assert set(ring_analysis(assemble(up_to)).frequencies_hz < found.table[1, 0] + 1.0) == {True}
 
 
+def test_modes_of_the_sector_by_itself_come_with_a_warning(tmp_path):
+    axial = changed(CASE, ("count = 2", "count = 2\ndirection = [0, 0, 1]"))
+    found = modal_analysis(assemble(load(axial, tmp_path)))
+    assert any(warning.startswith("ring: these are modes of one sector whose") for warning in found.warnings)
+
+
 def test_case_that_rotates_has_the_axis_and_waves_of_its_rotation(tmp_path):
     structure = assemble(
         load(CASE + ROTATION + "[campbell]\nrpm = [0, 6000]\nengine_orders = [1]\nmodes = 2\n", tmp_path)
@@ -86,6 +92,11 @@ def test_separate_structures_are_coupled_by_springs(tmp_path):
     [
         ("[ring]\nsectors = 5", "[ring]\nsectors = 1", "ring.sectors: should be greater than or equal to 2 (got 1)"),
         ("[ring]\nsectors = 5\n", "[ring]\n", "ring.sectors: missing"),
+        (
+            "count = 2",
+            "min_frequency = 10.0\nmax_frequency = 1e4",
+            "modes.min_frequency: families of a ring count from",
+        ),
         ('high = "high"\n', "", "ring: give both faces, low and high, or none of separate structures"),
         (FACES, "", "ring: low: missing; give the faces low and high, or [[ring.spring]] of separate structures"),
         ('high = "high"', 'high = "low"', "ring: high: expected another group than low, 'low'"),
