@@ -14,30 +14,13 @@ from scipy import linalg, sparse
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.modal.algebra import first_largest
-from vanedamp.modal.cyclic import CyclicSector, Diameter, aliased
+from vanedamp.modal.cyclic import CyclicSector, Diameter
 from vanedamp.modal.cyclic_faces import CyclicError, rotation
 from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
 
 _KIND = "ring-modes"
 # of the squared length of a field: less is round-off of fields that the others determine
 _DEPENDENT = 1e-12
-
-
-class Meeting(NamedTuple):
-    """A natural frequency met by an engine order.
-
-    order, diameter, sense  of the excitation and as `cyclic.aliased` has them
-    family                  of the diameter
-    frequency_hz            of both
-    speed                   rad/s, at which they are equal, if the frequency does not change with the speed
-    """
-
-    order: int
-    diameter: int
-    sense: int
-    family: int
-    frequency_hz: float
-    speed: float
 
 
 class Family(NamedTuple):
@@ -104,16 +87,6 @@ class RingModes(Displayed):
         found = np.full((known.size, int(self.families.max()) + 1), np.nan)
         found[np.searchsorted(known, self.diameters), self.families] = self.frequencies_hz
         return found
-
-    def interference(self, orders: Iterable[int]) -> tuple[Meeting, ...]:
-        """Return where engine orders, of at least 1, meet the frequencies of the diameters that they excite."""
-        return tuple(
-            Meeting(order, diameter, sense, int(self.families[k]), hz := float(self.frequencies_hz[k]),
-                    2.0 * np.pi * hz / order)
-            for order in orders
-            for diameter, sense in [aliased(order, self.sectors)]
-            for k in np.flatnonzero(self.diameters == (diameter if diameter in self.diameters else -diameter))
-        )  # fmt: skip
 
     def whole(self, mode: int, phase: float = 0.0) -> np.ndarray:
         """Return the displacements (N, n_nodes, 3) of all sectors in the global axes, at a phase omega t (rad)."""

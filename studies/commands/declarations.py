@@ -97,8 +97,17 @@ COMMANDS = (
                 "--orders", type=order, nargs="+", metavar="R",
                 help="engine orders (default: those of [campbell], or 1 to the number of sectors)",
             ),
+            argument("--mistuning", metavar="FILE.h5", help="the amplification by [mistuning], for the report"),
+            argument(
+                "--draws", type=family_count, default=100, metavar="N",
+                help="draws of [mistuning], from its seed on (default: %(default)s)",
+            ),
+            argument(
+                "--family", type=family_count, default=1, metavar="N",
+                help="family, from 1, around whose frequencies amplification counts (default: %(default)s)",
+            ),
         ),
-        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",)},
+        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",), "mistuning": _RECORD},
         reads=Function("support.cases:read_ring_case"),
     ),
     Command(
