@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +61,8 @@ class Sector:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value, needed = getattr(self, item.name), item.name in _NEEDED
-            if not math.isfinite(value) or value < 0.0 or (needed and value == 0.0):
+            value = getattr(self, item.name)
+            if not math.isfinite(value) or value < 0.0 or (item.default is MISSING and value == 0.0):
                 raise ParameterError(f"{item.name}: expected a positive number, not {value}")
         if self.sectors < 2:
             raise ParameterError(f"sectors: expected at least 2, not {self.sectors}")
@@ -97,9 +97,6 @@ class Sector:
     def tip_wall(self) -> float:
         """Wall between the cavity and the tip, m."""
         return self.cavity_wall or 0.5 * (self.blade_length - self.cavity_length)
-
-
-_NEEDED = ("sectors", "inner_radius", "outer_radius", "thickness", "element_size")
 
 
 def _check_within(name: str, value: float, most: float) -> None:

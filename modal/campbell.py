@@ -99,10 +99,10 @@ class Campbell(Plotted):
         object.__setattr__(self, "provenance", dict(self.provenance))
 
     def label(self, mode: int) -> str:
-        """Return the name of a mode: its number from 1, or the family and the signed diameter of a ring's."""
+        """Return the name of a mode: its number from 1, or of a ring its family from 1 and its signed diameter."""
         if not self.diameters.size:
             return f"mode {mode + 1}"
-        return f"{self.families[mode] + 1} of h={self.diameters[mode]:+}"
+        return f"{self.families[mode] + 1} of h={self.diameters[mode]}"
 
     @property
     def rpm(self) -> np.ndarray:

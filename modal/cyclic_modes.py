@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,6 +18,8 @@ from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.cyclic import CyclicSector, Diameter
 from vanedamp.modal.cyclic_faces import CyclicError, rotation
 from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
+from vanedamp.modal.iterative import chosen
+from vanedamp.modal.petsc import one_analysis
 
 _KIND = "ring-modes"
 # of the squared length of a field: less is round-off of fields that the others determine
@@ -153,18 +156,20 @@ def ring_modes(
     """
     wanted = list(sector.diameters if diameters is None else diameters)
     found: list[Family] = []
-    for done, number in enumerate(wanted):
-        if report is not None:
-            report(done, len(wanted))
-        problem = sector.at(number)
-        copies = 2 if problem.travels else 1
-        try:
-            most = min(copies * count, problem.matrices.free.size)
-            modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
-        except NoModesError:
-            continue
-        found.append(_of_diameter(sector, problem, modes))
-        provenance = modes.provenance
+    # two factors are kept: where the memory may not hold them, each diameter is analysed by itself
+    roomy = chosen("auto", 2 * 2 * sector.matrices.size)["name"] == "factor"
+    with one_analysis() if roomy else contextlib.nullcontext():
+        for done, number in enumerate(wanted):
+            if report is not None:
+                report(done, len(wanted))
+            problem = sector.at(number)
+            most = min((2 if problem.travels else 1) * count, problem.matrices.free.size)
+            try:
+                modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
+            except NoModesError:
+                continue
+            found.append(_of_diameter(sector, problem, modes))
+            provenance = modes.provenance
     if not found:
         raise NoModesError(f"max_frequency: the ring has no mode up to {max_frequency} Hz; raise it")
     return gathered(sector, found, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})

@@ -63,6 +63,7 @@ _UNCOUNTED = (
     "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
     '(solver = "factor")'
 )
+_SECTOR_ONLY = "ring: these are modes of one sector whose faces are free; `vanedamp ring` has those of the ring"
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 # fraction of the interface's largest motion by a mode below which a coordinate does not show it
@@ -344,6 +345,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     warnings += unit_doubts(structure, lowest)
     if not modes.counted:
         warnings += (_UNCOUNTED,)
+    if case.ring is not None:
+        warnings += (_SECTOR_ONLY,)
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
         inertia = base_inertia(case, matrices, label)
