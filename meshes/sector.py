@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +61,8 @@ class Sector:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value, needed = getattr(self, item.name), item.name in _NEEDED
-            if not math.isfinite(value) or value < 0.0 or (needed and value == 0.0):
+            value = getattr(self, item.name)
+            if not math.isfinite(value) or value < 0.0 or (item.default is MISSING and value == 0.0):
                 raise ParameterError(f"{item.name}: expected a positive number, not {value}")
         if self.sectors < 2:
             raise ParameterError(f"sectors: expected at least 2, not {self.sectors}")
@@ -75,10 +75,18 @@ class Sector:
             _check_within("blade_thickness", self.blade_thickness, pitch)
             _check_within("blade_width", self.axial_width, self.thickness * (1.0 + 1e-12))
         if self.cavity_length:
-            _check_within("cavity_length", self.cavity_length + self.tip_wall, self.blade_length)
+            if not self.blade_length:
+                raise ParameterError("cavity_length: needs a blade; give blade_length")
+            _check_within("cavity_length", self.cavity_length, self.blade_length - self.cavity_wall)
             _check_within("cavity_thickness", self.cavity_thickness, self.blade_thickness)
             _check_within("cavity_width", self.cavity_width, self.axial_width)
-        check_elements(math.prod(len(line) - 1.0 for line in _lines(self)), "element_size")
+        sizes = (self.tip_radius - self.inner_radius, pitch, self.thickness)
+        check_elements(math.prod(max(length / self.element_size, 1.0) for length in sizes), "element_size")
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius of the tip of the blade, m."""
+        return self.outer_radius + self.blade_length
 
     @property
     def axial_width(self) -> float:
@@ -89,9 +97,6 @@ class Sector:
     def tip_wall(self) -> float:
         """Wall between the cavity and the tip, m."""
         return self.cavity_wall or 0.5 * (self.blade_length - self.cavity_length)
-
-
-_NEEDED = ("sectors", "inner_radius", "outer_radius", "thickness", "element_size")
 
 
 def _check_within(name: str, value: float, most: float) -> None:
@@ -123,7 +128,7 @@ def build(sector: Sector, path: str | os.PathLike[str]) -> Path:
 
 def _lines(sector: Sector) -> list[np.ndarray]:
     """Return the grid: radii (m), angles (rad) and heights (m) of its planes."""
-    half, tip = math.pi / sector.sectors, sector.outer_radius + sector.blade_length
+    half, tip = math.pi / sector.sectors, sector.tip_radius
     radii, angles, heights = [sector.inner_radius, sector.outer_radius], [half], [0.5 * sector.thickness]
     if sector.blade_length:
         radii.append(tip)
@@ -160,7 +165,7 @@ def _kinds(sector: Sector, lines: list[np.ndarray]) -> np.ndarray:
     blade = (angles < _angle(sector, sector.blade_thickness)) & (heights < 0.5 * sector.axial_width)
     kinds = np.where(radii < sector.outer_radius, _DISK, np.where(blade, _BLADE, _OUTSIDE))
     if sector.cavity_length:
-        end = sector.outer_radius + sector.blade_length - sector.tip_wall
+        end = sector.tip_radius - sector.tip_wall
         hollow = (angles < _angle(sector, sector.cavity_thickness)) & (heights < 0.5 * sector.cavity_width)
         kinds[hollow & (radii < end) & (radii > end - sector.cavity_length)] = _CAVITY
     return kinds

@@ -20,6 +20,11 @@ def symmetric_part(matrix: Matrix) -> Matrix:
     return part
 
 
+def hermitian_part(matrix: np.ndarray) -> np.ndarray:
+    """Return (A + A^H) / 2 of a dense matrix."""
+    return np.asarray(0.5 * (matrix + matrix.conj().T))
+
+
 def orthogonal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray]) -> np.ndarray:
     """Return fields (n, m) without their components along M-orthonormal blocks (n, k)."""
     for block in [*known, *known]:  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)

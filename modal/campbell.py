@@ -73,6 +73,8 @@ class Campbell(Plotted):
     gyroscopic      whether the modes have the gyroscopic coupling
     operating       lowest and highest speed of operation, rad/s, to which crossings have a margin; None: not known
     warnings        where modes could not be followed, or are not among those computed
+    diameters       of a ring, (m,) nodal diameters of the modes, -h of the wave that runs with the turn; else empty
+    families        of a ring, (m,) order within the diameter, from 0, in which curves of a diameter do not cross
     """
 
     speeds: np.ndarray
@@ -88,11 +90,19 @@ class Campbell(Plotted):
     operating: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    diameters: np.ndarray = field(default_factory=lambda: np.empty(0))
+    families: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        for name, (_, _, _, dtype) in _ARRAYS.items():
+        for name, (_, _, _, dtype) in (_ARRAYS | _OF_RING).items():
             object.__setattr__(self, name, store.frozen(getattr(self, name), dtype))
         object.__setattr__(self, "provenance", dict(self.provenance))
+
+    def label(self, mode: int) -> str:
+        """Return the name of a mode: its number from 1, or of a ring its family from 1 and its signed diameter."""
+        if not self.diameters.size:
+            return f"mode {mode + 1}"
+        return f"{self.families[mode] + 1} of h={self.diameters[mode]}"
 
     @property
     def rpm(self) -> np.ndarray:
@@ -116,6 +126,8 @@ class Campbell(Plotted):
             "rpm": self.rpm.tolist(),
             "asked": self.asked.tolist(),
             "mode": self.modes.tolist(),
+            "diameter": self.diameters.tolist(),
+            "family": self.families.tolist(),
             "frequency_hz": self.frequencies_hz.tolist(),
             "orders": list(self.orders),
             "crossings": [
@@ -134,7 +146,7 @@ class Campbell(Plotted):
         """Write an HDF5 record."""
         variables = {
             name: store.Variable(getattr(self, own).astype(np.int8 if dtype is bool else dtype), dims, units)
-            for own, (name, dims, units, dtype) in _ARRAYS.items()
+            for own, (name, dims, units, dtype) in (_ARRAYS | (_OF_RING if self.diameters.size else {})).items()
         }
         variables["engine_order"] = store.Variable(np.array(self.orders, dtype=float), ("engine_order",))
         for kind, (_, columns) in _TABLES.items():
@@ -159,7 +171,11 @@ class Campbell(Plotted):
             for kind, (made, columns) in _TABLES.items()
         )
         return cls(
-            **{own: values[name] for own, (name, *_) in _ARRAYS.items()},
+            **{
+                own: values[name]
+                for own, (name, *_) in (_ARRAYS | _OF_RING).items()
+                if name in values or own in _ARRAYS
+            },
             orders=tuple(values["engine_order"].tolist()),
             crossings=crossings,
             approaches=approaches,
@@ -179,11 +195,18 @@ _ARRAYS: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
     "errors": ("error", ("speed",), "1", float),
     "solved": ("solved_speed", ("solution",), "rad/s", float),
 }
-#: crossings and approaches: columns by their fields, in order, with type and unit
+#: the same of a ring
+_OF_RING: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
+    "diameters": ("diameter", ("mode",), "1", np.int64),
+    "families": ("family", ("mode",), "1", np.int64),
+}
+#: columns of crossings by their fields, in order, with type and unit
+CROSSINGS: dict[str, tuple[Any, str]] = {
+    "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
+}  # fmt: skip
+#: the same of crossings and approaches
 _TABLES: dict[str, tuple[Callable[..., Any], dict[str, tuple[Any, str]]]] = {
-    "crossing": (Crossing, {
-        "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
-    }),
+    "crossing": (Crossing, CROSSINGS),
     "approach": (Approach, {
         "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
         "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),
@@ -216,7 +239,7 @@ def campbell(
     Two modes cross where their frequencies agree to ten tolerances; otherwise they veer. Raises CampbellError,
     modal.rotating.UnstableError for a speed that the structure does not bear, and SolverError.
     """
-    wanted = _checked(speeds, orders, count, rotating.standing.free.size, tolerance)
+    wanted = checked_speeds(speeds, orders, count, rotating.standing.free.size, tolerance)
     report = report or (lambda done, total: None)
     report(0, 2)
     with SpeedRange(rotating, float(wanted[0]), float(wanted[-1]), count, gyroscopic, keep) as source:
@@ -272,7 +295,7 @@ def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> l
     return sorted(kept, key=lambda crossing: (crossing.speed, crossing.mode))
 
 
-def _checked(
+def checked_speeds(
     speeds: Sequence[float] | np.ndarray, orders: Sequence[float], count: int, size: int, tolerance: float
 ) -> np.ndarray:
     """Return the speeds. Raises CampbellError for arguments that make no diagram; size: number of free DOFs."""

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -135,9 +137,13 @@ class CyclicSector:
         given, travels = self.matrices, self.travels(diameter)
         expansion, kept, fixed = self._expansion(diameter, travels)
         copies = 2 if travels else 1
+        if self._parts is None:
+            stiffness, mass = (_real_form(expansion, one, travels) for one in (self.stiffness(diameter), given.mass))
+        else:
+            stiffness, mass = (part.real_form(diameter * self.angle, travels) for part in self._parts)
         matrices = SystemMatrices(
-            stiffness=_real_form(expansion, self.stiffness(diameter), travels),
-            mass=_real_form(expansion, given.mass, travels),
+            stiffness=stiffness,
+            mass=mass,
             coordinates=np.tile(given.coordinates[kept], (copies, 1)),
             fixed=np.concatenate([fixed + copy * 3 * kept.size for copy in range(copies)]),
             patches={},
@@ -173,6 +179,17 @@ class CyclicSector:
             total = total + stretch.conj().T @ (sparse.diags(stiffness) @ stretch)
         return sparse.csr_array(total)
 
+    @cached_property
+    def _parts(self) -> tuple[_Parts, _Parts] | None:
+        """Stiffness and mass by their dependence on the diameter; None with springs or nodes on the axis."""
+        if self.couplings or np.any(self.low == self.high):
+            return None
+        expansion = self._expansion(0, False)[0].real
+        beyond = sparse.diags(np.repeat(np.isin(np.arange(len(self.matrices.coordinates)), self.high), 3) * 1.0)
+        turned = sparse.csr_array(beyond @ expansion)
+        own = sparse.csr_array(expansion - turned)
+        return _Parts.of(self.matrices.stiffness, own, turned), _Parts.of(self.matrices.mass, own, turned)
+
     def _expansion(self, diameter: int, travels: bool) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
         """Return T_h (N, 3 m), the kept nodes (m,), and the fixed ones (f,) of its freedoms."""
         count, phase = len(self.matrices.coordinates), np.exp(1j * diameter * self.angle)
@@ -205,11 +222,38 @@ class CyclicSector:
         return np.pad(free, ((0, 0), (0, 3 - free.shape[1])))
 
 
+class _Parts(NamedTuple):
+    """A symmetric matrix in the freedoms of all diameters, on one pattern: even.real + even.imag cos + i odd sin."""
+
+    even: sparse.csr_array
+    odd: sparse.csr_array
+
+    @classmethod
+    def of(cls, matrix: sparse.csr_array, own: sparse.csr_array, turned: sparse.csr_array) -> _Parts:
+        """Return the parts for T_h = own + exp(i h alpha) turned."""
+        forces = matrix @ turned
+        alone, across = own.T @ (matrix @ own) + turned.T @ forces, sparse.csr_array(own.T @ forces)
+        return cls(*(sparse.csr_array(part) for part in (alone + 1j * (across + across.T), across - across.T)))
+
+    def real_form(self, angle: float, travels: bool) -> sparse.csr_array:
+        """Return the real form at h alpha (rad); zeros stay, so that all diameters have one pattern."""
+        even = _same_pattern(self.even, self.even.data.real + math.cos(angle) * self.even.data.imag)
+        return _doubled(even, _same_pattern(self.odd, math.sin(angle) * self.odd.data)) if travels else even
+
+
+def _same_pattern(matrix: sparse.csr_array, data: np.ndarray) -> sparse.csr_array:
+    return sparse.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
 def _real_form(expansion: sparse.csr_array, matrix: sparse.csr_array, travels: bool) -> sparse.csr_array:
-    product = expansion.conj().T @ (matrix @ expansion)
-    if not travels:
-        return sparse.csr_array(product.real)
-    return sparse.csr_array(sparse.bmat([[product.real, -product.imag], [product.imag, product.real]], format="csr"))
+    product = sparse.csr_array(expansion.conj().T @ (matrix @ expansion))
+    real, imaginary = product.real, product.imag
+    imaginary.eliminate_zeros()
+    return _doubled(real, imaginary) if travels else sparse.csr_array(real)
+
+
+def _doubled(real: sparse.csr_array, imaginary: sparse.csr_array) -> sparse.csr_array:
+    return sparse.csr_array(sparse.bmat([[real, -imaginary], [imaginary, real]], format="csr"))
 
 
 def cyclic_sector(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,30 +15,15 @@ from scipy import linalg, sparse
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.modal.algebra import first_largest
-from vanedamp.modal.cyclic import CyclicSector, Diameter, aliased
+from vanedamp.modal.cyclic import CyclicSector, Diameter
 from vanedamp.modal.cyclic_faces import CyclicError, rotation
 from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
+from vanedamp.modal.iterative import chosen
+from vanedamp.modal.petsc import one_analysis
 
 _KIND = "ring-modes"
 # of the squared length of a field: less is round-off of fields that the others determine
 _DEPENDENT = 1e-12
-
-
-class Meeting(NamedTuple):
-    """A natural frequency met by an engine order.
-
-    order, diameter, sense  of the excitation and as `cyclic.aliased` has them
-    family                  of the diameter
-    frequency_hz            of both
-    speed                   rad/s, at which they are equal, if the frequency does not change with the speed
-    """
-
-    order: int
-    diameter: int
-    sense: int
-    family: int
-    frequency_hz: float
-    speed: float
 
 
 class Family(NamedTuple):
@@ -105,16 +91,6 @@ class RingModes(Displayed):
         found[np.searchsorted(known, self.diameters), self.families] = self.frequencies_hz
         return found
 
-    def interference(self, orders: Iterable[int]) -> tuple[Meeting, ...]:
-        """Return where engine orders, of at least 1, meet the frequencies of the diameters that they excite."""
-        return tuple(
-            Meeting(order, diameter, sense, int(self.families[k]), hz := float(self.frequencies_hz[k]),
-                    2.0 * np.pi * hz / order)
-            for order in orders
-            for diameter, sense in [aliased(order, self.sectors)]
-            for k in np.flatnonzero(self.diameters == (diameter if diameter in self.diameters else -diameter))
-        )  # fmt: skip
-
     def whole(self, mode: int, phase: float = 0.0) -> np.ndarray:
         """Return the displacements (N, n_nodes, 3) of all sectors in the global axes, at a phase omega t (rad)."""
         steps = np.arange(self.sectors) * self.angle
@@ -180,18 +156,20 @@ def ring_modes(
     """
     wanted = list(sector.diameters if diameters is None else diameters)
     found: list[Family] = []
-    for done, number in enumerate(wanted):
-        if report is not None:
-            report(done, len(wanted))
-        problem = sector.at(number)
-        copies = 2 if problem.travels else 1
-        try:
-            most = min(copies * count, problem.matrices.free.size)
-            modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
-        except NoModesError:
-            continue
-        found.append(_of_diameter(sector, problem, modes))
-        provenance = modes.provenance
+    # two factors are kept: where the memory may not hold them, each diameter is analysed by itself
+    roomy = chosen("auto", 2 * 2 * sector.matrices.size)["name"] == "factor"
+    with one_analysis() if roomy else contextlib.nullcontext():
+        for done, number in enumerate(wanted):
+            if report is not None:
+                report(done, len(wanted))
+            problem = sector.at(number)
+            most = min((2 if problem.travels else 1) * count, problem.matrices.free.size)
+            try:
+                modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
+            except NoModesError:
+                continue
+            found.append(_of_diameter(sector, problem, modes))
+            provenance = modes.provenance
     if not found:
         raise NoModesError(f"max_frequency: the ring has no mode up to {max_frequency} Hz; raise it")
     return gathered(sector, found, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})

@@ -10,6 +10,7 @@ from scipy import sparse
 from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.modal.eigen import stable_share, static_shape
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.petsc import one_analysis
 from vanedamp.modal.statics import Statics
 
 
@@ -31,4 +32,5 @@ class RingStatics(Statics):
         """Return the largest fraction that leaves the ring stable in every nodal diameter."""
         sector = self._sector_of(matrices)
         problems = (sector.at(diameter) for diameter in sector.diameters)
-        return min(stable_share(problem.matrices, problem.real_form(added)) for problem in problems)
+        with one_analysis():
+            return min(stable_share(problem.matrices, problem.real_form(added)) for problem in problems)

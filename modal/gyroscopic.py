@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.modal import petsc
-from vanedamp.modal.algebra import orthonormal
+from vanedamp.modal.algebra import hermitian_part, orthonormal
 from vanedamp.modal.eigen import SPARE, SolverError, factorize, shape_signs, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
@@ -128,7 +128,7 @@ def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray
     frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system v' + W G v + kappa y = 0,
     y' = kappa v.
     """
-    squares, turn = linalg.eigh(0.5 * (stiffness + stiffness.conj().T))
+    squares, turn = linalg.eigh(hermitian_part(stiffness))
     kappa, coupled = np.sqrt(squares), turn.conj().T @ coupling @ turn
     skew = np.block([[0.5 * (coupled - coupled.conj().T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)

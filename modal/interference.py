@@ -9,17 +9,16 @@ Vargo, Schiffer and Dello (1988), Proceedings of the 17th Turbomachinery Symposi
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from vanedamp.files import store
 from vanedamp.files.display import Plotted
-from vanedamp.modal.campbell import Crossing
+from vanedamp.modal.campbell import CROSSINGS, Crossing
 from vanedamp.modal.cyclic import aliased
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.speed_range import RPM
@@ -34,6 +33,7 @@ class Interference(Plotted):
     operating      lowest and highest speed of operation, rad/s; None: not known
     speeds         (s,) rad/s, ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds
     over_speed_hz  (m, s) frequencies there; nan where a mode is not among those computed
+    crossings      of the orders and the modes of the diagram
     """
 
     modes: RingModes
@@ -42,6 +42,7 @@ class Interference(Plotted):
     operating: tuple[float, float] | None = None
     speeds: np.ndarray = field(default_factory=lambda: np.zeros(0))
     over_speed_hz: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    crossings: tuple[Crossing, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("speeds", "over_speed_hz"):
@@ -93,14 +94,18 @@ class Interference(Plotted):
     def meetings(self) -> tuple[Crossing, ...]:
         """Where an order has the frequency of a mode whose diameter it excites, by speed.
 
-        Over the speeds of the Campbell diagram, or of operation without one. Between its speeds the squared frequencies
-        are interpolated over the squared speed, on which those of one mode depend linearly.
+        Over the speeds of the Campbell diagram, or of operation without one.
         """
+        if self.speeds.size or self.operating is None:
+            return self.crossings
+        low, high = self.operating
         found = [
-            Crossing(mode, float(order), speed, order * speed / (2.0 * np.pi))
-            for mode, diameter in enumerate(self.modes.diameters.tolist())
+            Crossing(mode, float(order), speed, hz)
+            for mode, (diameter, hz) in enumerate(
+                zip(self.modes.diameters.tolist(), self.modes.frequencies_hz.tolist(), strict=True)
+            )
             for order in self.exciting(diameter)
-            for speed in self._speeds_met(mode, order)
+            if low <= (speed := 2.0 * np.pi * hz / order) <= high and speed > 0.0
         ]
         return tuple(sorted(found, key=lambda each: (each.speed, each.mode)))
 
@@ -109,23 +114,6 @@ class Interference(Plotted):
         """The meetings at speeds of operation."""
         operating = self.operating
         return () if operating is None else tuple(each for each in self.meetings if each.margin(operating) == 0.0)
-
-    def _speeds_met(self, mode: int, order: int) -> Iterator[float]:
-        """Yield the speeds, rad/s, at which an order has the frequency of a mode."""
-        per_speed = order / (2.0 * np.pi)
-        if not self.speeds.size:
-            speed = float(self.modes.frequencies_hz[mode]) / per_speed
-            if self.operating is not None and self.operating[0] <= speed <= self.operating[1] and speed > 0.0:
-                yield speed
-            return
-        known = np.isfinite(self.over_speed_hz[mode])
-        squares = self.speeds[known] ** 2
-        if squares.size < 2:
-            return
-        curve = CubicSpline(squares, self.over_speed_hz[mode, known] ** 2 - per_speed**2 * squares)
-        for root in np.unique(curve.roots(extrapolate=False)):
-            if root > 0.0:
-                yield float(np.sqrt(root))
 
     @property
     def folded_speeds(self) -> list[float]:
@@ -169,6 +157,9 @@ class Interference(Plotted):
                 "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
                 "frequency_over_speed": store.Variable(self.over_speed_hz, ("mode", "speed"), "Hz"),
             }
+            for name, (dtype, units) in CROSSINGS.items():
+                values = np.array([getattr(each, name) for each in self.crossings], dtype=dtype)
+                variables[f"crossing_{name}"] = store.Variable(values, ("crossing",), units)
         given = {"at_speed": self.speed, "operating": self.operating and list(self.operating)}
         return variables, {name: value for name, value in given.items() if value is not None}
 
@@ -185,4 +176,7 @@ class Interference(Plotted):
             operating=tuple(attributes["operating"]) if "operating" in attributes else None,
             speeds=values.get("speed", np.zeros(0)),
             over_speed_hz=values.get("frequency_over_speed", np.zeros((0, 0))),
+            crossings=tuple(map(Crossing, *(values[f"crossing_{name}"].tolist() for name in CROSSINGS)))
+            if "speed" in values
+            else (),
         )

@@ -12,7 +12,7 @@ import vanedamp.modal.stack  # noqa: F401
 # isort: split
 import contextlib
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -45,14 +45,11 @@ class Factorization:
         # only the factor is kept: its inputs take as much memory in the largest structures
         with contextlib.ExitStack() as stack:
             given = stack.enter_context(owned(_upper_triangle(matrix)))
-            ksp = stack.enter_context(owned(PETSc.KSP().create(PETSc.COMM_SELF)))
-            ksp.setOperators(given)
-            _set_direct(ksp, direct, inertia=direct == "mumps")
             try:
-                ksp.setUp()
+                self._factor = _factor(stack, given, direct, inertia=direct == "mumps")
             except PETSc.Error as error:
+                _forget(direct)
                 raise SolverError(f"{direct}: {' '.join(str(error).split())}") from error
-            self._factor = ksp.getPC().getFactorMatrix()
         try:
             self._check(matrix, self._factor.getMumpsInfog(1) if direct == "mumps" else 0)
         except BaseException:
@@ -182,6 +179,23 @@ def interval_eigenpairs(
     return _ascending(*_on_all_ranks("interval", (stiffness, mass), lower, upper))
 
 
+@contextlib.contextmanager
+def one_analysis() -> Iterator[None]:
+    """Within this context, factorise a matrix with the ordering and symbolic factors of one with the same pattern.
+
+    The last factors of each solver are kept for it, which takes memory; those of the next matrix take their place, so
+    that a Factorization serves until then. Without effect on several ranks.
+    """
+    global _analysed
+    before, _analysed = _analysed, {} if parallel.COMM.size == 1 else None
+    try:
+        yield
+    finally:
+        for one in (_analysed or {}).values():
+            one.destroy()
+        _analysed = before
+
+
 def ranks() -> contextlib.AbstractContextManager[bool]:
     """Yield True on MPI's rank 0, which runs the program, and False on the others once they have helped it."""
     return parallel.ranks(_assist)
@@ -206,11 +220,7 @@ def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], argument
 
 
 def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
-    ksp = stack.enter_context(owned(PETSc.KSP().create(parallel.COMM)))
-    ksp.setOperators(operators[0])
-    _set_direct(ksp, inertia=True)
-    ksp.setUp()
-    factor = ksp.getPC().getFactorMatrix()
+    factor = _factor(stack, operators[0])
     status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
     if status < 0:
         raise SolverError(
@@ -319,6 +329,53 @@ def _distributed(matrix: sparse.csr_array | None) -> Any:
     created = PETSc.Mat().createAIJ(size=(local, local), csr=csr, comm=parallel.COMM)
     created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     return created
+
+
+class _Analysed(NamedTuple):
+    """A matrix of PETSc and the direct solver that has analysed its pattern."""
+
+    ksp: Any
+    matrix: Any
+
+    def fits(self, matrix: Any) -> bool:
+        """Say whether a matrix has the same pattern."""
+        return all(map(np.array_equal, self.matrix.getRowIJ(), matrix.getRowIJ()))
+
+    def destroy(self) -> None:
+        self.ksp.destroy()
+        self.matrix.destroy()
+
+
+#: the last of each solver within `one_analysis`; None outside of it
+_analysed: dict[str, _Analysed] | None = None
+
+
+def _factor(stack: contextlib.ExitStack, matrix: Any, direct: str = "mumps", inertia: bool = True) -> Any:
+    """Return the factor of a matrix of PETSc, by itself or by the analysis of one with the same pattern."""
+    known = None if _analysed is None else _analysed.pop(direct, None)
+    if known is not None and known.fits(matrix):
+        matrix.copy(known.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        ksp, given = known
+    else:
+        if known is not None:
+            known.destroy()
+        ksp = PETSc.KSP().create(matrix.getComm())
+        given = matrix if _analysed is None else matrix.duplicate(copy=True)
+        ksp.setOperators(given)
+        _set_direct(ksp, direct, inertia)
+    if _analysed is None:
+        stack.callback(ksp.destroy)
+    else:
+        _analysed[direct] = _Analysed(ksp, given)
+    ksp.setOperators(given)
+    ksp.setUp()
+    return ksp.getPC().getFactorMatrix()
+
+
+def _forget(direct: str) -> None:
+    """Drop the analysis of a solver that has failed."""
+    if _analysed is not None and direct in _analysed:
+        _analysed.pop(direct).destroy()
 
 
 def _set_direct(ksp: Any, direct: str = "mumps", inertia: bool = False) -> None:

@@ -7,12 +7,13 @@ the shapes, and the error is estimated from the residual with the full matrices.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal.algebra import orthogonal, orthonormal, symmetric_part
+from vanedamp.modal.algebra import hermitian_part, orthogonal, orthonormal, symmetric_part
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
@@ -48,6 +49,8 @@ class SpeedRange:
     keep        of full solutions
 
     solved      rad/s, speeds with full solutions so far
+    basis       (n, r) fields over the free DOFs, mass-orthonormal
+    small       K0, K1, M and, with gyroscopic coupling, G in the basis
 
     Raises modal.rotating.UnstableError for a structure that is unstable at the maximum speed, and SolverError.
     """
@@ -65,7 +68,7 @@ class SpeedRange:
         named += [rotating.gyroscopic] if gyroscopic else []
         self._operators = [standing.of_free(matrix) for matrix in named]
         self._keep = keep
-        self._basis = np.empty((self._free.size, 0))
+        self.basis = np.empty((self._free.size, 0))
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
         self.solved: list[float] = []
@@ -113,16 +116,8 @@ class SpeedRange:
         return np.asarray(change / self._inertia(modes, speed))
 
     def meetings(self, order: float) -> np.ndarray:
-        """Return the speeds, rad/s, at which a frequency equals an engine order's, omega = order * W, ascending.
-
-        (K0 + W^2 (K1 + i order G - order^2 M)) x = 0 is linear in the squared speed. Its eigenvalues turn negative one
-        after the other, each once: the i-th speed belongs to the i-th lowest mode.
-        """
-        inertia = order**2 * self._small[2] - self._small[1]
-        if self.gyroscopic:
-            inertia = inertia - 1j * order * self._small[3]
-        values = linalg.eigh(0.5 * (inertia + inertia.conj().T), symmetric_part(self._small[0]), eigvals_only=True)
-        return np.asarray(1.0 / np.sqrt(values[values > 0.0][::-1]))
+        """Return the speeds, rad/s, at which a frequency equals an engine order's: `meetings`."""
+        return meetings(self.small, order)
 
     def errors(self, speed: float) -> np.ndarray:
         """Return the estimated relative errors (m,) of the frequencies at a speed.
@@ -134,7 +129,7 @@ class SpeedRange:
         these. So no mode below that line is missed, either.
         """
         modes = self.modes(speed)
-        if self._basis.shape[1] == self._free.size:
+        if self.basis.shape[1] == self._free.size:
             return np.zeros(self.count)
         omega, shapes = modes.frequencies, modes.shapes
         parts = [shapes, speed**2 * shapes, -(omega**2) * shapes]
@@ -167,36 +162,31 @@ class SpeedRange:
         self._highest.append(float(2.0 * np.pi * modes["frequency"][-1]) ** 2)
         shapes = modes["shape"]
         shapes = np.vstack([shapes.real, shapes.imag]) if self.gyroscopic else shapes
-        mass, known = self._operators[2], [self._basis]
+        mass, known = self._operators[2], [self.basis]
         rest = orthogonal(shapes[:, self._free].T, mass, known)
         lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2
         fields = orthonormal(rest[:, lacking], mass, known)
         if not fields.shape[1]:
             return
-        self._basis = np.hstack([self._basis, fields])
+        self.basis = np.hstack([self.basis, fields])
         for place, operator in enumerate(self._operators):
             forces = operator @ fields
             self._forces[place] = np.hstack([self._forces[place], forces])
             self._compliant[place] = np.hstack([self._compliant[place], self._factor.solve(forces)])
-        self._small = [self._basis.T @ forces for forces in self._forces]
+        self.small = [self.basis.T @ forces for forces in self._forces]
         self._gram = np.hstack(self._forces).T @ np.hstack(self._compliant)
         self._known: dict[float, SpeedModes] = {}
 
     def _ritz(self, speed: float) -> SpeedModes:
-        stiffness = self._stiffness(speed**2)
-        if self.gyroscopic:
-            frequencies, vectors = dense_modes(stiffness, speed * self._small[3])
-        else:
-            values, vectors = linalg.eigh(stiffness)
-            frequencies = np.sqrt(values)
+        frequencies, vectors = ritz_modes(self.small, speed)
         return SpeedModes(speed, frequencies[: self.count], vectors[:, : self.count])
 
     def _stiffness(self, squared_speed: float) -> np.ndarray:
-        return symmetric_part(self._small[0] + squared_speed * self._small[1])
+        return symmetric_part(self.small[0] + squared_speed * self.small[1])
 
     def _form(self, place: int, modes: SpeedModes) -> np.ndarray:
         shapes = modes.shapes
-        return np.einsum("im,im->m", shapes.conj(), self._small[place] @ shapes)
+        return np.einsum("im,im->m", shapes.conj(), self.small[place] @ shapes)
 
     def _coupling(self, modes: SpeedModes) -> np.ndarray:
         return np.asarray((1j * self._form(3, modes)).real)
@@ -205,3 +195,28 @@ class SpeedRange:
         """Return x^H (2 omega M - i W G) x of modes of unit length."""
         doubled = 2.0 * modes.frequencies
         return doubled - speed * self._coupling(modes) if self.gyroscopic else doubled
+
+
+def ritz_modes(small: Sequence[np.ndarray], speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return frequencies (rad/s) and vectors of all modes at a speed, within a mass-orthonormal basis.
+
+    small: K0, K1, M and, with gyroscopic coupling, G in the basis; Hermitian, and G skew-Hermitian.
+    """
+    stiffness = hermitian_part(small[0] + speed**2 * small[1])
+    if len(small) > 3:
+        return dense_modes(stiffness, speed * small[3])
+    values, vectors = linalg.eigh(stiffness)
+    return np.sqrt(values), vectors
+
+
+def meetings(small: Sequence[np.ndarray], order: float) -> np.ndarray:
+    """Return the speeds, rad/s, at which a frequency equals an engine order's, omega = order * W, ascending.
+
+    small: as in `ritz_modes`. (K0 + W^2 (K1 + i order G - order^2 M)) x = 0 is linear in the squared speed. Its
+    eigenvalues turn negative one after the other, each once: the i-th speed belongs to the i-th lowest mode.
+    """
+    inertia = order**2 * small[2] - small[1]
+    if len(small) > 3:
+        inertia = inertia - 1j * order * small[3]
+    values = linalg.eigh(hermitian_part(inertia), hermitian_part(small[0]), eigvals_only=True)
+    return np.asarray(1.0 / np.sqrt(values[values > 0.0][::-1]))

@@ -23,6 +23,7 @@ KINDS = {
             "vanedamp.studies.identification.tables:IdentificationFile",
             ("numbers", "forced", "decay", "impacts"),
         ),
+        FileKind("deviations", "vanedamp.studies.identification.deviations:DeviationsFile", ("deviations",)),
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
         FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),

@@ -44,6 +44,7 @@ from vanedamp.modal.cyclic_modes import RingModes as RingModes
 from vanedamp.modal.cyclic_modes import ring_modes as ring_modes
 from vanedamp.modal.eigen import Modes as Modes
 from vanedamp.modal.eigen import solve_modes as solve_modes
+from vanedamp.modal.interference import Interference as Interference
 from vanedamp.modal.matrices import Patch as Patch
 from vanedamp.modal.matrices import SystemMatrices as SystemMatrices
 from vanedamp.modal.rigid_model import RigidModel as RigidModel

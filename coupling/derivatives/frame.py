@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
+from vanedamp.coupling.derivatives.symmetry import Symmetry, mirror_of, wave_of
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
@@ -146,13 +147,19 @@ class Frame:
         ]))  # fmt: skip
 
     @cached_property
-    def image(self) -> np.ndarray | None:
-        """Map (k, k) of states to their mirror images; None for a scene without that symmetry: x(t) -> -x(t + T/2)."""
-        turned = _image_of(self.system)
-        if turned is None:
+    def mirror(self) -> Symmetry | None:
+        """Its symmetry x(t) -> -x(t + T/2), of states (k,); None for a scene without it."""
+        return self._of_states(mirror_of(self.system))
+
+    @cached_property
+    def wave(self) -> Symmetry | None:
+        """Its symmetry of travelling waves, of states (k,); None for a scene without it."""
+        return self._of_states(wave_of(self.scene, self.system))
+
+    def _of_states(self, symmetry: Symmetry | None) -> Symmetry | None:
+        if symmetry is None:
             return None
-        image: np.ndarray = self.to_state @ np.kron(np.eye(2), turned) @ self.from_state
-        return image
+        return symmetry._replace(image=self.to_state @ np.kron(np.eye(2), symmetry.image) @ self.from_state)
 
 
 def _signs(system: System, like: System) -> np.ndarray:
@@ -174,48 +181,3 @@ def _turned(system: System, sign: np.ndarray) -> System:
     return system._replace(
         viscous=system.viscous * sign * sign[:, None], **both, **{name: getattr(system, name) * own for name in rows}
     )  # fmt: skip
-
-
-def _image_of(system: System) -> np.ndarray | None:
-    """Return the map (N, N) of coordinates to the mirror image; None where that is another scene.
-
-    The motions of the structure and of the bodies along their cavities change sign, bodies in reversed order.
-    """
-    size, u = len(system.mass), len(system.rest)
-    image = -np.eye(size)
-    for index in set(system.cavity.tolist()):
-        row = np.flatnonzero(system.cavity == index)
-        for b, partner in zip(row, row[::-1], strict=True):
-            x, y = system.along[b], system.along[partner]
-            extended = system.tilt[b] >= 0
-            if extended != (system.tilt[partner] >= 0):
-                return None
-            image[x : x + 1 + 2 * extended] = 0.0
-            image[x, y] = -1.0
-            if extended:
-                image[x + 1, y + 1], image[x + 2, y + 2] = 1.0, -1.0
-    same = lambda a, b: np.allclose(a, b, rtol=1e-12, atol=1e-14 * np.abs(a).max(initial=0.0))  # noqa: E731
-    half = np.exp(1j * np.pi * system.order)
-    if not (
-        same(image.T @ np.diag(system.mass) @ image, np.diag(system.mass))
-        and same(image.T @ system.stiffness @ image, system.stiffness)
-        and same(image.T @ system.damping @ image, system.damping)
-        and same(system.load * half[:, None] @ image, system.load)
-        and same(-system.table * half, system.table)
-        and same(system.weight @ image, system.weight)
-    ):
-        return None
-    kinds = np.column_stack(
-        [system.friction, system.limit, system.restitution, system.dashpot, np.nan_to_num(system.spring, posinf=-1.0),
-         np.nan_to_num(system.rest), np.nan_to_num(system.play, posinf=-1.0)]
-    )  # fmt: skip
-    normal, slip = system.J[:u], system.J[u:]
-    for r in range(u):
-        partners = [
-            o for o in range(u)
-            if same(normal[r], normal[o] @ image) and same(kinds[r], kinds[o])
-            and (same(slip[r], -slip[o] @ image) or same(slip[r], slip[o] @ image))
-        ]  # fmt: skip
-        if not partners:
-            return None
-    return image

@@ -57,7 +57,8 @@ class Start:
         u, given = z[: dynamics.one], dynamics.from_state @ self._given
         M = self._placed(segment, z)
         n = self.system.modes
-        if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n]):
+        # of the largest mode: the bodies may move others by more than what the loads let expect of them
+        if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n].max(initial=0.0)):
             status = PassageStatus.GRAZING  # the structure would begin beyond a stop
         hit = event.struck[event.impulse[event.struck] != 0.0]
         rows = dynamics.speed[hit, : dynamics.one]

@@ -53,22 +53,22 @@ class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
     turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
-    a search for the clearance; given: as in Start; half_way: if `halves`, state (k,) and derivatives (k, k) and (k, P)
-    half a period after the start, of a passage without its derivative only the state; else, or if the engine has not
-    come so far, None.
+    a search for the clearance; given: as in Start; reached: state (k,) and derivatives (k, k) and (k, P) a part of a
+    period after the start, of a passage without its derivative only the state; None without a part, or if the engine
+    has not come so far; short: whether the passage ends there, its own end unknown.
     """
 
     def __init__(
         self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
         numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
-        given: bool = False, halves: bool = False,
+        given: bool = False, part: float = np.inf, short: bool = False,
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole = dynamics, names, derivative
-        self._frame, self._numbers, self._watch, self._halves = dynamics.frame, numbers, watch, halves
+        self._frame, self._numbers, self._watch, self._part, self._short = dynamics.frame, numbers, watch, part, short
         self._start = Start(dynamics, state, numbers, turns, given)
         self.derivative = Derivative(dynamics, self._start, numbers)
         self._crossings, self._clearance = list[Crossing](), (np.inf, "")
-        self.half_way: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.reached: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
@@ -77,8 +77,10 @@ class PassageWalk:
         by_number = np.full((k, 0 if self._numbers is None else len(self._numbers)), np.nan)
         with np.errstate(invalid="ignore"):  # a derivative that is not known is nan
             before = self._walked(walk)
-            final = run.final() if walk.status is Status.OK else None
-            if before is None or final is None:
+            final = run.final() if walk.status is Status.OK and not self._short else None
+            if self._short and self.reached is not None:
+                state, derivative, by_number = self.reached
+            elif before is None or final is None:
                 made.worsen(PassageStatus.STOPPED)
             else:
                 state = self._frame.state_of(final)
@@ -93,16 +95,18 @@ class PassageWalk:
 
     def _walked(self, walk: Walk) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
-        dynamics, half = self._dynamics, 0.5 * self._frame.system.period
+        dynamics, part = self._dynamics, self._part * self._frame.system.period
         before: Before | None = None
         for segment in walk:
             assert segment.event is not None
             flow, u = dynamics.flow(segment.state, segment.open_force), dynamics.state(segment)
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
-            if self._halves and segment.period == 0 and segment.time <= half <= segment.time + segment.duration:
-                middle = self._followed(Before(segment, segment.event, flow, z, M), half - segment.time, None)
-                self.half_way = dynamics.to_state @ middle.u, *self.derivative.reached(middle, 0.5)
+            if segment.period == 0 and segment.time <= part <= segment.time + segment.duration:
+                middle = self._followed(Before(segment, segment.event, flow, z, M), part - segment.time, None)
+                self.reached = dynamics.to_state @ middle.u, *self.derivative.reached(middle, self._part)
+                if self._short:
+                    return middle
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue

@@ -40,22 +40,32 @@ class IllConditioned(ArithmeticError):
     """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
-def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any]) -> tuple[Any, int]:
+def with_free_place(
+    stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray | None = None
+) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
     A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
-    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again or, by the
+    times (s,) at which its places were last used, gives away the one that has waited longest, as it is.
     """
     free = np.flatnonzero(filled == 0)
     if len(free):
         return stack, int(free[0])
     size = len(filled)
     if 2 * sum(part.nbytes for part in stack) > ROOM:
-        return empty(size), 0
+        if used is None:
+            return empty(size), 0
+        return stack, int(np.argmin(used))
     larger = empty(2 * size)
     for part, old in zip(larger, stack, strict=True):
         part[:size] = old
     return larger, size
+
+
+def places(empty: Callable[[int], Any], room: int) -> int:
+    """Return how many places of a stack `empty(size)` so many bytes hold, all zeros of which take no memory."""
+    return max(4, room // sum(part.nbytes for part in empty(1)))
 
 
 class EventDrivenRun(ABC):

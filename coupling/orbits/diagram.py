@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.orbits.waves import find_wave
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -133,7 +135,10 @@ class Diagram:
         for start in starts.candidates:
             problem = self._problem(start.periods)
             row = problem.along_parameter
-            orbit = solve(problem, problem.pack(start.state, self.low), row, np.zeros(problem.size))
+            if self.table.wave:
+                orbit = replace(find_wave(problem.map, start.state), parameter=self.low)
+            else:
+                orbit = solve(problem, problem.pack(start.state, self.low), row, np.zeros(problem.size))
             problem.count["iterations"] += orbit.iterations
             if orbit.status is OrbitStatus.OK:
                 return Continuation.begin(problem, self.table, orbit, row), list(failed)

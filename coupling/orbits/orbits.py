@@ -21,6 +21,7 @@ from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.orbit_stress import orbit_stresses
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
+from vanedamp.coupling.orbits.waves import find_wave
 from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -48,7 +49,7 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     else:
         candidates = list(search.starts().candidates)
     for state, periods in candidates:
-        found = newton.find_orbit(search.map.over(periods), state)
+        found = (find_wave if search.table.wave else newton.find_orbit)(search.map.over(periods), state)
         if found.status is OrbitStatus.OK:
             break
     return replace(found, parameter=search.low)
@@ -168,7 +169,8 @@ class _Search:
             ends = [with_choices(end, choices).scene for end in ends]
         self.first = ends[0]
         second = "" if track is None else track.parameter
-        self.map: PeriodMap = period_map(self.first, path, self.table.periods or 1, second)
+        self._periods = 1 if self.table.wave else self.table.periods
+        self.map: PeriodMap = period_map(self.first, path, self._periods or 1, second)
 
     def _share(self, second: float) -> float:
         """Return where a value lies in the range of the second number, 0 to 1."""
@@ -187,8 +189,8 @@ class _Search:
     def starts(self) -> Starts:
         """Return the states from which the first orbit is sought. Raises InputError if the run ends early."""
         if self.table.start == "linear":
-            return of_linear_motion(self.map, self.first, self.table.periods)
-        return of_run(self.map, simulate(self.first), self.table.periods)
+            return of_linear_motion(self.map, self.first, self._periods)
+        return of_run(self.map, simulate(self.first), self._periods)
 
 
 def _at(scene: Scene, values: Mapping[str, float]) -> Scene:

@@ -16,6 +16,7 @@ from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
+from vanedamp.coupling.derivatives.symmetry import Symmetry
 from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
@@ -37,7 +38,9 @@ class PeriodMap:
 
     scene: with the map's parameter (a dotted path in it) at its value; scale: (k,) typical sizes of the coordinates,
     the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
-    of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives.
+    of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives;
+    wave: whether a passage ends, with its sectors shifted, after the part of a period in which a travelling wave comes
+    to the next one (derivatives.symmetry.wave_of): travelling waves are fixed points of it.
     """
 
     scene: Scene
@@ -46,6 +49,7 @@ class PeriodMap:
     scale: np.ndarray
     speed: float | None = None
     numbers: tuple[str, ...] = ()
+    wave: bool = False
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
     _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
@@ -76,21 +80,28 @@ class PeriodMap:
         Without the derivative, in less than half of the time, the derivative, the speeds of crossings and the clearance
         are unknown, and the status is OK or STOPPED.
         """
+        if self.wave:
+            return self._shared(self.travelling, state, derivative, True)
         if not np.all(np.isfinite(state)):
             return Passage.stopped(state, self.periods, len(self.numbers))
-        return self._walk(state, self.periods, derivative, False)[0]
+        return self._walk(state, self.periods, derivative)[0]
+
+    @property
+    def travelling(self) -> Symmetry | None:
+        """Symmetry of travelling waves, of states (k,); None for a scene without it."""
+        return self._frame.wave
 
     def _walk(
-        self, state: np.ndarray, periods: int, derivative: bool, halves: bool = True
+        self, state: np.ndarray, periods: int, derivative: bool, part: float = np.inf, short: bool = False
     ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
-        """Return a passage from a state (k,), and state and derivatives half a period after the start."""
+        """Return a passage from a state (k,), and state and derivatives at a part of a period; short: it ends there."""
         run = run_from(self._frame, state, periods)
         for earlier in self._earlier:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
         numbers = self._numbers if derivative else None
-        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers, halves=halves)
-        return walk.passage(run, periods), walk.half_way
+        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers, part=part, short=short)
+        return walk.passage(run, periods), walk.reached
 
     def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
@@ -141,11 +152,11 @@ class PeriodMap:
 
         None, too, where the engine does not come so far.
         """
-        image = self._frame.image
-        if image is None:
+        mirror = self._frame.mirror
+        if mirror is None:
             return None
-        passage, half = self._walk(state, 1, False)
-        return None if half is None or passage.status is PassageStatus.STOPPED else image @ half[0]
+        passage, half = self._walk(state, 1, False, mirror.part)
+        return None if half is None or passage.status is PassageStatus.STOPPED else mirror.image @ half[0]
 
     def half(self, state: np.ndarray, derivative: bool = True) -> Passage:
         """Return a passage of one period that ends, mirrored, half a period after the start.
@@ -153,11 +164,17 @@ class PeriodMap:
         Symmetric orbits are fixed points of it, and one that loses its symmetry has a multiplier of -1 there. Of a
         scene with that symmetry (`mirrored`).
         """
-        image = self._frame.image
-        passage, half = self._walk(state, 1, derivative) if np.all(np.isfinite(state)) else (None, None)
-        if image is None or passage is None or half is None:
+        return self._shared(self._frame.mirror, state, derivative, False)
+
+    def _shared(self, symmetry: Symmetry | None, state: np.ndarray, derivative: bool, short: bool) -> Passage:
+        """Return a passage of one period, or a short one, that ends after a part of a period with its image."""
+        passage, reached = None, None
+        if symmetry is not None and np.all(np.isfinite(state)):
+            passage, reached = self._walk(state, 1, derivative, symmetry.part, short)
+        if symmetry is None or passage is None or reached is None:
             return Passage.stopped(state, 1, len(self.numbers))
-        return passage._replace(state=image @ half[0], derivative=image @ half[1], by_number=image @ half[2])
+        there, by_state, by_number = (symmetry.image @ each for each in reached)
+        return passage._replace(state=there, derivative=by_state, by_number=by_number)
 
 
 def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "") -> PeriodMap:

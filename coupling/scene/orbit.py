@@ -40,6 +40,9 @@ class Orbit:
     """periods of the excitation that the motion takes to repeat (default: those of the run; 1 with "linear")"""
     start: Literal["run", "linear"] = "run"
     """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
+    wave: bool = False
+    """find a travelling wave of a tuned ring, in which each sector does the same one phase later, in a part of the
+    time; of a single orbit"""
     parameter: str = "excitation.frequency"
     """dotted path of the number that changes along the branch"""
     from_: Annotated[Real | None, Field(alias="from")] = None
@@ -68,6 +71,8 @@ class Orbit:
             raise ValueError("to: say where the branch that begins at `from` ends, or leave `from` out")
         if self.to is not None and self.to == self.from_:
             raise ValueError(f"to ({self.to:g}) must differ from `from`")
+        if self.wave and (self.to is not None or (self.periods or 1) != 1):
+            raise ValueError("wave: is found over one period, and not followed; leave `to` and `periods` out")
         if self.track is not None and self.to is None:
             raise ValueError("track: special points are those of a branch; give `to`")
         within = None if self.track is None else self.track.within

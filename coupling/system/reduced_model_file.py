@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,11 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
+
+if TYPE_CHECKING:
+    from vanedamp.rom.ring.ring_model import RingModel
+    from vanedamp.rom.ring.sector_ring import SectorRing
 
 
 class Restricted(NamedTuple):
@@ -130,8 +133,10 @@ def _loaded(file: str, _stamp: int) -> ReducedModel:
 
 
 @lru_cache(maxsize=8)
-def _ring(file: str, _stamp: int) -> RingModel:
-    return RingModel.load(file)
+def _ring(file: str, _stamp: int) -> RingModel | SectorRing:
+    from vanedamp.rom.ring.sector_ring import load_ring  # for scenes of rings only
+
+    return load_ring(file)
 
 
 @lru_cache(maxsize=8)

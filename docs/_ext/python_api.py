@@ -62,7 +62,7 @@ PARTS = (
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),
     Part("vanedamp.studies.life", ("study", "life", "record", "slow")),
-    Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density")),
+    Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density", "deviations")),
 )
 
 

@@ -18,7 +18,9 @@ from scipy import linalg
 from vanedamp.files import store
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.ring_model import RingModel, sector_label
+from vanedamp.rom.ring.placement import sector_label
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing
 
 # half-bandwidths around every resonance at which a response is sampled, and halvings of the bracket of a peak
 _AROUND = np.array([-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
@@ -69,8 +71,8 @@ class Forced:
 
 
 def forced_response(
-    model: RingModel | ReducedModel, order: int, frequencies_hz: np.ndarray, label: str, at: str | None = None,
-    deviations: Deviations | None = None,
+    model: RingModel | SectorRing | ReducedModel, order: int, frequencies_hz: np.ndarray, label: str,
+    at: str | None = None, deviations: Deviations | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return the complex amplitudes (f, N), m/N, of every sector under an engine order of unit force at a label.
 
@@ -85,15 +87,15 @@ def forced_response(
 
 
 def forced(
-    model: RingModel | ReducedModel, order: int, label: str, at: str | None = None,
+    model: RingModel | SectorRing | ReducedModel, order: int, label: str, at: str | None = None,
     deviations: Deviations | None = None, speed: float = 0.0,
 ) -> Forced:  # fmt: skip
     """Return the response to an engine order over all frequencies. Arguments and errors: see `forced_response`.
 
     speed: of a reduced ring that rotates, rad/s.
     """
-    if isinstance(model, RingModel):
-        return Natural.of(model, deviations, speed).forced(model, order, label, at)
+    if not isinstance(model, ReducedModel):
+        return natural_of(model, deviations, speed).forced(order, label, at)
     ring = model.provenance.get("ring")
     if ring is None:
         raise RingError("model: no reduced ring; a force that turns around needs the sectors of one")
@@ -112,28 +114,53 @@ def forced(
 class Natural(NamedTuple):
     """All natural modes of a ring with deviations: squares (n,), shapes (n, n) in its waves, modal damping (n, n)."""
 
+    ring: RingModel
     squares: np.ndarray
     shapes: np.ndarray
     damping: np.ndarray
 
-    @classmethod
-    def of(cls, ring: RingModel, deviations: Deviations | None = None, speed: float = 0.0) -> Natural:
-        """Return those of a ring at a speed, rad/s. Raises RingError where it can move freely or is unstable."""
-        deviations = deviations or Deviations()
-        mass, stiffness = ring.matrices(deviations, speed)
-        squares, shapes = linalg.eigh(stiffness, mass)
-        if squares[0] <= 0.0:
-            raise RingError("the ring can move freely, or is unstable at that speed: it has no response to compare")
-        damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
-        if (added := ring.added_damping(deviations)) is not None:
-            damping = damping + shapes.T @ added @ shapes
-        return cls(squares, shapes, damping)
-
-    def forced(self, ring: RingModel, order: int, label: str, at: str | None = None) -> Forced:
+    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
         """Return the response to an engine order. Raises RingError for an unknown label."""
+        ring = self.ring
         load = self.shapes.T @ load_of(ring, order, label)
         rows = ring.rows[:, place_of(ring.interface, at or label)] @ self.shapes
         return _superposed(self.squares, self.damping, rows, load, np.zeros(ring.sectors))
+
+
+class OfModel(NamedTuple):
+    """The same of a ring's reduced model, in the modes that it keeps."""
+
+    model: ReducedModel
+
+    @property
+    def squares(self) -> np.ndarray:
+        """(n,) squared angular frequencies."""
+        return self.model.squares
+
+    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
+        """Return the response to an engine order. Raises RingError for an unknown label."""
+        return forced(self.model, order, label, at)
+
+
+def natural_of(
+    ring: RingModel | SectorRing, deviations: Deviations | None = None, speed: float = 0.0
+) -> Natural | OfModel:
+    """Return the natural modes of a ring with deviations, at a speed, rad/s.
+
+    Raises RingError where it can move freely or is unstable.
+    """
+    deviations = deviations or Deviations()
+    if isinstance(ring, SectorRing):
+        # a family above those of the model, too, which responds to the same forces
+        return OfModel(ring.model(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
+    mass, stiffness = ring.matrices(deviations, speed)
+    squares, shapes = linalg.eigh(stiffness, mass)
+    if squares[0] <= 0.0:
+        raise RingError("the ring can move freely, or is unstable at that speed: it has no response to compare")
+    damping = np.diag(2.0 * ring.damping_ratio * np.sqrt(squares))
+    if (added := ring.added_damping(deviations)) is not None:
+        damping = damping + shapes.T @ added @ shapes
+    return Natural(ring, squares, shapes, damping)
 
 
 def _superposed(

@@ -14,8 +14,9 @@ from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
-from vanedamp.rom.ring.forced import Forced, Natural, participation
+from vanedamp.rom.ring.forced import Forced, Natural, OfModel, natural_of, participation
 from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.rom.ring.whitehead import whitehead_bound
 
 _KIND = "mistuning"
@@ -171,22 +172,22 @@ class MistuningStudy(Displayed):
 
 
 def amplification(
-    ring: RingModel, deviations: Deviations, order: int, label: str, band_hz: Sequence[float] | None = None,
-    speed: float = 0.0,
+    ring: RingModel | SectorRing, deviations: Deviations, order: int, label: str,
+    band_hz: Sequence[float] | None = None, speed: float = 0.0,
 ) -> Amplification:  # fmt: skip
     """Return the amplification of a ring with deviations under an engine order at an interface label.
 
     band_hz: two frequencies between which the peaks count (default: around the first family); speed: rad/s, of a ring
-    that rotates. The response includes all waves of the ring. Raises RingError.
+    that rotates. The response of a RingModel includes all of its waves. Raises RingError.
     """
-    tuned = Natural.of(ring, speed=speed)
+    tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
-    reference = float(tuned.forced(ring, order, label).peaks(low, high)[0].max())
-    return _amplified(Natural.of(ring, deviations, speed).forced(ring, order, label), reference, low, high)
+    reference = float(tuned.forced(order, label).peaks(low, high)[0].max())
+    return _amplified(natural_of(ring, deviations, speed).forced(order, label), reference, low, high)
 
 
 def mistuning_study(
-    ring: RingModel,
+    ring: RingModel | SectorRing,
     table: Table,
     orders: Sequence[int],
     seeds: int | Sequence[int],
@@ -212,9 +213,9 @@ def mistuning_study(
     numbers = list(range(table.seed, table.seed + seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
     if not numbers or not len(orders):
         raise RingError("seeds: expected at least one draw, and one engine order")
-    tuned = Natural.of(ring, speed=speed)
+    tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, family) if band_hz is None else band_hz
-    nominal = [tuned.forced(ring, order, label) for order in orders]
+    nominal = [tuned.forced(order, label) for order in orders]
     peaks = [one.peaks(low, high) for one in nominal]
     largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
     references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
@@ -225,8 +226,8 @@ def mistuning_study(
         if report is not None:
             report(done, len(numbers))
         deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
-        natural = Natural.of(ring, deviations, speed)
-        responses = [natural.forced(ring, order, label) for order in orders]
+        natural = natural_of(ring, deviations, speed)
+        responses = [natural.forced(order, label) for order in orders]
         first = first or (deviations, responses)
         found.append([_amplified(one, top, low, high) for one, top in zip(responses, references, strict=True)])
     assert first is not None
@@ -244,7 +245,7 @@ def mistuning_study(
     )  # fmt: skip
 
 
-def _band(ring: RingModel, tuned: Natural, family: int) -> tuple[float, float]:
+def _band(ring: RingModel | SectorRing, tuned: Natural | OfModel, family: int) -> tuple[float, float]:
     """Return the edges of the band, Hz, around a family's frequencies, of families apart from each other."""
     own = np.sqrt(tuned.squares[family * ring.sectors : (family + 1) * ring.sectors]) / (2.0 * np.pi)
     if len(own) < ring.sectors or not 0 <= family < ring.modes // ring.sectors:

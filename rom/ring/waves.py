@@ -15,7 +15,6 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
-from vanedamp.modal.cyclic_faces import rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +77,3 @@ class Waves:
         steps = (self.wavenumbers[None, :] - self.wavenumbers[:, None]) % self.sectors
         found = (self._travelling @ (travelling * transform[steps]) @ self._travelling.conj().T).real
         return np.asarray(0.5 * (found + found.T))
-
-
-def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
-    """Return the rotations (N, 3, 3) of the sectors' frames about an axis (3,)."""
-    return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])

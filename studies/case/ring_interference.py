@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
-from vanedamp.studies.case.ring_stages import ring_analysis
-from vanedamp.studies.case.stages import Structure
+from vanedamp.studies.case.stages import Structure, campbell_diagram
 
 #: about the speed of [rotation], speeds of operation where nothing says them
 _ABOUT = 0.05
@@ -27,8 +27,8 @@ def ring_interference(
     """Return the interference of the modes of a structure's ring with engine orders.
 
     operating: lowest and highest speed, rad/s, by default those of [campbell], or 5 % about that of [rotation];
-    orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of speeds done
-    and of all. Raises InputError for an engine order that is no whole number.
+    orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of diameters
+    done, and of all, for the Campbell diagram. Raises InputError for an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
     given = orders or (table.engine_orders if table else ()) or None
@@ -44,26 +44,19 @@ def ring_interference(
     )
     if table is None:
         return found
-    return replace(found, speeds=table.speeds, over_speed_hz=_over_speed(structure, found, table.speeds, report))
+    wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=found.orders)
+    diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report)
+    rows = {pair: row for row, pair in enumerate(_pairs(modes))}
+    curves = [rows.get(pair) for pair in _pairs(diagram)]
+    over = np.full((len(modes), len(diagram.speeds)), np.nan)
+    for row, curve in zip(curves, diagram.frequencies_hz, strict=True):
+        if row is not None:
+            over[row] = curve
+    crossings = [(each, curves[each.mode]) for each in diagram.crossings]
+    kept = tuple(replace(each, mode=row) for each, row in crossings if row is not None)
+    return replace(found, speeds=diagram.speeds, over_speed_hz=over, crossings=kept)
 
 
-def _over_speed(
-    structure: Structure, found: Interference, speeds: np.ndarray, report: Callable[[int, int], None] | None
-) -> np.ndarray:
-    """Return the frequencies (m, s) of the modes at speeds, which are matched by diameter and family."""
-    assert structure.rotating is not None  # [campbell] needs [rotation]
-    over = np.full((len(found.modes), len(speeds)), np.nan)
-    rows = {pair: row for row, pair in enumerate(_pairs(found.modes))}
-    for place, speed in enumerate(speeds.tolist()):
-        there = ring_analysis(replace(structure, matrices=structure.rotating.at(speed)))
-        for pair, frequency in zip(_pairs(there), there.frequencies_hz, strict=True):
-            if pair in rows:
-                over[rows[pair], place] = frequency
-        if report is not None:
-            report(place + 1, len(speeds))
-    return over
-
-
-def _pairs(modes: RingModes) -> list[tuple[int, int]]:
+def _pairs(modes: RingModes | Campbell) -> list[tuple[int, int]]:
     """Return diameter and family of each mode."""
     return list(zip(modes.diameters.tolist(), modes.families.tolist(), strict=True))

@@ -11,6 +11,7 @@ from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes
 from vanedamp.modal.eigen import factorize
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.stages import MODES, Structure, interface
 from vanedamp.studies.terminal import stage
 
@@ -43,13 +44,13 @@ def ring_analysis(structure: Structure, report: Callable[[int, int], None] | Non
 @stage("reduced ring")
 def ring_reduction(
     structure: Structure, families: int = 3, max_frequency: float | None = None,
-    report: Callable[[int, int], None] | None = None,
-) -> RingModel:  # fmt: skip
+    report: Callable[[int, int], None] | None = None, basis: str = "modes",
+) -> RingModel | SectorRing:  # fmt: skip
     """Reduce the ring to `families` modes of every nodal diameter, or all up to a frequency, and its interface.
 
     A ring that rotates is reduced for all speeds up to the maximum of its case. report: called with the number of
-    diameters done, and of all. Raises InputError without the table [ring] or interface coordinates, and what
-    `rom.ring.reduction.reduce_ring` raises.
+    diameters done, and of all; basis: as of `rom.ring.reduction.reduce_ring`. Raises InputError without the table
+    [ring] or interface coordinates, and what reduce_ring raises.
     """
     case, rotating = structure.case, structure.rotating
     if case.ring is None:
@@ -64,4 +65,5 @@ def ring_reduction(
         case.ring.sector(standing, case.rotation), interface(case, standing), families, max_frequency,
         Part(*structure.solid.part(case.ring.deviating)) if case.ring.deviating else None,
         rotating.centrifugal_stiffness if rotating is not None and greatest else None, greatest, factorize, report,
+        basis,
     )  # fmt: skip

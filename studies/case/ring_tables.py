@@ -68,7 +68,7 @@ class RingTable:
         """Facet groups by their keys."""
         faces = {} if self.low is None or self.high is None else {"low": self.low, "high": self.high}
         for number, spring in enumerate(self.spring):
-            faces |= {f"spring.{number}.low": spring.low, f"spring.{number}.high": spring.high}
+            faces |= {f"spring[{number}].low": spring.low, f"spring[{number}].high": spring.high}
         return faces
 
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:

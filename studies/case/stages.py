@@ -20,6 +20,7 @@ from vanedamp.files.toml_input import InputError, tables
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
+from vanedamp.modal.cyclic_campbell import ring_campbell
 from vanedamp.modal.cyclic_statics import RingStatics
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
@@ -62,6 +63,7 @@ _UNCOUNTED = (
     "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
     '(solver = "factor")'
 )
+_SECTOR_ONLY = "ring: these are modes of one sector whose faces are free; `vanedamp ring` has those of the ring"
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 # fraction of the interface's largest motion by a mode below which a coordinate does not show it
@@ -343,6 +345,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     warnings += unit_doubts(structure, lowest)
     if not modes.counted:
         warnings += (_UNCOUNTED,)
+    if case.ring is not None:
+        warnings += (_SECTOR_ONLY,)
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
         inertia = base_inertia(case, matrices, label)
@@ -447,15 +451,18 @@ def campbell_diagram(
 
     report: called with the number of full solutions made, and of those known to be needed; checkpoint: a file to which
     these are written and from which an interrupted call resumes; the caller removes it once the result is safe
-    (files.checkpoint_file.clear). Raises the errors of `modal.campbell.campbell`.
+    (files.checkpoint_file.clear). Of a ring, modes of every nodal diameter. Raises the errors of
+    `modal.campbell.campbell`.
     """
     table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
     assert table is not None and rotation is not None and rotating is not None
     most = rotating.standing.free.size
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
+    ring = structure.case.ring
+    made = campbell if ring is None else partial(ring_campbell, ring.sector(rotating.standing, rotation))
     with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as kept:
-        diagram = campbell(
+        diagram = made(
             rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=kept.next
         )
     provenance = {"matrices": dict(diagram.provenance), "versions": versions()}

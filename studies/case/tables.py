@@ -464,6 +464,8 @@ class Case:
             raise ValueError("ring.axis: a ring that rotates has the axis of [rotation]; leave out axis and point")
         if self.mistuning is not None and self.ring is None:
             raise ValueError("mistuning: deviations are those of sectors; give [ring] with sectors, low and high")
+        if self.ring is not None and self.modes.min_frequency:
+            raise ValueError("modes.min_frequency: families of a ring count from the lowest mode; leave it out")
         stressed = self.temperature is not None or (self.rotation is not None and self.rotation.omega)
         if stressed and self.calibration is not None and self.calibration.tune is not None:
             raise ValueError(

@@ -44,17 +44,17 @@ def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:
     shown = diagram.modes[:_MOST_COLUMNS]
     kind = ", with gyroscopic coupling" if diagram.gyroscopic else ""
     yield f"natural frequencies in Hz versus speed{kind}"
-    yield "       rpm     rad/s" + "".join(f"    mode {mode + 1:2}" for mode in shown)
+    yield "       rpm     rad/s" + "".join(f"{diagram.label(mode):>11}" for mode in shown)
     rows = diagram.asked.nonzero()[0]
     for row in rows[:: -(-len(rows) // _MOST_ROWS)]:
         values = "".join(f"  {frequency:9.2f}" for frequency in diagram.frequencies_hz[: len(shown), row])
         yield f"{diagram.rpm[row]:10.1f}{diagram.speeds[row]:10.2f}{values}"
     if diagram.orders:
         margin = "" if diagram.operating is None else "  margin to operation"
-        yield f"crossings with engine orders\n  mode  order         rpm       rad/s          Hz{margin}"
+        yield f"crossings with engine orders\n       mode  order         rpm       rad/s          Hz{margin}"
     for crossing in diagram.crossings:
         yield (
-            f"{crossing.mode + 1:6}{crossing.order:7g}{crossing.rpm:12.3f}{crossing.speed:12.4f}"
+            f"{diagram.label(crossing.mode):>11}{crossing.order:7g}{crossing.rpm:12.3f}{crossing.speed:12.4f}"
             f"{crossing.frequency_hz:12.4f}"
             + ("" if diagram.operating is None else f"  {format_margin(crossing.margin(diagram.operating)):>19}")
         )

@@ -97,8 +97,17 @@ COMMANDS = (
                 "--orders", type=order, nargs="+", metavar="R",
                 help="engine orders (default: those of [campbell], or 1 to the number of sectors)",
             ),
+            argument("--mistuning", metavar="FILE.h5", help="the amplification by [mistuning], for the report"),
+            argument(
+                "--draws", type=family_count, default=100, metavar="N",
+                help="draws of [mistuning], from its seed on (default: %(default)s)",
+            ),
+            argument(
+                "--family", type=family_count, default=1, metavar="N",
+                help="family, from 1, around whose frequencies amplification counts (default: %(default)s)",
+            ),
         ),
-        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",)},
+        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",), "mistuning": _RECORD},
         reads=Function("support.cases:read_ring_case"),
     ),
     Command(
@@ -147,7 +156,7 @@ COMMANDS = (
             ),
             argument(
                 "--basis", default="craig-bampton", metavar="BASIS",
-                help="craig-bampton (default), rubin, macneal, massless or truncated",
+                help="craig-bampton (default), rubin, macneal, massless, truncated; of a ring modes (default), sectors",
             ),
             argument(
                 "--tolerance", type=ratio, default=0.01, metavar="R",
@@ -260,13 +269,14 @@ COMMANDS = (
         writes={"output": _RECORD}, checkpoint=True,
     ),
     Command(
-        "identify", "numbers of a scene from measurements, with what these tell of each", 95,
+        "identify", "numbers of a scene, or deviations of a ring's sectors, from measurements", 95,
         (
             input_file("STUDY.toml"), output_file("IDENTIFICATION.h5"),
             argument("--scene", metavar="TUNED.toml", help="the scene with the numbers found"),
+            argument("--csv", metavar="FILE.csv", help="deviations by sector, as [mistuning.stiffness] reads them"),
             json_file, workers,
         ),
-        writes={"output": _RECORD, "scene": (".toml",)},
+        writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)},
     ),
     Command(
         "report", "one HTML page of results", 100,

@@ -1,12 +1,16 @@
-"""`vanedamp identify`: numbers of a scene from measurements, with what these tell of each."""
+"""`vanedamp identify`: numbers of a scene, or deviations of a ring's sectors, from measurements."""
 
 from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import asdict
+from functools import partial
 
 from vanedamp.files.provenance import versions
+from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.identification.deviations import identify_deviations, load_table, save
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
@@ -17,7 +21,12 @@ from vanedamp.studies.workers import workers
 
 
 def run(arguments: Namespace) -> None:
-    """Find the numbers."""
+    """Find the numbers, or the deviations of a file with that table."""
+    if "deviations" in read_toml(arguments.input):
+        _deviations(arguments)
+        return
+    if arguments.csv is not None:
+        raise InputError("--csv: is for deviations of a ring; take --scene for the numbers of a scene")
     study = IdentificationStudy.load(arguments.input)
     arguments.outputs.keep(study.scene.files)
     with workers(arguments.workers) as pool:
@@ -26,6 +35,21 @@ def run(arguments: Namespace) -> None:
             found = identify(study, pool, report, {"versions": versions()})
     lines = _summary(found)
     write_result(arguments, found.to_json(), lines, found.notes, output=found.save, scene=found.save_scene)
+
+
+def _deviations(arguments: Namespace) -> None:
+    """Find deviations of a ring's sectors."""
+    if arguments.scene is not None:
+        raise InputError("--scene: not for deviations of a ring; --output or --csv has them")
+    table = load_table(arguments.input)
+    arguments.outputs.keep([table.ring, table.file])
+    found = identify_deviations(table)
+    result = {"deviation": found.stiffness.tolist(), "error": found.errors.tolist(), "misfit": found.misfit}
+    lines = [f"misfit {found.misfit:.3g} of omega^2 u", "sector  stiffness deviation  standard deviation"]
+    for sector, (value, error) in enumerate(zip(found.stiffness, found.errors, strict=True)):
+        lines.append(f"{sector:6}{value:21.6f}{error:20.2g}")
+    written = partial(save, found=found, provenance={"table": asdict(table), "versions": versions()})
+    write_result(arguments, result, lines, output=written, csv=written)
 
 
 def _summary(found: Identification) -> Iterator[str]:

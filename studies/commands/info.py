@@ -22,7 +22,7 @@ from vanedamp.files.store import Variable, decoding, load_any
 from vanedamp.modal.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import load_ring
 from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
@@ -170,11 +170,11 @@ def _reduced(record: _Record) -> Iterator[Fact]:
 
 
 def _ring_model(record: _Record) -> Iterator[Fact]:
-    ring = RingModel.load(record.path)
+    ring = load_ring(record.path)
     yield Fact("sectors", ring.sectors)
-    yield Fact("frequency_hz", np.unique(ring.frequencies_hz)[:_MOST].tolist(), "Hz", "of the tuned ring at standstill")
+    yield Fact("frequency_hz", np.unique(ring.frequencies_hz)[:_MOST].tolist(), "Hz", "of the tuned ring")
     yield Fact("interface", list(ring.interface), "", "of every sector")
-    yield Fact("modes", ring.modes, "", f"natural modes among {len(ring.squares)} waves")
+    yield Fact("modes", ring.modes, "", f"natural modes of {ring.size} coordinates")
     yield Fact("estimate", ring.provenance.get("estimate", {}).get("sentence"))
 
 
@@ -304,6 +304,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "ring-modes": ("the modes of a ring", "ring", _ring),
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
     "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
+    "ring-sectors": ("the reduced model of a ring, by sectors", "reduce", _ring_model),
     "mistuning": ("amplification of a mistuned ring", "mistuning", _mistuning),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
@@ -314,6 +315,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "optimisation": ("an optimisation", "optimise", _optimisation),
     "life": ("the life of a damper", "life", _life),
     "identification": ("numbers of a scene from measurements", "identify", _identification),
+    "deviations": ("deviations of a ring's sectors from measurements", "identify", _any),
     "optimise": ("an optimisation", "optimise", _any),
     "calibrate": ("a calibration", "calibrate", _any),
     "system-matrices": ("matrices of finite elements", None, _any),

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import load_ring
 from vanedamp.rom.ring.study import mistuning_study
 from vanedamp.studies.case.ring_stages import ring_reduction
 from vanedamp.studies.case.stages import assemble
@@ -27,7 +27,7 @@ def run(arguments: Namespace, case: Case) -> None:
     if arguments.ring is None:
         ring = ring_reduction(assemble(case), arguments.family)
     else:
-        ring = RingModel.load(arguments.ring)
+        ring = load_ring(arguments.ring)
         if ring.sectors != case.ring.sectors:
             raise InputError(f"{arguments.ring}: has {ring.sectors} sectors, the case {case.ring.sectors}")
     speed = 0.0 if case.rotation is None else case.rotation.omega

@@ -12,6 +12,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.ring_stages import ring_reduction
 from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
@@ -19,8 +20,8 @@ from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
 from vanedamp.studies.terminal import progress
 
-#: defaults of the options that a case with [ring] does not take
-_OF_STRUCTURES = (12, "craig-bampton", 0, False)
+#: defaults of the options that a case with [ring] does not take, and of the basis
+_OF_STRUCTURES, _BASIS = (12, 0, False), "craig-bampton"
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -56,31 +57,37 @@ def run(arguments: Namespace, case: Case) -> None:
 
 def _reduce_ring(arguments: Namespace, case: Case, started: float) -> None:
     """Reduce the ring of which the case is a sector."""
-    if (arguments.modes, arguments.basis, arguments.hot_spots, arguments.recovery) != _OF_STRUCTURES:
-        raise InputError("--modes, --basis, --hot-spots, --recovery: not for a case with [ring]; it takes --families")
+    if (arguments.modes, arguments.hot_spots, arguments.recovery) != _OF_STRUCTURES:
+        raise InputError("--modes, --hot-spots, --recovery: not for a case with [ring]; it takes --families")
+    basis = "modes" if arguments.basis == _BASIS else arguments.basis
     structure = assemble(case)
     with progress("nodal diameters") as report:
-        ring = ring_reduction(structure, arguments.families, arguments.max_frequency, report)
+        ring = ring_reduction(structure, arguments.families, arguments.max_frequency, report, basis)
+    frequencies, size = ring.frequencies_hz, ring.size
     result = {
         "sectors": ring.sectors,
-        "frequency_hz": ring.frequencies_hz.tolist(),
-        "diameters": ring.diameters[: ring.modes].tolist(),
+        "basis": basis,
+        "frequency_hz": frequencies.tolist(),
+        "diameters": ring.diameters[: ring.modes].tolist() if isinstance(ring, RingModel) else None,
         "modes": ring.modes,
-        "coordinates": len(ring.squares),
+        "coordinates": size,
         "interface": list(ring.interface),
         "estimate": ring.provenance["estimate"],
-        "greatest_speed": ring.greatest_speed,
-        "warnings": list(unit_doubts(structure, float(ring.frequencies_hz.min()))),
+        "greatest_speed": ring.greatest_speed if isinstance(ring, RingModel) else 0.0,
+        "warnings": list(unit_doubts(structure, float(frequencies.min()))),
         "wall_time_s": time.perf_counter() - started,
     }
     write_result(arguments, result, _ring_summary(ring), result["warnings"], output=ring.save)
 
 
-def _ring_summary(ring: RingModel) -> Iterator[str]:
+def _ring_summary(ring: RingModel | SectorRing) -> Iterator[str]:
     """Yield sizes, the estimates of errors, and natural frequencies by nodal diameter."""
     estimate = ring.provenance["estimate"]
-    yield f"{ring.sectors} sectors in {len(ring.squares)} waves; interface of each: {', '.join(ring.interface)}"
+    yield f"{ring.sectors} sectors, {ring.size} coordinates; interface of each: {', '.join(ring.interface)}"
     yield f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz"
+    if isinstance(ring, SectorRing):
+        yield "frequencies, Hz: " + _listed(ring.model())
+        return
     if ring.greatest_speed:
         yield f"for speeds up to {ring.greatest_speed:.6g} rad/s; at standstill:"
     for number in range(ring.sectors // 2 + 1):

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.interference import Interference
 from vanedamp.modal.speed_range import RPM
+from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_interference import ring_interference
-from vanedamp.studies.case.ring_stages import ring_analysis
-from vanedamp.studies.case.stages import assemble, unit_doubts
+from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
+from vanedamp.studies.case.stages import Structure, assemble, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.headline import format_margin
@@ -21,29 +23,47 @@ from vanedamp.studies.terminal import progress
 
 #: families, and engine orders of a diameter, that are printed at most; meetings
 _MOST_FAMILIES, _MOST_ORDERS, _MOST_MEETINGS = 8, 4, 40
+#: families of a reduced ring at least
+_FAMILIES = 3
 
 
 def run(arguments: Namespace, case: Case) -> None:
-    """Compute the modes, and where engine orders meet them."""
+    """Compute the modes, where engine orders meet them, and the amplification of a mistuned ring."""
     if arguments.vtu:  # reports missing packages before the work
-        from vanedamp.studies.report.pictures import save_vtk
+        import vanedamp.studies.report.pictures  # noqa: F401
     operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
     if operating is not None and not operating[0] <= operating[1]:
         raise InputError("--rpm: expected the lowest speed, then the highest")
+    if arguments.mistuning and case.mistuning is None:
+        raise InputError("--mistuning: the case has no table [mistuning], such as frequency = {std = 0.01}")
     started = time.perf_counter()
     structure = assemble(case)
     modes = ring_analysis(structure)
-    with progress("speeds") as report:
+    with progress("diameters") as report:
         found = ring_interference(structure, modes, operating, arguments.orders, report)
-    seconds = time.perf_counter() - started
-    mesh, cell_type = structure.mesh()
+    study = None if case.mistuning is None else _study(arguments, structure, found)
+    warnings = unit_doubts(structure)
+    result = found.to_json() | {"warnings": warnings, "wall_time_s": time.perf_counter() - started}
+    lines, files = [*_summary(found)], _files(structure, found)
+    if study is not None:
+        result["mistuning"] = study.to_json()
+        lines += _amplification(study)
+        files["mistuning"] = study.save
+    write_result(arguments, result, lines, warnings, **files)
+
+
+def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str], object]]:
+    """Return by its option what writes a file of the modes."""
+    modes, (mesh, cell_type) = found.modes, structure.mesh()
 
     def save(path: str) -> None:
         variables, attributes = found.riding()
-        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": case.damping_ratio}
+        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": structure.matrices.damping_ratio}
         modes.save(path, mesh | variables, attributes)
 
     def vtu(path: str) -> None:
+        from vanedamp.studies.report.pictures import save_vtk
+
         ring = whole_ring(modes, mesh["coordinates"].values, mesh["cell"].values)
         named = ((f"{found.name(k)}: {hz:.6g} Hz", ring.shape(modes, k)) for k, hz in enumerate(modes.frequencies_hz))
         save_vtk(with_parts(named), ring.points, ring.cells, cell_type, path)
@@ -53,35 +73,70 @@ def run(arguments: Namespace, case: Case) -> None:
 
         interference_picture(found, Path(path))
 
-    warnings = unit_doubts(structure)
-    result = found.to_json() | {"warnings": warnings, "wall_time_s": seconds}
-    write_result(arguments, result, _summary(found), warnings, output=save, vtu=vtu, picture=picture)
+    return {"output": save, "vtu": vtu, "picture": picture}
+
+
+def _study(arguments: Namespace, structure: Structure, found: Interference) -> MistuningStudy:
+    """Return the amplification over draws, of the orders that are named, or one for each diameter from 1.
+
+    Raises InputError for a case without an interface, and RingError.
+    """
+    table, half = structure.case.mistuning, found.modes.sectors // 2
+    assert table is not None
+    named = arguments.orders or (structure.case.campbell is not None and structure.case.campbell.engine_orders)
+    ring = ring_reduction(structure, max(arguments.family, _FAMILIES))
+    drawn = any(each is not None and each.std is not None for each in (getattr(table, name) for name in DEVIATIONS))
+    with progress("draws") as report:
+        return mistuning_study(
+            ring, table, found.orders if named else range(1, half + 1), arguments.draws if drawn else 1,
+            family=arguments.family - 1, speed=found.speed or 0.0, report=report,
+        )  # fmt: skip
 
 
 def _summary(found: Interference) -> Iterator[str]:
     """Yield frequencies by nodal diameter, the engine orders of each, and the meetings."""
     rows, modes = found.by_diameter(), found.modes
     families = min(len(rows[0][1]), _MOST_FAMILIES)
+    wide = max(8, *(len(found.label(diameter)) for diameter, _ in rows))
     at = "" if found.speed is None else f" at {found.speed * RPM:.6g} rpm"
     yield f"natural frequencies in Hz of {modes.sectors} sectors by nodal diameter{at}"
-    yield "diameter  engine orders     " + "".join(f"  family {family + 1:2}" for family in range(families))
+    yield f"{'diameter':>{wide}}  engine orders     " + "".join(
+        f"  family {family + 1:2}" for family in range(families)
+    )
     for diameter, row in rows:
         orders = found.exciting(diameter)
         listed = ", ".join(map(str, orders[:_MOST_ORDERS])) + (" ..." if len(orders) > _MOST_ORDERS else "")
-        yield f"{found.label(diameter):>8}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
+        yield f"{found.label(diameter):>{wide}}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
     if found.operating is None and not found.speeds.size:
         yield "no speed is known at which engine orders could meet them: [rotation], [campbell] or --rpm gives it"
         return
     margin = "" if found.operating is None else "  margin to operation"
-    yield f"meetings with engine orders\n  diameter  family  order         rpm       rad/s          Hz{margin}"
+    yield "meetings with engine orders"
+    yield f"{'diameter':>{wide + 2}}  family  order         rpm       rad/s          Hz{margin}"
     for each in found.meetings[:_MOST_MEETINGS]:
         told = "" if found.operating is None else f"  {format_margin(each.margin(found.operating)):>19}"
+        diameter, family = int(modes.diameters[each.mode]), modes.families[each.mode] + 1
         yield (
-            f"{found.label(int(modes.diameters[each.mode])):>10}{modes.families[each.mode] + 1:8}{each.order:7g}"
-            f"{each.rpm:12.3f}{each.speed:12.4f}{each.frequency_hz:12.4f}{told}"
+            f"{found.label(diameter):>{wide + 2}}{family:8}{each.order:7g}{each.rpm:12.3f}{each.speed:12.4f}"
+            f"{each.frequency_hz:12.4f}{told}"
         )
     more = len(found.meetings) - _MOST_MEETINGS
     if more > 0:
         yield f"  and {more} more, in the result's file and its report"
     if not found.meetings:
         yield "  none"
+
+
+def _amplification(study: MistuningStudy) -> Iterator[str]:
+    """Yield the amplification by engine order."""
+    told, (low, high) = study.to_json(), study.band_hz
+    draws = f"{len(study.seeds)} draw{'s' if len(study.seeds) > 1 else ''}"
+    yield f"amplification at {study.label}, {draws} of [mistuning], peaks from {low:.6g} to {high:.6g} Hz"
+    yield "  order   tuned/Hz     median       95 %    largest  sector       seed"
+    for row in told["orders"]:
+        median, high_quantile, _ = (each["value"] for each in row["quantiles"])
+        yield (
+            f"{row['order']:7}{row['tuned_frequency_hz']:11.2f}{median:11.4f}{high_quantile:11.4f}"
+            f"{row['amplification']['largest']:11.4f}{row['worst']['sector']:8}{row['worst']['seed']:11}"
+        )
+    yield f"one family of modes stays below {study.bound:.4f} (Whitehead)"

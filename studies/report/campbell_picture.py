@@ -40,7 +40,7 @@ def draw_campbell(axes: Axes, diagram: Campbell) -> None:
         )
     for place, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
         colour = COLOURS[place % len(COLOURS)]
-        axes.plot(diagram.rpm, frequencies, color=colour, linewidth=1.8, label=f"mode {mode + 1}")
+        axes.plot(diagram.rpm, frequencies, color=colour, linewidth=1.8, label=diagram.label(mode))
     veerings, crossings = diagram.veerings, diagram.crossings
     if veerings:
         axes.plot(

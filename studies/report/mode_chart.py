@@ -18,7 +18,7 @@ _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
 _NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
-EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
+_EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 _HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -66,7 +66,7 @@ def screen_of(view: np.ndarray) -> np.ndarray:
 def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (n, 3) moved by a shape, and their displacements (n,) over the largest."""
     magnitude, size = np.linalg.norm(shape, axis=1), float(np.linalg.norm(np.ptp(points, axis=0)))
-    return points + shape * (EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
+    return points + shape * (_EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
 
 
 class Surface(NamedTuple):

@@ -23,6 +23,7 @@ from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.frf import UNITS
 from vanedamp.modal.interference import Interference
+from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
@@ -32,6 +33,7 @@ from vanedamp.studies.report.forced_response import best_first, forced_responses
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.identification_charts import data_figure
 from vanedamp.studies.report.life_charts import life_figure
+from vanedamp.studies.report.mistuning_charts import amplification_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
 from vanedamp.studies.report.results import Result, Results, collect
 from vanedamp.studies.report.ring_charts import interference_figure
@@ -50,6 +52,7 @@ _DIAGRAMS: dict[type, Callable[[Any], go.Figure]] = {
     Ramp: ramp_figure, RingDown: ring_down_figure, Campbell: campbell_figure,
     Identification: data_figure, LifeRecord: life_figure, Ensemble: ensemble_figure,
     Interference: interference_figure, RingModes: lambda found: interference_figure(Interference.of(found)),
+    MistuningStudy: amplification_figure,
 }  # fmt: skip
 
 
@@ -61,9 +64,9 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     Response its time history (with the walls of its cavities if its scene is given); Branches, Ramp, RingDown and
     Campbell their diagrams, Branches with borders the map of these; an Identification its measurements over the
     model; a LifeRecord its course over the hours; an Ensemble its curve with bands, of one frequency its indices;
-    RingModes and an Interference the frequencies over nodal diameters with the engine orders; a file of `vanedamp
-    modal` its modes; one of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies.
-    Raises InputError for anything else, and for a response without samples.
+    RingModes and an Interference the frequencies over nodal diameters with the engine orders, a MistuningStudy its
+    amplifications; a file of `vanedamp modal` its modes; one of `vanedamp calibrate` the measured response with its
+    fit, or else the tuned frequencies. Raises InputError for anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
@@ -94,6 +97,7 @@ def _(result: History, scene: Scene | None = None) -> go.Figure:
 @plot.register(Campbell)
 @plot.register(Interference)
 @plot.register(RingModes)
+@plot.register(MistuningStudy)
 @plot.register(Identification)
 @plot.register(LifeRecord)
 @plot.register(Ensemble)

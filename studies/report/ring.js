@@ -47,8 +47,7 @@ for (const controls of document.querySelectorAll(".ring")) {
   const show = () => {
     diameter.value = known.indexOf(meta.diameters[mode]);
     family.selectedIndex = meta.families[mode];
-    text.textContent = `nodal diameter ${meta.diameters[mode]}, family ${meta.families[mode] + 1}: ` +
-      `${meta.frequencies[mode].toPrecision(6)} Hz`;
+    text.textContent = `${meta.names[mode]}: ${meta.frequencies[mode].toPrecision(6)} Hz`;
     if (begun === null) draw();
   };
   diameter.max = known.length - 1;

@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from scipy.spatial.transform import Rotation
 
 from vanedamp.modal.cyclic_modes import RingModes
+from vanedamp.modal.interference import Interference
 from vanedamp.studies.report.mode_chart import (
-    EXAGGERATION,
     MOST_TRIANGLES,
     deformed_mesh,
     in_space,
@@ -24,6 +24,8 @@ from vanedamp.studies.ring_mesh import WholeRing, joints, whole_ring
 _ELEVATIONS = (55.0, 30.0)
 #: the longest side of the scene, as the eye's distance counts it
 _SIDE = 1.8
+#: largest displacement over the ring's size
+_EXAGGERATION = 0.03
 #: of the shapes in a page, which are whole numbers
 _STEPS = 32767
 
@@ -68,13 +70,13 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     The layout's `meta` has what `ring.js` needs for any mode at any phase: nodes at rest, sector and node of each, and
     of every mode the diameter and the shape on sector 0 at these nodes over its largest displacement, as whole numbers.
     """
-    points = 1e3 * ring.points
+    points, named = 1e3 * ring.points, Interference.of(modes)
     nodes, place = np.unique(ring.node, return_inverse=True)
     shapes = modes.shapes.reshape(len(modes.shapes), -1, 3)[:, nodes]
     largest = np.sqrt((np.abs(shapes) ** 2).sum(axis=2)).max(axis=1)
     relative = np.stack([shapes.real, shapes.imag], axis=-1) / largest[:, None, None, None]
     moved = modes.whole(mode)[ring.sector, ring.node] / largest[mode]
-    scale = EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
+    scale = _EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
     turns = Rotation.from_rotvec(np.outer(2.0 * np.pi * np.arange(modes.sectors) / modes.sectors, modes.axis))
     figure = go.Figure(deformed_mesh(points + scale * moved, np.linalg.norm(moved, axis=1), ring.cells))
     in_space(figure, viewpoint(points, moved, _ELEVATIONS))
@@ -87,6 +89,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     return figure.update_layout(meta={
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),
+        "names": [named.name(place) for place in range(len(modes))],
         "turns": turns.as_matrix().reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
         "sector": _packed(ring.sector, "<u2"), "node": _packed(place, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,

@@ -9,9 +9,11 @@ import pytest
 import vanedamp as vd
 from tests.commands.test_export import of_vtk
 from vanedamp.modal.interference import Interference
-from vanedamp.studies.case.ring_stages import ring_analysis
+from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
+from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.report.mistuning_charts import sectors_figure
 from vanedamp.studies.ring_mesh import whole_ring
 
 DISK = """
@@ -50,6 +52,16 @@ operating = [28000, 33000]
 """
 
 
+MISTUNED = """
+[interface.tip]
+facets = "tip"
+direction = [0, 1, 0]
+[mistuning]
+seed = 3
+frequency = {std = 0.01}
+"""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ring")
@@ -76,15 +88,34 @@ def test_modes_are_those_at_the_speed(folder, found):
 
 
 def test_meetings_are_those_of_solutions_at_their_speeds(folder, found):
-    """The curves between the speeds of the diagram, against the sector at the speeds at which they are met."""
+    """Against full solutions of the sector at the speeds at which they are met."""
     structure = assemble(vd.Case.load(folder / "case.toml"))
     assert len(found.meetings) > 3
     for each in found.meetings[::2]:
         case = vd.Case.load(folder / "case.toml")
         there = vd.ring_modes(case.ring.sector(structure.rotating.at(each.speed), case.rotation), 2)
         at = (there.diameters == found.diameters[each.mode]) & (there.families == found.modes.families[each.mode])
-        assert there.frequencies_hz[at] == pytest.approx([each.frequency_hz], rel=1e-4)
+        assert there.frequencies_hz[at] == pytest.approx([each.frequency_hz], rel=2e-8)
         assert min(each.order % 6, -each.order % 6) == found.diameters[each.mode]
+
+
+def test_gyroscopic_coupling_parts_the_waves(tmp_path, capsys):
+    """Each order meets the wave of its sense: order 1 and 7 the backward one of diameter 1, order 5 the forward one."""
+    (tmp_path / "case.toml").write_text(DISK + TURNING.replace("rpm = 30000", "rpm = 30000\ngyroscopic = true"))
+    assert main(["ring", str(tmp_path / "case.toml"), "--json", str(tmp_path / "ring.json")]) == 0
+    result = json.loads((tmp_path / "ring.json").read_text())
+    assert result["excited"] == {"1": 1, "4": -2, "5": -1, "7": 1, "10": -2}
+    assert {(each["order"], each["diameter"]) for each in result["meetings"]} <= {
+        (1, 1),
+        (4, -2),
+        (5, -1),
+        (7, 1),
+        (10, -2),
+    }
+    assert len(result["meetings"]) > 3
+    waves = {(h, f): hz for h, f, hz in zip(result["diameter"], result["family"], result["frequency_hz"], strict=True)}
+    assert abs(waves[1, 0] / waves[-1, 0] - 1.0) > 1e-4
+    assert "1 backward" in capsys.readouterr().out
 
 
 def test_json_summary_and_report(folder, found, capsys):
@@ -175,6 +206,8 @@ def test_info(folder, found, capsys):
     ("text", "options", "message"),
     [
         (DISK.partition("[ring]")[0], [], "ring: missing; give the number of sectors"),
+        (DISK, ["--mistuning", "m.h5"], "--mistuning: the case has no table [mistuning]"),
+        (DISK + MISTUNED.partition("[mistuning]")[1] + "\nmass = {std = 0.1}", [], "interface: missing"),
         (DISK, ["--rpm", "2000", "1000"], "--rpm: expected the lowest speed, then the highest"),
         (DISK.replace('high = "high"', 'high = "hgih"'), [], "ring.high: no facet group 'hgih'"),
         (
@@ -191,3 +224,54 @@ def test_bad_input_is_one_line(text, options, message, tmp_path, capsys):
     assert main(["ring", str(tmp_path / "case.toml"), "-o", str(target), *options]) == BAD_INPUT
     error = capsys.readouterr().err
     assert message in error and not target.exists() and error.count("\n") == 1
+
+
+def test_mistuning_is_that_of_the_study(tmp_path, monkeypatch, capsys):
+    """The table of the command, its file and the report, against the study in Python."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED)
+    options = [
+        "--orders",
+        "1",
+        "2",
+        "--draws",
+        "12",
+        "--family",
+        "2",
+        "--mistuning",
+        "mistuning.h5",
+        "--json",
+        "ring.json",
+    ]
+    assert main(["ring", "case.toml", *options]) == 0
+    printed = capsys.readouterr().out
+    case = vd.Case.load("case.toml")
+    study = mistuning_study(ring_reduction(assemble(case)), case.mistuning, [1, 2], 12, family=1)
+    told = json.loads((tmp_path / "ring.json").read_text())["mistuning"]
+    for index, row in enumerate(told["orders"]):
+        largest = study.amplification[index].max()
+        assert row["amplification"]["largest"] == pytest.approx(largest, rel=1e-6) and f"{largest:.4f}" in printed
+    found = MistuningStudy.load("mistuning.h5")
+    figure = vd.plot("mistuning.h5")
+    for index, order in enumerate((1, 2)):
+        (shown,) = (t for t in figure.data if t.name == f"engine order {order}" and t.mode == "markers")
+        assert sorted(shown.x) == pytest.approx(sorted(study.amplification[index]), rel=1e-6)
+        assert [found.amplification[index][int(seed) - 3] for seed in shown.customdata[:, 0]] == list(shown.x)
+    sectors = sectors_figure(found, 0)
+    curves = np.reshape(sectors.data[0].y, (6, -1))[:, :-1]
+    np.testing.assert_allclose(curves.T * found.tuned_amplitude[0], found.amplitude[0], rtol=1e-12)
+    assert main(["report", "mistuning.h5", "-o", "report.html"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Mistuned ring of 6 sectors" in page and f"{found.amplification[1].max():.4f}" in page
+
+
+def test_deviations_that_are_given_are_one_draw(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED.replace("std = 0.01", "pattern = [0.02, -0.02]"))
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1"]) == 0
+    assert "1 draw of [mistuning]" in capsys.readouterr().out
+
+
+def test_pages_are_of_rings_only(tmp_path, capsys):
+    """`vanedamp explore` writes a page of a ring's modes; of scenes it serves one."""
+    assert main(["explore", "-o", str(tmp_path / "page.html"), "--no-browser"]) == BAD_INPUT
+    assert "is written of a ring's modes" in capsys.readouterr().err and not (tmp_path / "page.html").exists()

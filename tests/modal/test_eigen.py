@@ -12,6 +12,7 @@ from vanedamp.modal.eigen import Modes, SolverError, count_below, factorize, sol
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.participation import effective_masses, first_bending
+from vanedamp.modal.petsc import negative_eigenvalues, one_analysis
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 
@@ -264,3 +265,21 @@ def test_cantilever_beam_converges_to_timoshenko(tmp_path):
     assert pair / beam.total_mass == pytest.approx((2.0 * 0.7340955 / 1.8751041) ** 2, rel=5e-3)
     assert errors[0] > errors[1] > errors[2]
     assert abs(errors[2]) < 1e-3
+
+
+def test_one_analysis_serves_matrices_of_one_pattern():
+    """Inertia and solutions are those of each matrix, also after another pattern, and one that CHOLMOD cannot take."""
+    random = np.random.default_rng(0)
+    base = np.where(random.random((40, 40)) < 0.1, random.random((40, 40)), 0.0)
+    pattern = sparse.csr_array(base + base.T + 40.0 * sparse.identity(40))
+    load = random.standard_normal(40)
+    with one_analysis():
+        for shift, other in ((0.0, 0.0), (-3.0, 0.0), (55.0, 0.0), (0.0, 1.0), (0.0, 0.0)):
+            matrix = sparse.csr_array(pattern - shift * sparse.identity(40))
+            matrix = sparse.csr_array(
+                matrix + other * sparse.csr_array(([1.0, 1.0], ([0, 39], [39, 0])), shape=(40, 40))
+            )
+            known = linalg.eigvalsh(matrix.toarray())
+            assert negative_eigenvalues(matrix) == np.count_nonzero(known < 0.0)
+            with factorize(matrix) as factors:
+                assert matrix @ factors.solve(load) == pytest.approx(load, abs=1e-10)

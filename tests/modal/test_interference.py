@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tools.plate_rings import plate_waves
+from vanedamp.modal.campbell import Crossing
 from vanedamp.modal.interference import Interference
 
 
@@ -48,21 +49,12 @@ def test_meetings_at_constant_frequencies():
     assert Interference.of(modes).meetings == ()
 
 
-def test_meetings_over_the_speed():
-    """f^2 = f0^2 + B (speed / 2 pi)^2 is met by the order r at (speed / 2 pi)^2 = f0^2 / (r^2 - B)."""
-    modes, stiffening = plate_waves(8), 1.7
-    speeds = np.linspace(0.0, 500.0, 5)
-    over = np.sqrt(modes.frequencies_hz[:, None] ** 2 + stiffening * (speeds / (2 * np.pi)) ** 2)
-    found = Interference.of(modes, operating=(200.0, 300.0), speeds=speeds, over_speed_hz=over)
-    expected = {
-        (mode, r): 2 * np.pi * np.sqrt(f**2 / (r**2 - stiffening))
-        for mode, (h, f) in enumerate(zip(modes.diameters, modes.frequencies_hz, strict=True)) for r in range(2, 9)
-        if min(r % 8, -r % 8) == h and 2 * np.pi * np.sqrt(f**2 / (r**2 - stiffening)) <= 500.0
-    }  # fmt: skip
-    assert len(expected) > 5
-    assert {(each.mode, each.order): each.speed for each in found.meetings} == pytest.approx(expected, rel=1e-9)
-    within = [each for each in found.meetings if 200.0 <= each.speed <= 300.0]
-    assert list(found.in_operation) == within and 0 < len(within) < len(found.meetings)
+def test_meetings_of_a_campbell_diagram():
+    """Its crossings, of which those within the range of operation are in operation."""
+    crossings = tuple(Crossing(mode, 2.0, speed, speed / np.pi) for mode, speed in ((2, 100.0), (3, 250.0), (2, 400.0)))
+    found = Interference.of(plate_waves(8), operating=(200.0, 300.0), speeds=[0.0, 500.0],
+                            over_speed_hz=np.ones((10, 2)), crossings=crossings)  # fmt: skip
+    assert found.meetings == crossings and found.in_operation == crossings[1:2]
 
 
 def test_waves_that_turn_apart_are_met_by_their_own_orders():
@@ -81,7 +73,7 @@ def test_waves_that_turn_apart_are_met_by_their_own_orders():
 def test_file_keeps_it(tmp_path):
     modes = plate_waves(8)
     given = Interference.of(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
-                            over_speed_hz=np.ones((10, 2)))  # fmt: skip
+                            over_speed_hz=np.ones((10, 2)), crossings=(Crossing(2, 3.0, 60.0, 28.6),))  # fmt: skip
     modes.save(tmp_path / "ring.h5", *given.riding())
     found = Interference.load(tmp_path / "ring.h5")
     assert found.to_json() == given.to_json() and found.orders == (3, 5)

@@ -104,10 +104,27 @@ EXTERNAL = {
     "matrices": {"file": "other.npz", "mass": "m", "stiffness": "k", "damping_ratio": 0.01, "base_load": "b"},
     "interface": {"tip": {"coordinate": 0, "direction": [0.0, 1.0, 0.0]}, "top": {"row": [1.0, 0.0]}},
 }
+RING = {
+    "mesh": {
+        "generator": "sector",
+        "degree": 1,
+        "sectors": 4,
+        "inner_radius": 0.05,
+        "outer_radius": 0.1,
+        "thickness": 0.01,
+        "element_size": 0.05,
+    },
+    "material": {"default": {"young": 2e11, "poisson": 0.3, "density": 8000.0, "damping_ratio": 0.01}},
+    "support": {"clamped": ["bore"]},
+    "modes": {"count": 2},
+    "interface": {"rim": {"facets": "rim", "direction": [0, 0, 1]}},
+    "ring": {"sectors": 4, "low": "low", "high": "high"},
+    "mistuning": {"frequency": {"std": 0.01}},
+}
 #: by the command that takes them
 FILES: dict[str, tuple[dict[str, Any], ...]] = {
     "run": (SCENE, ROM_SCENE, PRESCRIBED), "sweep": (SCENE,), "optimise": (OPTIMISE,), "modal": (CASE,),
-    "calibrate": (CASE,), "reduce": (CASE,), "import": (EXTERNAL,),
+    "calibrate": (CASE,), "reduce": (CASE,), "import": (EXTERNAL,), "ring": (RING,),
 }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from scipy import io, sparse
 
 from tests.tools import fork_mesh
 from tests.tools.archives import ansys_archive, labelled
-from tests.tools.fuzz import CASE, OPTIMISE, SCENE
+from tests.tools.fuzz import CASE, OPTIMISE, RING, SCENE
 from tests.tools.op2_file import write_op2
 
 #: what takes the place of a number in a text
@@ -96,7 +96,7 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
         "scene.toml": plain, "swept.toml": plain | {"sweep": SCENE["sweep"]}, "ramp.toml": plain | ramp,
         "down.toml": plain | down, "case.toml": CASE | {"calibration": calibration},
         "orbit.toml": plain | {"orbit": {"to": 15.95, "max_points": 4}}, "optimise.toml": OPTIMISE,
-        "campbell.toml": CASE | campbell,
+        "campbell.toml": CASE | campbell, "ring.toml": RING,
         "external.toml": {"matrices": matrices, "interface": {"tip": {"coordinate": 0}, "top": {"coordinate": 2}}},
     }  # fmt: skip
     for name, tables in files.items():
@@ -108,6 +108,7 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
         ["import", "external.toml", "-o", "rom.h5"], ["modal", "case.toml", "-o", "modes.h5"],
         ["calibrate", "case.toml", "-o", "calibration.h5"], ["campbell", "campbell.toml", "-o", "campbell.h5"],
         ["orbits", "orbit.toml", "-o", "orbits.h5"],
+        ["ring", "ring.toml", "--orders", "1", "--draws", "2", "-o", "ring.h5", "--mistuning", "mistuning.h5"],
         ["optimise", "optimise.toml", "--workers", "1", "-o", "optimum.h5"],
     ):  # fmt: skip
         if run(words):
@@ -117,7 +118,8 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
 #: by the name of a sample: the words of commands that read the damaged file "damaged.*", or a call of Python
 READS: dict[str, tuple[list[str], ...]] = {
     **{f"{name}.h5": (["report", "@", "-o", "out.html"], *(["export", "@", "-o", f"out.{e}"] for e in ("csv", "mat")))
-       for name in ("run", "sweep", "ramp", "down", "modes", "calibration", "campbell", "orbits", "optimum")},
+       for name in ("run", "sweep", "ramp", "down", "modes", "calibration", "campbell", "orbits", "optimum", "ring",
+                    "mistuning")},
     "rom.h5": (["report", "@", "-o", "out.html"], ["run", "on_rom.toml"], ["export", "@", "-o", "out.uff"],
                ["export", "@", "-o", "out.mat"]),
     **{f"mesh.{ending}": (["check", "on_mesh.toml"], ["check", "on_mesh.toml"], ["modal", "on_mesh.toml"])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal.cyclic import CyclicSector, cyclic_sector
+from vanedamp.modal.cyclic import CyclicSector, Spring, cyclic_sector
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
@@ -69,13 +69,14 @@ class LumpedDisk:
     """A disk of N sectors with a blade each, of masses that springs of three stiffnesses join: 3 freedoms a mass.
 
     A sector has nodes 0 (face low), 1 (face high), 2 (rim, also on springs to ground) and 3, 4, 5 up the blade; its
-    axes are x radial, y tangential, z axial.
+    axes are x radial, y tangential, z axial. With springs, N/m, the sectors are separate and these join their nodes.
     """
 
     sectors: int = 6
     blade: float = 1e7
     rim: float = 3e7
     axes: tuple[float, float, float] = (2.3, 1.0, 0.6)
+    springs: float = 0.0
 
     def _springs(self, pairs: Sequence[tuple[int, int]], stiffness: float) -> np.ndarray:
         matrix = np.zeros((18, 18))
@@ -107,6 +108,9 @@ class LumpedDisk:
 
     def sector(self) -> CyclicSector:
         """Return the cyclic sector about the axis z."""
+        if self.springs:
+            springs = (Spring("low", "high", (self.springs, 0.5 * self.springs, 2.0 * self.springs)),)
+            return cyclic_sector(self.matrices(), None, None, self.sectors, couplings=springs)
         return cyclic_sector(self.matrices(), "low", "high", self.sectors)
 
     def whole(self, deviations: Deviations | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -143,4 +147,8 @@ def whole_ring(
     for name, whole, one in zip(("stiffness", "mass"), (matrices.stiffness, matrices.mass), part, strict=True):
         values = deviations.of(name, sector.sectors)
         totals.append(sum(t.T @ (whole + d * one) @ t for t, d in zip(found, values, strict=True)))
+    for high, low, values in sector.couplers():
+        for j, motion in enumerate(found):
+            stretch = high @ motion - low @ found[(j + 1) % sector.sectors]
+            totals[0] = totals[0] + sparse.csr_array(stretch.T @ (values[:, None] * stretch))
     return totals[0], totals[1], found

@@ -23,6 +23,7 @@ from vanedamp.coupling.engine.line.contact_states import (
 )
 from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell
 from vanedamp.coupling.engine.line.event_functions import ENDLESS, carry_over_period, hop_speed, next_event
+from vanedamp.coupling.engine.line.flow_assembly import code_of
 from vanedamp.coupling.engine.line.gap_kinematics import (
     align_gaps,
     close_gaps,
@@ -139,6 +140,7 @@ def _begin_flow(system, flows, st, rec, scratch):
     s = _find_flow(flows, st.active_set)
     if s < 0:
         return NEEDS_FLOW
+    flows.used[s] = st.counters[EVENTS]
     _begin_subsystem(system, flows, st, scratch, s)
     if stop_attached_bodies(system, flows, st):
         keep_released(st, scratch)
@@ -218,8 +220,9 @@ def _close_gap(system, st, scratch, r):
 @kernel
 def _find_flow(flows, active_set):
     """Return the place of the subsystem of these closed rows, -1 if there is none yet."""
+    code = code_of(active_set)
     for s in range(len(flows.modes)):
-        same = flows.modes[s] > 0
+        same = flows.modes[s] > 0 and flows.code[s] == code
         for r in range(len(active_set)):
             if not same:
                 break

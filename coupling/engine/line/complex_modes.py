@@ -17,7 +17,17 @@ from scipy.linalg import qr, solve_triangular
 from scipy.linalg.lapack import dgejsv
 from scipy.sparse.csgraph import connected_components
 
-from vanedamp.coupling.engine.line.tolerances import MIXED, NEARLY_EQUAL, SHIFTS
+from vanedamp.coupling.engine.line.tolerances import (
+    ALIKE,
+    INDEPENDENT,
+    LIGHT,
+    MANY,
+    MIXED,
+    NEARLY_EQUAL,
+    SETTLED,
+    SHIFTS,
+    STEPS,
+)
 from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST
 
@@ -46,6 +56,42 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
     if not inertia.shape[1]:
         none = np.zeros((0, 0))
         return RealModes(np.zeros(0), none, none, none)
+    found = _alike(inertia, elastic) if inertia.shape[1] >= MANY else None
+    frequency, shape, project, strain = _far_apart(inertia, elastic) if found is None else found
+    size, lossy = np.abs(strain), np.abs(loss)
+    damping, noise = strain.T @ loss @ strain, size.T @ lossy @ size
+    # strains are known to round-off of a mode's whole strain: by that only, equal modes would be coupled and mixed
+    whole = lossy.sum(axis=0) @ size
+    noise = np.where(np.eye(len(whole), dtype=bool), noise, np.maximum(noise, np.maximum(whole, whole[:, None])))
+    # sums of as many terms, and rotations of as many columns
+    damping[np.abs(damping) <= max(8, 2 * len(whole)) * _EPS * noise] = 0.0
+    return RealModes(frequency, shape, project, frequency[:, None] * (damping + damping.T) / 2 * frequency)
+
+
+def _alike(inertia: np.ndarray, elastic: np.ndarray) -> tuple[np.ndarray, ...] | None:
+    """Return frequencies (q,), shapes, their inverse (q, q) and strains (e, q) of modes that lie close together.
+
+    From matrices, in a small part of the time. None where they lose digits: by masses or frequencies far apart.
+    """
+    size = np.linalg.norm(inertia, axis=0)
+    if not size.all():
+        return None
+    scaled = inertia / size
+    try:
+        r = np.linalg.cholesky(scaled.T @ scaled).T
+    except np.linalg.LinAlgError:
+        return None
+    if np.diag(r).min() < INDEPENDENT:  # of columns of length one
+        return None
+    r_inverse = solve_triangular(r, np.eye(len(r)), check_finite=False) / size[:, None]
+    strain, frequency, v = np.linalg.svd(elastic @ r_inverse, full_matrices=False)
+    if not frequency[0] <= ALIKE * frequency[-1]:
+        return None
+    return frequency, r_inverse @ v.T, v @ (r * size), strain
+
+
+def _far_apart(inertia: np.ndarray, elastic: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the same from the factors, with Jacobi's rotations. Raises IllConditioned for one of lower rank."""
     r, r_inverse, _ = _inverse(inertia)
     scaled, u, v, work, _, info = dgejsv(elastic @ r_inverse, joba=2, jobu=0, jobv=0, jobr=0, jobt=1, jobp=1)
     frequency, strain = scaled * (work[0] / work[1]), u[:, : len(v)]
@@ -60,14 +106,7 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
         elastic_inverse @ (strain * frequency),
     )
     project = np.where(_reach(r.T) < _reach(elastic.T) / frequency, r.T @ v, (elastic.T @ strain) / frequency).T
-    size, lossy = np.abs(strain), np.abs(loss)
-    damping, noise = strain.T @ loss @ strain, size.T @ lossy @ size
-    # strains are known to round-off of a mode's whole strain: by that only, equal modes would be coupled and mixed
-    whole = lossy.sum(axis=0) @ size
-    noise = np.where(np.eye(len(whole), dtype=bool), noise, np.maximum(noise, np.maximum(whole, whole[:, None])))
-    # sums of as many terms, and rotations of as many columns
-    damping[np.abs(damping) <= max(8, 2 * len(whole)) * _EPS * noise] = 0.0
-    return RealModes(frequency, shape, project, frequency[:, None] * (damping + damping.T) / 2 * frequency)
+    return frequency, shape, project, strain
 
 
 def _inverse(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -99,6 +138,9 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
     q = len(frequency)
     number, block = q, np.arange(q)
     if np.count_nonzero(damping) > np.count_nonzero(np.diagonal(damping)):  # the library takes its time
+        found = _lightly_coupled(frequency, damping) if q >= MANY else None
+        if found is not None:
+            return found
         number, block = connected_components(damping != 0, directed=False)
     values, shapes, left = np.zeros(2 * q, complex), np.zeros((2 * q, q), complex), np.zeros((2 * q, 2 * q), complex)
     done = 0
@@ -129,6 +171,42 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     part = np.diag(1 / (first - second))
     left = np.block([[-second * part, part], [first * part, -part]])
     return np.r_[first, second], np.vstack([eye, eye]), left
+
+
+def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return `complex_modes` of real ones that damping hardly couples, by a fixed point; None where it is not found.
+
+    Row k of the equation of mode k gives its eigenvalue, the others its small parts in other real modes.
+    """
+    k = len(w)
+    own, apart, diagonal = np.diag(damping), damping - np.diag(np.diag(damping)), np.arange(k)
+    if np.any(own >= w):
+        return None
+    shapes = older = np.eye(k, dtype=complex)  # columns; each has 1 in its own real mode
+    for _ in range(STEPS):
+        coupling = (apart @ shapes.view(float)).view(complex)
+        half = (own + coupling[diagonal, diagonal]) / 2
+        values = -half + 1j * np.sqrt((w - half) * (w + half))
+        stiffness = (values - 1j * w[:, None]) * (values + 1j * w[:, None]) + 2 * half[:, None] * values
+        # what the part in a real mode brings back from the others, two steps later, belongs to that mode's own row:
+        # modes of equal frequencies have the same there
+        coupling -= coupling[diagonal, diagonal][:, None] * older
+        # below the round-off of the equation, which would mix such modes
+        stiffness[np.abs(coupling) <= _EPS * w] = np.inf
+        older, shapes = shapes, -values * coupling / stiffness
+        shapes[diagonal, diagonal] = 1.0
+        if float(np.abs(shapes - older).max()) <= SETTLED:
+            break
+    else:
+        return None
+    if np.abs(shapes).sum(axis=0).max() > 1.0 + LIGHT:
+        return None
+    left, norm = _left(values, shapes.T, w)
+    left /= norm[:, None]
+    right = np.vstack([shapes, shapes * values])
+    # modes of nearly equal frequencies are known to round-off over their distance
+    left += left - left @ right @ left
+    return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
 
 
 def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -70,7 +70,6 @@ class EngineRun(EventDrivenRun):
         super().__init__(whole, records, events, max_events)
         self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
         self.known, self.assembly, self.flows = known_of(system), new_assembly_scratch(system), empty_flows(system)
-        self._stack_begun = self.known.begun
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.columns = new_state(system, modes), repeated(system, start)
         self.event_functions = new_event_functions(system, modes)
@@ -93,7 +92,7 @@ class EngineRun(EventDrivenRun):
     def reuse(self, earlier: EngineRun) -> None:
         """Take over the flows of an earlier run of the same system."""
         if self.whole is earlier.whole:
-            self.flows, self._stack_begun = earlier.flows, earlier._stack_begun
+            self.flows = earlier.flows
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Return the code of numerics.codes. Raises InputError as `check`."""
@@ -111,14 +110,14 @@ class EngineRun(EventDrivenRun):
                 raise InputError(f"structure: {error}; change its damping slightly") from None
 
     def _advance(self, periods: int, max_events: int) -> int:
-        if self._stack_begun != self.known.begun:  # by another run
-            self.flows, self._stack_begun = empty_flows(self.system), self.known.begun
         return int(self._run(*self._records(), periods, max_events))
 
     def _add_flow(self) -> None:
         k = self.known.place(self.system, self.state.active_set)
-        if not np.any(self.flows.subsystem == k + 1):
-            self.flows, _ = with_free_place(self.flows, self.flows.subsystem, partial(empty_flows, self.system))
+        own = self.flows.subsystem
+        if not np.any(own == self.known.stack.number[k]):
+            self.flows, s = with_free_place(self.flows, own, partial(empty_flows, self.system), self.flows.used)
+            self.flows.subsystem[s] = self.flows.modes[s] = 0
 
     def _segment(self) -> Segment:
         # roots of other segments do not apply

@@ -59,9 +59,19 @@ def new_assembly_scratch(system: LineSystem) -> AssemblyScratch:
     )  # fmt: skip
 
 
+@kernel
+def code_of(closed):
+    """Return a number of the closed rows (r,) by which most others are told from them."""
+    code = 0
+    for r in range(len(closed)):
+        if closed[r]:
+            code += (r + 1) * (r + 2) * (2 * r + 3)
+    return code
+
+
 @entry
 def fill(system, subsystems, k, flows, s, scratch):
-    """Set place s of the flows, all zeros or of the same subsystem before, to subsystem k under the excitation.
+    """Set place s of the flows, whatever it was before, to subsystem k under the excitation.
 
     Returns whether doubles resolve it: otherwise its modes cancel, it rests too far away under its weight, or it is
     excited at a resonance without damping.
@@ -83,7 +93,7 @@ def fill(system, subsystems, k, flows, s, scratch):
         step *= 0.5
     _take_constants(system, subsystems, k, flows, s)
     set_energies(system, flows, s, e + count, scratch)
-    flows.modes[s], flows.subsystem[s] = e + count, k + 1
+    flows.modes[s], flows.subsystem[s], flows.code[s] = e + count, subsystems.number[k], code_of(flows.active_set[s])
     return True
 
 
@@ -93,8 +103,8 @@ def add_known(system, subsystems, closed, flows, scratch):
 
     Returns DONE, ILL_CONDITIONED where doubles do not resolve it, NEEDS_FLOW for a subsystem that is new, or no place.
     """
-    for k in range(len(subsystems.met)):
-        same = subsystems.met[k]
+    for k in range(len(subsystems.number)):
+        same = subsystems.number[k] > 0
         for r in range(len(closed)):
             if not same:
                 break
@@ -103,7 +113,7 @@ def add_known(system, subsystems, closed, flows, scratch):
             continue
         free = -1
         for s in range(len(flows.subsystem)):
-            if flows.subsystem[s] == k + 1:
+            if flows.subsystem[s] == subsystems.number[k]:
                 free = s
                 break
             if flows.subsystem[s] == 0 and free < 0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from vanedamp.coupling.numerics.codes import (
     CALM,
     DIFFERENCE,
@@ -22,6 +24,10 @@ from vanedamp.coupling.numerics.tolerances import SLOW
 def set_energies(system, flows, s, m, scratch):
     """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
     n, e, rows = system.modes, len(system.frequency), len(system.spring)
+    # impacts between free flights happen where no rigid row is closed (line.impacts.all_in_flight)
+    jumps = True
+    for r in range(rows):
+        jumps = jumps and not (flows.active_set[s, r] and system.spring[r] == math.inf)
     _set_linear(system, flows, s, m, scratch)
     pairs = _invert_rates(flows, s, m, system.period, scratch)
     for what in range(3):  # one place only, which is compiled once
@@ -43,10 +49,10 @@ def set_energies(system, flows, s, m, scratch):
                     _take_factor(flows.velocity[s, r], system.dashpot[r], width, m, scratch)
                     width += 1
         _set_form(flows, s, m, scratch, form, slow, pairs)
-        for r in range(rows):
+        for r in range(rows if jumps else 0):
             _kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
     flows.slow_count[s] = _list_single(flows, s, m, system.period, pairs)
-    for r in range(rows):
+    for r in range(rows if jumps else 0):
         change = flows.impulse_response[s, r]
         for c in range(flows.kick_maps.shape[2]):
             total = 0.0

@@ -97,6 +97,7 @@ def run(
         code = at[CODE]
         if begins:
             used = st.counters[PERIOD]
+            flows.used[:] = 0
             _set_start(system, st, watched, columns, k)
             if at[COUNT] > 0:
                 _clear(rec, used)

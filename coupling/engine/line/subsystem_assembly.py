@@ -20,11 +20,15 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
 from vanedamp.coupling.engine.line.subsystems import Known, most_modes
+from vanedamp.coupling.engine.line.tolerances import MANY
 from vanedamp.coupling.engine.peaks import GRIDS
-from vanedamp.coupling.engine.run import IllConditioned, with_free_place
+from vanedamp.coupling.engine.run import ROOM, IllConditioned, places, with_free_place
 from vanedamp.coupling.numerics.codes import WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.system.line_system import LineSystem
+
+#: bytes that flows of many modes may take, of which they use about a half
+_ROOM = 3 * ROOM
 
 
 @record_with(free_axes=1)
@@ -35,9 +39,11 @@ class Flows(NamedTuple):
     """
 
     # the subsystem
-    subsystem: Annotated[np.ndarray, "s", int]  # its place among the subsystems, counted from 1; 0: none yet
+    subsystem: Annotated[np.ndarray, "s", int]  # its number among the subsystems; 0: a free index
+    used: Annotated[np.ndarray, "s", int]  # events of the run when it was last begun
     active_set: Annotated[np.ndarray, "s r", bool]  # which rows are closed
-    modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: a free index
+    code: Annotated[np.ndarray, "s", int]  # of these (flow_assembly.code_of)
+    modes: Annotated[np.ndarray, "s", int]  # number of its complex modes; 0: it is to be filled
     eigenvalue: Annotated[np.ndarray, "s m", complex]  # of the modes, 1/s
     sprung: Annotated[np.ndarray, "s", bool]  # whether springs are closed
     attached: Annotated[np.ndarray, "s b", bool]  # whether rigid rows hold a body to the structure
@@ -67,7 +73,7 @@ class Flows(NamedTuple):
     tied: Annotated[np.ndarray, "s", bool]  # whether there are any
     body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
-    impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
+    impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse (no rigid row closed)
 
     # sizes of modes, and steps of the search for the peak
     speed: Annotated[np.ndarray, "s m"]  # largest speed of a mode over all rows and the response
@@ -81,7 +87,8 @@ class Flows(NamedTuple):
     loss: Annotated[np.ndarray, "s 2m 2m"]  # viscous loss of two modes, by their real and imaginary parts in turns
     dashpot: Annotated[np.ndarray, "s 2m 2m"]  # loss in the dashpots of contacts
     square: Annotated[np.ndarray, "s 2m 2m"]  # squared response of two modes
-    kick: Annotated[np.ndarray, "s r 3 2m"]  # loss, square, dashpot of a mode and the change by a unit impulse on a row
+    # loss, square, dashpot of a mode and the change by a unit impulse on a row, where no rigid one is closed
+    kick: Annotated[np.ndarray, "s r 3 2m"]
     kick_maps: Annotated[np.ndarray, "s r kicks"]  # linear maps of that change
     damped: Annotated[np.ndarray, "s", bool]  # whether contacts with dashpots are closed
     uncoupled: Annotated[np.ndarray, "s", bool]  # whether damping couples no two free modes
@@ -94,8 +101,14 @@ class Flows(NamedTuple):
     slow_square: Annotated[np.ndarray, "s pairs", complex]  # its part of the squared response
 
 
-def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
-    """Return storage for `capacity` subsystems, none of them filled (modes 0)."""
+def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
+    """Return storage for `capacity` subsystems, none of them filled (modes 0): a few, or as many as there is room for.
+
+    Those of many modes are not copied to more room later: much of it stays zero, and takes no memory.
+    """
+    if capacity is None:
+        few = system.modes < MANY
+        return empty_flows(system, 4 if few else places(lambda size: empty_flows(system, size), _ROOM))
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = most_modes(system) + e
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
@@ -108,8 +121,6 @@ def add_flow(flows: Flows, system: LineSystem, closed: np.ndarray) -> Flows:
     For flows of one system alone, without what compiled runs (line.scenes) keep of its structure.
     """
     known = Known(system)
-    for s in np.flatnonzero(flows.subsystem):
-        known.place(system, flows.active_set[s])
     k = known.place(system, closed)
     flows, s = with_free_place(flows, flows.subsystem, lambda size: empty_flows(system, size))
     if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system)):

@@ -6,6 +6,7 @@ others move freely. Each subsystem is found once, by numpy; line.flow_assembly s
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections import OrderedDict
 from typing import Annotated, Any, NamedTuple
@@ -16,8 +17,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
-from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MOVES_ALIKE, UNFELT
-from vanedamp.coupling.engine.run import with_free_place
+from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT
+from vanedamp.coupling.engine.run import ROOM, places, with_free_place
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
 from vanedamp.coupling.system.line_system import LineSystem
@@ -31,7 +32,7 @@ class Subsystems(NamedTuple):
     largest number of complex modes, one of each conjugate pair: z = Re sum_j shape_j c_j; other sizes as in line.state.
     """
 
-    met: Annotated[np.ndarray, "k", bool]  # False: a free index
+    number: Annotated[np.ndarray, "k", int]  # in the order in which they were found, of all systems; 0: a free index
     closed: Annotated[np.ndarray, "k r", bool]  # which rows are closed
     held: Annotated[np.ndarray, "k b", bool]  # whether rigid rows hold a body to the structure
     free: Annotated[np.ndarray, "k b", bool]  # whether a body moves freely
@@ -69,7 +70,8 @@ class Subsystems(NamedTuple):
     push: Annotated[np.ndarray, "k m N", complex]  # rate of an amplitude by loads on (p, x)
     motion: Annotated[np.ndarray, "k r m", complex]  # displacement of each row
     force: Annotated[np.ndarray, "k r m", complex]  # force of each closed row
-    impulse_response: Annotated[np.ndarray, "k r m", complex]  # change of the amplitudes by a unit impulse on a row
+    # change of the amplitudes by a unit impulse on a row, where no rigid one is closed
+    impulse_response: Annotated[np.ndarray, "k r m", complex]
     response: Annotated[np.ndarray, "k m", complex]  # displacement of the response
     momentum: Annotated[np.ndarray, "k m", complex]  # momentum of all bodies
     speed: Annotated[np.ndarray, "k m"]  # largest speed of a mode over all rows and the response
@@ -81,43 +83,51 @@ class Subsystems(NamedTuple):
     natural: Annotated[np.ndarray, "k N"]  # rad/s
 
 
-def empty_subsystems(system: LineSystem, capacity: int = 4) -> Subsystems:
-    """Return storage for `capacity` subsystems of a system."""
+def empty_subsystems(system: LineSystem, capacity: int | None = None) -> Subsystems:
+    """Return storage for `capacity` subsystems of a system: a few of small ones, or as many as half of ROOM holds."""
+    if capacity is None:
+        few = system.modes < MANY
+        return empty_subsystems(system, 4 if few else places(lambda size: empty_subsystems(system, size), ROOM // 2))
     n, b, r = system.modes, system.bodies, len(system.delassus)
     return room(Subsystems, {"k": capacity, "n": n, "b": b, "N": n + b, "r": r, "m": most_modes(system)})
 
 
 def most_modes(system: LineSystem) -> int:
-    """Return the largest number of complex modes that a subsystem can have."""
-    return 2 * system.modes + 2 * system.bodies * bool(np.isfinite(system.spring[system.friction_rows :]).any())
+    """Return the largest number of complex modes that a subsystem can have.
+
+    A structure whose modes are less than critically damped stays so with masses and springs added: by Cauchy and
+    Schwarz no motion x has a damping x^T C x of 2 sqrt(x^T M x x^T K x), and modes come in pairs of which one is kept.
+    """
+    most = system.modes + system.bodies * bool(np.isfinite(system.spring[system.friction_rows :]).any())
+    part, light = system.of_structure, system.modes >= MANY and system.proportional and not system.dashpot.any()
+    return most if light and np.all(np.diag(part.damping) <= np.sqrt(part.stiffness)) else 2 * most
 
 
 class Known:
-    """The subsystems met so far, of a system and of those that differ from it by what the excitation decides.
-
-    begun: how often the stack has begun again (engine.run.with_free_place), which gives its places other meanings.
-    """
+    """The subsystems met of late, of a system and of those that differ from it by what the excitation decides."""
 
     def __init__(self, system: LineSystem) -> None:
-        self.stack, self.begun = empty_subsystems(system), 0
+        self.stack = empty_subsystems(system)
 
     def __bool__(self) -> bool:
-        return bool(self.stack.met.any())
+        return bool(self.stack.number.any())
 
     def place(self, system: LineSystem, closed: np.ndarray) -> int:
         """Return the place in the stack of the subsystem of the closed rows (r,), which is found if it is new.
 
         Raises IllConditioned (line.complex_modes) for one that doubles cannot resolve.
         """
-        found = np.flatnonzero(self.stack.met & (self.stack.closed == closed).all(axis=1))
+        found = np.flatnonzero((self.stack.number > 0) & (self.stack.closed == closed).all(axis=1))
         if len(found):
             return int(found[0])
-        self.stack, k = with_free_place(self.stack, self.stack.met, lambda size: empty_subsystems(system, size))
-        self.begun += k == 0
+        own = self.stack.number
+        self.stack, k = with_free_place(self.stack, own, lambda size: empty_subsystems(system, size), own)
         _set(self.stack, k, system, closed)
+        self.stack.number[k] = next(_NUMBERS)
         return k
 
 
+_NUMBERS = itertools.count(1)
 #: parts of a system that decide its subsystems
 _DECIDING = ("mass", "stiffness", "damping", "response", "floor", "J", "spring", "dashpot")
 #: structures whose subsystems are kept
@@ -155,13 +165,12 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
-    push = project[:, q:] @ loads
-    shape, project = lift @ shape.reshape(2, q, m), project.reshape(m, 2, q) @ drop
+    push = _times(loads.T, project[:, q:].T).T
+    shape = np.stack([_times(lift, part) for part in shape.reshape(2, q, m)])
+    project = np.stack([_times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
     free = (cluster >= 0) & ~springs.anchored
-    acceleration = np.zeros((b, b))
-    for c in set(springs.cluster[free]):
-        members = free & (springs.cluster == c)
-        acceleration[np.ix_(members, members)] = 1 / system.mass[n:][members].sum()
+    together = free & free[:, None] & (springs.cluster == springs.cluster[:, None])
+    acceleration = together / np.maximum(together @ system.mass[n:], np.finfo(float).tiny)[:, None]
     values = _functionals(system, carrier, functional, eigenvalue, shape[0])
     values |= _forces(system, rigid, sprung, eigenvalue, values["motion"], shape[:, :n].reshape(2 * n, m))
     values |= _round_off(system, carrier, functional, law, sprung, shape, project)
@@ -175,11 +184,11 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
         "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
         "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
         "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(kept) > 0, "push": push,
-        "impulse_response": system.J[:, :n] @ project[:, 1, :n].T,
     }  # fmt: skip
+    if not len(rigid):
+        values["impulse_response"] = _times(system.J[:, :n], project[:, 1, :n].T)
     for name, value in values.items():
         getattr(stack, name)[(k, *map(slice, np.shape(value)))] = value
-    stack.met[k] = True
 
 
 def _real_modes(
@@ -226,6 +235,11 @@ def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return values[keep], vectors[:, keep] * np.where(values[keep].imag > 0, 2.0, 1.0), inverse[keep]
 
 
+def _times(real: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the product of a real matrix (i, k) and a complex one (k, j), which numpy would make a complex one."""
+    return (real @ np.ascontiguousarray(values).view(float)).view(complex)
+
+
 def _support(shape: np.ndarray) -> np.ndarray:
     """Return the first coordinate p of each mode's p and p' (2, n, m) that is not zero, and the last plus 1 (m, 2)."""
     _, n, m = shape.shape
@@ -241,8 +255,8 @@ def _functionals(
     """Return bodies, rows and response as functionals of the modes, and the modes' sizes. shape: (N, m)."""
     n = system.modes
     p, own = shape[:n], shape[n:]
-    body, of_bodies = carrier @ p + own, system.J[:, n:]
-    motion = functional @ p + of_bodies @ own
+    body, of_bodies = _times(carrier, p) + own, system.J[:, n:]
+    motion = _times(functional, p) + _times(of_bodies, own)
     # terms by their sizes: a mode may be where no row feels it as long as others are closed
     held = np.abs(functional) @ np.abs(p)
     terms = held + np.abs(of_bodies) @ np.abs(own)
@@ -273,9 +287,9 @@ def _forces(
     pull = -np.hstack([on_structure * system.stiffness[:n], on_structure @ system.damping[:n, :n]])
     if len(rigid):
         inverse = np.linalg.inv(system.delassus[np.ix_(rigid, rigid)])
-        acceleration = (pull @ structure + system.delassus[:, sprung] @ force[sprung])[rigid]
-        size = (np.abs(pull) @ np.abs(structure))[rigid]
-        held = -inverse @ acceleration
+        acceleration = _times(pull[rigid], structure) + system.delassus[np.ix_(rigid, sprung)] @ force[sprung]
+        size = np.abs(pull[rigid]) @ np.abs(structure)
+        held = _times(-inverse, acceleration)
         # a contact without force has none, not round-off, or it would open and close at every tick of the clock
         held[np.abs(held) <= CANCELLED * (np.abs(inverse) @ size)] = 0.0
         force[rigid], closed_inverse[np.ix_(rigid, rigid)] = held, inverse
@@ -298,13 +312,18 @@ def _round_off(
     size[:, :n] = 1 / np.maximum(felt, UNFELT * felt.max(initial=np.finfo(float).tiny))
     m = len(project)
     size, vectors, inverse = size.ravel(), shape.reshape(2 * (n + b), m), project.reshape(m, 2 * (n + b))
+    natural = np.sqrt((system.stiffness + system.spring[sprung] @ law**2) / system.mass)
+    own = np.r_[np.ones(n + b), np.where(natural > 0, natural, 1.0)]
+    # of many modes a bound serves (Cauchy and Schwarz) where it is far below what is allowed
+    into = np.linalg.norm(vectors, axis=1) / size
+    out = np.linalg.norm(inverse, axis=0) * size * (np.finfo(float).eps / LOST)
+    if m >= MANY and (into / own).max() * (out * own).max() < SURE:
+        return {"round_off": np.outer(into, out), "natural": natural}
     parts = np.abs(vectors.real) @ np.abs(inverse.real) + np.abs(vectors.imag) @ np.abs(inverse.imag)
     # the search for events uses only the modulus of an amplitude
     whole = np.abs(vectors) @ np.abs(inverse)
-    return {
-        "round_off": np.maximum(parts / LOST, whole / FAR) * (np.finfo(float).eps * size / size[:, None]),
-        "natural": np.sqrt((system.stiffness + system.spring[sprung] @ law**2) / system.mass),
-    }
+    growth = np.maximum(parts / LOST, whole / FAR) * (np.finfo(float).eps * size / size[:, None])
+    return {"round_off": growth, "natural": natural}
 
 
 def _attachment(system: LineSystem, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

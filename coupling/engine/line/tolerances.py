@@ -37,6 +37,8 @@ DRIVEN = 2e-2
 FAR = 1e-6
 #: least fraction of a coordinate in the rows, times the largest, that the check of cancellation assumes
 UNFELT = 1e-8
+#: bound of a growth of round-off, over what is allowed, below which it is not computed
+SURE = 1e-3
 #: product of a left and a right vector, times their lengths, below which they are combinations of equal modes
 MIXED = 1e-3
 #: condition number of modes beyond which some nearly coalesce
@@ -44,6 +46,14 @@ NEARLY_EQUAL = 1e2
 #: distances from an eigenvalue, times its size, at which an inverse step is tried: the matrix must not be singular to
 #: the last bit, as it can be close to two eigenvalues that nearly coalesce
 SHIFTS = (4 * float(np.finfo(float).eps), 1e-10, 1e-6)
+#: modes from which on a quicker way to them is tried
+MANY = 24
+#: largest frequency, times the lowest, and least independent length of a coordinate of length one in the inertia, for
+#: which modes are taken from matrices: two and four digits are lost
+ALIKE, INDEPENDENT = 1e3, 0.1
+#: fixed point of lightly coupled modes: most steps, which gain some three digits each; the change in the last one; and
+#: the largest sum of a mode's parts in others
+STEPS, SETTLED, LIGHT = 12, 1e-13, 0.5
 
 # --- samples
 #: distance of a sampling time before a segment's start, times the sampling step, that is round-off

@@ -29,8 +29,9 @@ def read_campbell_case(arguments: Namespace) -> Case:
 
 def read_reducible_case(arguments: Namespace) -> Case:
     """Load a case with an interface, for a basis that there is; as read_case."""
-    basis_named(arguments.basis)
     case = read_case(arguments)
+    if case.ring is None:
+        basis_named(arguments.basis)
     check_interface(case)
     return case
 

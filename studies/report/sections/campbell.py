@@ -47,7 +47,7 @@ def campbell_figure(diagram: Campbell) -> go.Figure:
     top = 1.06 * float(np.nanmax(diagram.frequencies_hz))
     _add_orders(figure, diagram, top)
     for place, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
-        name = f"mode {mode + 1}"
+        name = diagram.label(mode)
         figure.add_scatter(
             x=diagram.rpm, y=frequencies, name=name, mode="lines", customdata=diagram.speeds,
             line={"color": COLOURS[place % len(COLOURS)], "width": 2.2, "dash": _DASHES[place // len(COLOURS) % 3]},
@@ -92,7 +92,7 @@ def _add_crossings(figure: go.Figure, diagram: Campbell) -> None:
             y=[crossing.frequency_hz for crossing in diagram.crossings],
             name="crossings", mode="markers", hoverinfo="text",
             hovertext=[
-                f"mode {crossing.mode + 1} meets engine order {crossing.order:g}<br>{crossing.rpm:.3f} rpm "
+                f"{diagram.label(crossing.mode)} meets engine order {crossing.order:g}<br>{crossing.rpm:.3f} rpm "
                 f"({crossing.speed:.4f} rad/s)<br>{crossing.frequency_hz:.4f} Hz"
                 for crossing in diagram.crossings
             ],
@@ -117,5 +117,5 @@ def _add_veerings(figure: go.Figure, diagram: Campbell) -> None:
 
 def campbell_table(diagram: Campbell) -> Table:
     """Return the frequencies of the modes, a row per speed."""
-    header = ["speed, rad/s", "speed, rpm", *(f"mode {mode + 1}, Hz" for mode in diagram.modes)]
+    header = ["speed, rad/s", "speed, rpm", *(f"{diagram.label(mode)}, Hz" for mode in diagram.modes)]
     return header, np.column_stack([diagram.speeds, diagram.rpm, diagram.frequencies_hz.T]).tolist()

@@ -8,8 +8,8 @@ from scipy import linalg
 
 from tests.tools.rings import Chain
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.ring_model import RingModel, sector_label
-from vanedamp.rom.ring.waves import turns
+from vanedamp.rom.ring.placement import sector_label, turns
+from vanedamp.rom.ring.ring_model import RingModel
 
 DEVIATIONS = Deviations(
     stiffness=np.array([0.03, -0.02, 0.05, 0.0, -0.04, 0.01, 0.02]),

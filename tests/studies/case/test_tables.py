@@ -209,7 +209,7 @@ def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
     ("old", "new", "message"),
     [
         ('"block"', '"blok"', "mesh.generator: no generator 'blok'; did you mean 'block'?"),
-        ('"block"', "[1]", "mesh.generator: no generator [1]; known: block, vane_cluster"),
+        ('"block"', "[1]", "mesh.generator: no generator [1]; known: block, sector, vane_cluster"),
         ("thickness = 0.01", "thikness = 0.01", "mesh.thikness: unknown key; did you mean 'thickness'?"),
         ("thickness = 0.01", "thickness = -0.01", "mesh: thickness: expected a positive number of metres"),
         ("thickness = 0.01", 'thickness = "3"', "mesh: thickness: expected a number, not '3'"),

@@ -27,8 +27,9 @@ def modes():
 def found(modes):
     speeds = np.array([0.0, 200.0, 400.0])
     over = np.sqrt(modes.frequencies_hz[:, None] ** 2 + 2.0 * (speeds / (2 * np.pi)) ** 2)
+    crossings = Interference.of(modes, operating=(100.0, 400.0)).meetings
     return Interference.of(modes, range(1, 9), speed=150.0, operating=(140.0, 180.0), speeds=speeds,
-                           over_speed_hz=over)  # fmt: skip
+                           over_speed_hz=over, crossings=crossings)  # fmt: skip
 
 
 @pytest.fixture
@@ -185,10 +186,10 @@ def test_page_turns_and_animates_the_wave(modes, file, surface, browser):
     assert shown(1, 0.0) < 1e-3
     page.locator(".ring .diameter").fill("3")
     page.locator(".ring .family").select_option(index=1)
-    assert "nodal diameter 3, family 2: 290.000 Hz" in page.locator(".ring output").inner_text()
+    assert "diameter 3, family 2: 290.000 Hz" in page.locator(".ring output").inner_text()
     assert shown(8, 0.0) < 1e-3
     page.evaluate("document.getElementById('interference-0').emit('plotly_click', {points: [{customdata: 2}]})")
-    assert "nodal diameter 2, family 1" in page.locator(".ring output").inner_text()
+    assert "diameter 2, family 1" in page.locator(".ring output").inner_text()
     page.locator(".ring .button").click()
     page.wait_for_timeout(300)
     page.locator(".ring .button").click()

@@ -26,6 +26,7 @@ def facts(path: str | Path) -> list[Fact]:
         warnings.append("support: nothing holds the structure, which has six rigid motions and no first bending then")
     commands = ["modal", *(["reduce"] if case.interface else []), *(["calibrate"] if case.calibration else [])]
     commands += ["campbell"] if case.campbell else []
+    commands += ["ring"] if case.ring else []
     commands += [] if isinstance(case.mesh, MeshFile) else ["mesh"]
     found = [Fact("commands", commands), *_of_mesh(case), *_of_materials(case), *_of_results(case)]
     warnings += [f"units: {doubt}" for fact in found if fact.key == "extent" for doubt in size_doubts(fact.value)]

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from tests.reference.compliant_collision import damping_ratio
 from tests.reference.multiprecision import propagator
 from tests.tools.closed_form_compliant_scenes import STILL, scene
+from vanedamp.coupling.engine.line import complex_modes as module
 from vanedamp.coupling.engine.line.complex_modes import complex_modes, real_modes
 from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.engine.line.subsystems import _about_centre
@@ -319,6 +320,56 @@ def test_equal_oscillators_that_damping_couples():
         values, vectors, inverse = complex_modes(frequency, damping)
         whole = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.diag(frequency**2), -damping]])
         assert ((vectors * np.exp(values)) @ inverse).real == pytest.approx(expm(whole), abs=1e-13)
+
+
+def waves(sectors, bodies, detuned):
+    """A ring of chains of two with bodies held to some tips: inertia, elastic and loss factors of its modes."""
+    n = 2 * sectors
+    K = np.zeros((n, n))
+    for s in range(sectors):
+        for a, b, k in ((2 * s, 2 * s + 1, 6.0), (2 * s, (2 * s + 2) % n, 0.02)):
+            K[[a, b], [a, b]] += k
+            K[[a, b], [b, a]] -= k
+        K[2 * s, 2 * s] += 1.0 + detuned * math.cos(s * s)
+    squares, shapes = np.linalg.eigh(K)
+    frequency = np.sqrt(squares)
+    inertia = np.vstack([np.eye(n), 0.15 * shapes[2 * np.array(bodies, int) + 1]])
+    return inertia, np.diag(frequency), np.diag(0.01 / frequency)
+
+
+@pytest.mark.parametrize("detuned", [0.0, 0.03])
+@pytest.mark.parametrize("bodies", [(0,), (0, 1), (0, 3), (0, 4, 8), (1, 2, 5, 9), range(12)])
+def test_many_modes_that_damping_hardly_couples(bodies, detuned, monkeypatch):
+    """A tuned ring has equal modes, also with bodies in a pattern that repeats: found quickly, and without QR."""
+    inertia, elastic, loss = waves(12, bodies, detuned)
+    for name in ("_coupled", "_far_apart"):
+        monkeypatch.setattr(module, name, None)
+    real = real_modes(inertia, elastic, loss)
+    q = len(real.frequency)
+    assert real.shape.T @ inertia.T @ inertia @ real.shape == pytest.approx(np.eye(q), abs=1e-13)
+    assert real.shape.T @ elastic.T @ elastic @ real.shape == pytest.approx(np.diag(real.frequency**2), abs=1e-12)
+    assert real.shape @ real.project == pytest.approx(np.eye(q), abs=1e-13)
+    values, vectors, inverse = complex_modes(real.frequency, real.damping)
+    whole = np.block([[np.zeros((q, q)), np.eye(q)], [-np.diag(real.frequency**2), -real.damping]])
+    assert whole @ vectors == pytest.approx(vectors * values, abs=1e-13)
+    assert ((vectors * np.exp(values)) @ inverse).real == pytest.approx(expm(whole), abs=1e-12)
+    assert inverse @ vectors == pytest.approx(np.eye(2 * q), abs=1e-12)
+
+
+def test_many_modes_far_apart_or_strongly_coupled():
+    """What is not found the quick way is found the other way, to the same equation."""
+    rng = np.random.default_rng(5)
+    for frequency, damping in (
+        (np.linspace(1.0, 1.01, 24), 0.2), (np.geomspace(1.0, 1e5, 24), 1e-3), (np.ones(24), 1e-3),
+    ):  # fmt: skip
+        half = rng.normal(size=(24, 24)) / 24
+        loss = damping * half @ half.T
+        real = real_modes(np.vstack([np.eye(24), half]), np.diag(frequency), loss)
+        values, vectors, inverse = complex_modes(real.frequency, real.damping)
+        whole = np.block([[np.zeros((24, 24)), np.eye(24)], [-np.diag(real.frequency**2), -real.damping]])
+        size = np.abs(whole) @ np.abs(vectors)
+        assert (np.abs(whole @ vectors - vectors * values) <= 1e-12 * size).all()
+        assert inverse @ vectors == pytest.approx(np.eye(48), abs=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -273,13 +273,13 @@ def test_known_subsystems_serve_all_frequencies():
         for s, key in enumerate(keys):
             assert fill(now, known.stack, k[s], flows, s, scratch)
             assert np.array_equal(flows.active_set[s], key)
-        assert len(set(k)) == known.stack.met.sum() == len({key.tobytes() for key in keys})
+        assert len(set(k)) == np.count_nonzero(known.stack.number) == len({key.tobytes() for key in keys})
         for s, key in enumerate(keys):
             alone = add_flow(empty_flows(now, 1), now, key)
             # filled before at another frequency, and now at this one
             assert fill(system, known.stack, k[s], flows, s, scratch)
             assert fill(now, known.stack, k[s], flows, s, scratch)
-            for name, part in alone._replace(subsystem=np.array([k[s] + 1]))._asdict().items():
+            for name, part in alone._replace(subsystem=known.stack.number[k[s]][None])._asdict().items():
                 listed = slice(alone.slow_count[0] if name.startswith("slow") and part.ndim > 1 else None)
                 assert np.array_equal(np.atleast_1d(getattr(flows, name)[s])[listed], np.atleast_1d(part[0])[listed])
     assert known

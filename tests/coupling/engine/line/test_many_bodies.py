@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.coupling.orbits.test_waves import ring
 from tests.tools.laws_by_event import check_events
+from vanedamp.coupling.engine import run
+from vanedamp.coupling.engine.line import subsystem_assembly, subsystems
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -44,6 +47,20 @@ def joint(elements, **tables) -> Scene:
         "time": {"periods": 1, "transient": 0},
     }
     return validate(Scene, data | tables, "scene")
+
+
+def test_subsystems_that_memory_does_not_hold_are_found_again(monkeypatch):
+    """A ring of eight bodies that stick and rest at walls: with room for four subsystems only, the same to the bit."""
+    scene = ring(8, 1, periods=60).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
+    whole = simulate(scene)
+    assert whole.counters["subsystems"] > 12
+    monkeypatch.setattr(subsystems, "_STRUCTURES", subsystems._Structures())
+    for module, name in ((subsystems, "ROOM"), (subsystem_assembly, "_ROOM"), (run, "ROOM")):
+        monkeypatch.setattr(module, name, 0)
+    few = simulate(scene)
+    assert few.counters["subsystems"] <= 4 and few.counters["impacts"] == whole.counters["impacts"]
+    assert np.array_equal(few.section, whole.section)
+    assert few.energy_residual == whole.energy_residual < 1e-9
 
 
 @pytest.mark.parametrize("bodies", BODIES)

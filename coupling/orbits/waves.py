@@ -1,0 +1,48 @@
+"""Travelling waves of a tuned ring: each sector does the same one phase later, and one tells of all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Problem, solve
+from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.files.toml_input import InputError
+
+#: largest fraction of the scale by which a travelling wave misses itself after a whole period; least time between
+#: events, over the period: sectors opposite to each other may have theirs together, though no part tells their order
+_CLOSED, _TOGETHER = 1e-6, 1e-9
+
+
+def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+    """Return the travelling wave that Newton's method finds from a state (k,), or the last iterate and why it failed.
+
+    Its steps take the part of a period in which the wave comes to the next sector; the result is an orbit over the
+    whole period, whose derivative is the product of the parts'. Raises InputError for a scene without that symmetry.
+    """
+    symmetry = period_map.travelling
+    if symmetry is None or period_map.periods != 1:
+        raise InputError(
+            "orbit.wave: a wave travels over equal sectors with bodies in equal steps (cavities such as c@0, c@1), "
+            "without mistuning or scatter, under one engine order that is no multiple of their number; over one period"
+        )
+    problem = Problem(replace(period_map, wave=True, _earlier=[]))
+    begin = problem.pack(np.asarray(start, float), math.nan)
+    found = solve(problem, begin, problem.along_parameter, np.zeros(problem.size))
+    if found.status is not OrbitStatus.OK:
+        return found
+    passage, own = period_map(found.state, derivative=False), found.passage
+    missed = float(np.abs((passage.state - found.state) / found.scale).max(initial=0.0))
+    if not missed < _CLOSED * (1.0 + float(np.abs(found.state / found.scale).max(initial=0.0))):
+        return replace(found, status=OrbitStatus.NOT_CONVERGED, residual=missed, map=period_map)
+    # (image part)^times is the whole period, with the sectors shifted all the way round or by a period of the loads
+    back, step = np.linalg.inv(symmetry.image), own.derivative
+    derivative = np.linalg.matrix_power(back, symmetry.times) @ np.linalg.matrix_power(step, symmetry.times)
+    status, times = own.status, [crossing.time for crossing in passage.crossings]
+    if status is PassageStatus.OK and np.any(np.diff(times) < _TOGETHER * times[-1]):
+        status = PassageStatus.COINCIDENT
+    whole = passage._replace(derivative=derivative, status=status, clearance=own.clearance)
+    return replace(found, passage=whole, residual=max(missed, found.residual), map=period_map)

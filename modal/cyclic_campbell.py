@@ -1,0 +1,130 @@
+"""Campbell diagram of a ring: frequencies of every nodal diameter over the speed, and engine orders that excite them.
+
+In the rotating frame, where a load at rest loads sector j by cos(k (W t + j alpha)), the order k = i N + h excites the
+wave exp(i (omega t + h j alpha)), against the turn, and k = i N - h the one with it. Waves of one sign and diameter
+keep their order: their curves do not cross.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.modal.campbell import Campbell, CampbellError, Crossing, checked_speeds
+from vanedamp.modal.cyclic import CyclicSector, aliased
+from vanedamp.modal.cyclic_rotation import rotating_diameter
+from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
+from vanedamp.modal.rotating import RotatingMatrices
+from vanedamp.modal.speed_range import SpeedRange, meetings, ritz_modes
+
+
+def ring_campbell(
+    sector: CyclicSector,
+    rotating: RotatingMatrices,
+    speeds: Sequence[float] | np.ndarray,
+    orders: Sequence[float] = (),
+    count: int = 6,
+    gyroscopic: bool = False,
+    tolerance: float = 1e-8,
+    report: Callable[[int, int], None] | None = None,
+    keep: Keep = not_kept,
+) -> Campbell:
+    """Return the lowest `count` frequencies of every nodal diameter over speeds, and their crossings.
+
+    sector  for the ring's geometry; the rest and the errors as in modal.campbell.campbell. Engine orders are whole
+    report  called with the number of diameters done, and of all
+
+    With gyroscopic coupling both waves of a diameter are there, otherwise their common frequency.
+    """
+    wanted = checked_speeds(speeds, orders, count, rotating.standing.free.size, tolerance)
+    if any(order != int(order) for order in orders):
+        raise CampbellError("orders: expected whole engine orders of a ring")
+    curves: list[_Curve] = []
+    crossings: list[Crossing] = []
+    errors, solved = [], set()
+    for diameter in sector.diameters:
+        if report is not None:
+            report(diameter, len(sector.diameters))
+        travels = sector.travels(diameter)
+        turning = rotating_diameter(sector, rotating, diameter)
+        asked = min((2 if travels else 1) * count, turning.standing.free.size)
+        made = _Waves if travels else SpeedRange
+        with made(turning, float(wanted[0]), float(wanted[-1]), asked, gyroscopic, keep) as source:
+            errors.append(_refined(source, wanted, tolerance))
+            solved |= set(source.solved)
+            for sense in (1, -1) if travels and gyroscopic else (1,):
+                small = source.of_sense(sense) if isinstance(source, _Waves) else source.small
+                met = [k for k in orders if aliased(int(k), sector.sectors) in ((diameter, sense), (diameter, 0))
+                       or (not gyroscopic and aliased(int(k), sector.sectors)[0] == diameter)]  # fmt: skip
+                crossings += _crossings(small, met, wanted, count, len(curves))
+                frequencies = np.array([ritz_modes(small, float(speed))[0][:count] for speed in wanted]).T
+                curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
+    worst = np.max(errors, axis=0)
+    warnings = [] if worst.max() <= tolerance else [f"frequencies are estimated to be wrong by up to {worst.max():.2g}"]
+    return Campbell(
+        speeds=wanted,
+        asked=np.ones(wanted.size, dtype=bool),
+        modes=np.arange(len(curves)),
+        frequencies_hz=np.array([curve.frequencies for curve in curves]) / (2.0 * np.pi),
+        errors=worst,
+        solved=np.sort(list(solved)),
+        orders=tuple(float(order) for order in orders),
+        crossings=tuple(sorted(crossings, key=lambda crossing: (crossing.speed, crossing.mode))),
+        approaches=(),
+        gyroscopic=gyroscopic,
+        warnings=tuple(warnings),
+        provenance=rotating.standing.provenance,
+        diameters=np.array([curve.diameter for curve in curves]),
+        families=np.array([curve.family for curve in curves]),
+    )
+
+
+class _Curve(NamedTuple):
+    diameter: int
+    family: int
+    frequencies: np.ndarray
+
+
+def _crossings(
+    small: Sequence[np.ndarray], orders: Sequence[float], speeds: np.ndarray, count: int, first: int
+) -> list[Crossing]:
+    """Return where orders meet the `count` lowest curves of small matrices, the modes from `first` on."""
+    return [
+        Crossing(first + place, float(order), speed, order * speed / (2.0 * np.pi))
+        for order in orders
+        for place, speed in enumerate(meetings(small, order)[:count].tolist())
+        if speeds[0] <= speed <= speeds[-1]
+    ]
+
+
+def _refined(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> np.ndarray:
+    """Solve the full problem at more speeds until all errors (s,) meet a tolerance, and return them."""
+    while True:
+        errors = np.array([source.errors(float(speed)).max() for speed in speeds])
+        worst = float(speeds[np.argmax(errors)])
+        if errors.max() <= tolerance or worst in source.solved:
+            return errors
+        source.add(worst)
+
+
+class _Waves(SpeedRange):
+    """A basis for the real form of a diameter, with i times every field, so that its two waves can be told apart."""
+
+    def of_sense(self, sense: int) -> list[np.ndarray]:
+        """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of those with -h."""
+        basis = self.basis
+        turned = basis.T @ (self.rotating.standing.of_free(self.rotating.standing.mass) @ _turned(basis.T).T)
+        values, vectors = np.linalg.eigh(-1j * sense * turned)
+        own = vectors[:, values > 0.5]
+        return [own.conj().T @ matrix @ own for matrix in self.small]
+
+    def _join(self, speed: float, modes: Arrays) -> None:
+        super()._join(speed, {**modes, "shape": np.vstack([modes["shape"], _turned(modes["shape"])])})
+
+
+def _turned(rows: np.ndarray) -> np.ndarray:
+    """Return i times fields (k, 2 n) in real form."""
+    real, imaginary = np.split(rows, 2, axis=1)
+    return np.hstack([-imaginary, real])

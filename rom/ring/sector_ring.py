@@ -1,0 +1,204 @@
+"""SectorRing: a ring sector by sector, each with inner motions of its own, for large deviations and many sectors."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import linalg, sparse
+
+from vanedamp.files import store
+from vanedamp.files.display import Displayed
+from vanedamp.modal.algebra import symmetric_part
+from vanedamp.rom.bases.projection import lowest_modes, superlu
+from vanedamp.rom.checks import shaped, symmetric
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.placement import Ring, turns
+from vanedamp.rom.ring.ring_model import RingModel
+
+_KIND = "ring-sectors"
+_ARRAYS = {
+    "axis": (("direction",), "1"),
+    "point": (("direction",), "m"),
+    "stiffness": (("coordinate", "column"), "N/m"),
+    "mass": (("coordinate", "column"), "kg"),
+    "part_stiffness": (("coordinate", "column"), "N/m"),
+    "part_mass": (("coordinate", "column"), "kg"),
+    "spring_high": (("spring", "coordinate"), "1"),
+    "spring_low": (("spring", "coordinate"), "1"),
+    "spring_stiffness": (("spring",), "N/m"),
+    "selection": (("interface", "coordinate"), "1"),
+    "directions": (("interface", "direction"), "1"),
+    "normals": (("interface", "direction"), "1"),
+    "positions": (("interface", "direction"), "m"),
+    "arms": (("interface",), "m"),
+    "base_load": (("coordinate", "direction"), "kg"),
+    "part_load": (("coordinate", "direction"), "kg"),
+}
+_SYMMETRIC = ("stiffness", "mass", "part_stiffness", "part_mass")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SectorRing(Ring, Displayed):
+    """A ring of N equal sectors by component modes of one; matrices of the whole ring are sparse.
+
+    The s coordinates of a sector are f motions of its face low, the same f of its face high, which are the next
+    sector's first, and inner motions. Fields that RingModel has, too, mean the same in them.
+
+    faces                          f
+    modes                          number of natural modes of the ring that `model` keeps
+    stiffness, mass                (s, s) of a sector; part_stiffness, part_mass: of the part that deviates
+    spring_high, spring_low        (p, s) stretch of springs between neighbours: spring_high q_j - spring_low q_(j+1)
+    spring_stiffness               (p,) N/m
+    selection                      (k, s); base_load, part_load (s, 3) kg
+
+    Raises RingError or rom.checks.ReducedModelError.
+    """
+
+    sectors: int
+    axis: np.ndarray
+    point: np.ndarray
+    faces: int
+    modes: int
+    stiffness: np.ndarray
+    mass: np.ndarray
+    part_stiffness: np.ndarray
+    part_mass: np.ndarray
+    spring_high: np.ndarray
+    spring_low: np.ndarray
+    spring_stiffness: np.ndarray
+    interface: tuple[str, ...]
+    selection: np.ndarray
+    directions: np.ndarray
+    normals: np.ndarray
+    positions: np.ndarray
+    arms: np.ndarray
+    base_load: np.ndarray
+    part_load: np.ndarray
+    damping_ratio: float
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths = {
+            "coordinate": len(self.mass), "column": len(self.mass), "interface": len(self.interface), "direction": 3,
+            "spring": len(self.spring_stiffness),
+        }  # fmt: skip
+        for name, (dims, _) in _ARRAYS.items():
+            shape = tuple(lengths[dimension] for dimension in dims)
+            given = getattr(self, name)
+            found = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
+            object.__setattr__(self, name, found)
+        self._settle()
+        if not 0 <= 2 * self.faces <= len(self.mass) or not 0 < self.modes <= self.size:
+            raise RingError(f"faces: {self.faces} motions of a face and {self.modes} modes do not fit the sector")
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates of the whole ring."""
+        return self.sectors * (len(self.mass) - self.faces)
+
+    @cached_property
+    def frequencies_hz(self) -> np.ndarray:
+        """(modes,) natural frequencies of the tuned ring, ascending."""
+        return self.model().natural_frequencies_hz
+
+    def model(
+        self, deviations: Deviations | None = None, speed: float | None = None, modes: int | None = None
+    ) -> ReducedModel:
+        """Return the reduced model of the whole ring with deviations of its sectors, as RingModel.model.
+
+        In its own lowest natural modes, so many or `modes` of the ring, with residual flexibility. Raises RingError,
+        also for a speed.
+        """
+        count = self.modes if modes is None else modes
+        if speed:
+            raise RingError('speed: the ring is reduced sector by sector, at standstill; take basis = "modes"')
+        deviations = deviations or Deviations()
+        stiffness, mass = self.matrices(deviations)
+        factors = superlu(stiffness)
+        squares, shapes = lowest_modes(
+            mass, count, factors.solve, self.size, 0.0,
+            lambda: linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, count - 1]),
+        )  # fmt: skip
+        rows = self._joined(np.broadcast_to(self.selection, (self.sectors, *self.selection.shape))).toarray()
+        extra, added = deviations.of("damping", self.sectors), None
+        if extra.any():
+            share = np.sqrt(2.0 * self.damping_ratio) * squares**-0.25
+            moved = shapes.T @ (self._summed(extra[:, None, None] * self.part_stiffness) @ shapes)
+            added = symmetric_part(share[:, None] * moved * share)
+        load = self._load(deviations.of("mass", self.sectors))
+        return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added)
+
+    def matrices(self, deviations: Deviations) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Return stiffness and mass of the whole ring, sparse."""
+        softer, lighter = (deviations.of(name, self.sectors)[:, None, None] for name in ("stiffness", "mass"))
+        stiffness = self._summed(self.stiffness + softer * self.part_stiffness)
+        if len(self.spring_stiffness):
+            stretch = self._joined(np.broadcast_to(self.spring_high, (self.sectors, *self.spring_high.shape)))
+            other = np.broadcast_to(self.spring_low, (self.sectors, *self.spring_low.shape))
+            stretch = sparse.csr_array(stretch - self._joined(other, 1))
+            scaled = stretch * np.tile(self.spring_stiffness, self.sectors)[:, None]
+            stiffness = sparse.csr_array(stiffness + stretch.T @ scaled)
+        return stiffness, self._summed(self.mass + lighter * self.part_mass)
+
+    def places(self) -> np.ndarray:
+        """Return the places (N, s) of the coordinates of every sector among those of the ring."""
+        own = len(self.mass) - self.faces
+        first = own * np.arange(self.sectors)[:, None]
+        face = np.arange(self.faces)
+        return np.hstack([first + face, np.roll(first, -1, axis=0) + face, first + np.arange(self.faces, own)])
+
+    def _summed(self, blocks: np.ndarray) -> sparse.csr_array:
+        """Return the matrix of the ring from those of the sectors (N, s, s)."""
+        places = self.places()
+        rows, columns = (np.broadcast_to(one, blocks.shape) for one in (places[:, :, None], places[:, None, :]))
+        return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), (self.size, self.size))
+
+    def _joined(self, rows: np.ndarray, ahead: int = 0) -> sparse.csr_array:
+        """Return functionals (N k, size) of the ring from those of its sectors (N, k, s), or of the sectors ahead."""
+        places = np.roll(self.places(), -ahead, axis=0)
+        numbers = np.arange(rows.shape[0] * rows.shape[1]).reshape(rows.shape[:2])
+        at, columns = (np.broadcast_to(one, rows.shape) for one in (numbers[:, :, None], places[:, None, :]))
+        return sparse.csr_array((rows.ravel(), (at.ravel(), columns.ravel())), (numbers.size, self.size))
+
+    def _load(self, lighter: np.ndarray) -> np.ndarray:
+        """Return the load (size, 3) of the ring by an acceleration of the base along x, y, z."""
+        own = self.base_load + lighter[:, None, None] * self.part_load
+        turned = np.einsum("nsa,nba->nsb", own, turns(self.axis, self.sectors))
+        found = np.zeros((self.size, 3))
+        np.add.at(found, self.places(), turned)
+        return found
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an HDF5 record that xarray opens."""
+        variables = {name: store.Variable(getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
+        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
+        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
+        attributes = {name: getattr(self, name) for name in ("sectors", "modes", "faces", "damping_ratio")}
+        store.save(path, _KIND, variables, attributes | {"provenance": dict(self.provenance)})
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> SectorRing:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, _KIND)
+        return cls(
+            **{name: values[name] for name in _ARRAYS},
+            sectors=int(attributes["sectors"]),
+            modes=int(attributes["modes"]),
+            faces=int(attributes["faces"]),
+            interface=tuple(values["interface"]),
+            damping_ratio=float(attributes["damping_ratio"]),
+            provenance=json.loads(attributes["provenance"]),
+        )
+
+
+def load_ring(path: str | os.PathLike[str]) -> RingModel | SectorRing:
+    """Read a reduced ring of either basis. Raises files.store.StoreError."""
+    return SectorRing.load(path) if store.kind_of(path) == _KIND else RingModel.load(path)

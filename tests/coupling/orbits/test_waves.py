@@ -1,0 +1,102 @@
+"""Travelling waves of a tuned ring: on one sector's account against whole periods and the long run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vanedamp as vd
+from vanedamp.coupling.orbits.newton import find_orbit as newton_orbit
+from vanedamp.coupling.orbits.orbits import find_orbit, orbits
+from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.files.toml_input import InputError
+from vanedamp.rom.in_memory import file_of
+
+
+def ring(sectors, order, periods=600, detuned=0.0, **orbit):
+    """Chains of three masses to the ground, coupled at their feet, with a body at each tip, under an engine order."""
+    n, w = 3 * sectors, (2 * np.pi * 500) ** 2 * 0.1
+    K = np.zeros((n, n))
+    for s in range(sectors):
+        foot = 3 * s
+        K[foot, foot] += w
+        for a, b, k in ((foot, foot + 1, 6 * w), (foot + 1, foot + 2, 6 * w), (foot, (foot + 3) % n, 0.02 * w)):
+            K[[a, b], [a, b]] += k
+            K[[a, b], [b, a]] -= k
+    K[0, 0] += detuned * w
+    labels = {f"tip@{s}": 3 * s + 2 for s in range(sectors)}
+    model = vd.ReducedModel.from_matrices(
+        0.1 * np.eye(n), K, labels, damping_ratio=0.002, directions={label: [1, 0, 0] for label in labels}
+    )
+    return vd.Scene.of({
+        "structure": {"model": "rom", "file": file_of(model)},
+        "excitation": {
+            "frequency": 1.002 * float(model.natural_frequencies_hz[0]), "at": "tip@0",
+            "load": [
+                {"at": f"tip@{s}", "force": 3.0, "phase": -360.0 * order * s / sectors} for s in range(sectors)
+            ],
+        },
+        "cavity": [{"name": f"c@{s}", "gap": 2e-4, "floor": f"tip@{s}"} for s in range(sectors)],
+        "damper": [{"cavity": f"c@{s}", "mass": 0.002, "friction": 0.2, "restitution": 0.5} for s in range(sectors)],
+        "time": {"periods": periods, "transient": periods // 2},
+        "orbit": {"wave": True} | orbit,
+    }, "scene")  # fmt: skip
+
+
+def test_the_wave_is_the_long_run_and_the_orbit_of_whole_periods():
+    scene = ring(5, 1, periods=1500)
+    response = vd.simulate(scene)
+    wave = find_orbit(scene, response.final)
+    whole = newton_orbit(period_map(scene), wave.map.state_of(response.final))
+    assert response.classification == "periodic-1" and wave.status == whole.status == "ok"
+    largest = np.abs(whole.state).max()
+    assert np.abs(wave.state - whole.state).max() < 1e-10 * largest
+    assert np.abs(wave.state - wave.map.state_of(response.final)).max() < 1e-8 * largest
+    assert wave.stable and whole.stable and wave.neutral == whole.neutral == 0
+    size = np.abs(whole.derivative).max()
+    assert np.abs(wave.derivative - whole.derivative).max() < 1e-8 * size
+    assert np.allclose(np.abs(wave.multipliers), np.abs(whole.multipliers), rtol=0.0, atol=1e-6)
+    assert wave.amplitude_mean == pytest.approx(whole.amplitude_mean, rel=1e-10)
+    assert wave.impacts_per_period == whole.impacts_per_period == pytest.approx(response.impacts_per_period)
+
+
+@pytest.mark.parametrize("sectors, order, times", [(5, 1, 5), (5, 2, 5), (6, 5, 6), (6, 2, 3), (6, 3, 2), (6, -1, 6)])
+def test_a_part_of_a_period_with_its_sectors_shifted_commutes_with_the_period(sectors, order, times):
+    scene = ring(sectors, order)
+    along = period_map(scene)
+    wave, symmetry = replace(along, wave=True, _earlier=[]), along.travelling
+    assert symmetry.times == times and symmetry.part == 1 / times
+    # any motion, not only a wave
+    state = along.linear_orbit() + 0.1 * along.scale * np.random.default_rng(0).normal(size=len(along.scale))
+    one, other = along(wave(state, False).state, False), wave(along(state, False).state, False)
+    assert np.abs(one.state - other.state).max() < 1e-9 * np.abs(state).max()
+    assert len(wave(state, False).crossings) <= len(along(state, False).crossings) / times + sectors
+    part, first = wave(state), np.eye(len(state))[0]
+    step = 1e-7 * np.abs(state).max()
+    moved = wave(state + step * first, False).state - wave(state - step * first, False).state
+    assert np.allclose(
+        moved / (2 * step), part.derivative[:, 0], rtol=1e-4, atol=1e-4 * np.abs(part.derivative[:, 0]).max()
+    )
+
+
+@pytest.mark.parametrize("changed", [
+    {"cavity.1.gap": 2.1e-4}, {"damper.2.mass": 0.0021}, {"damper.0.restitution": 0.6},
+    {"excitation.load.1.phase": -71.0}, {"cavity.1.name": "c1", "damper.1.cavity": "c1"},
+])  # fmt: skip
+def test_scenes_without_a_wave(changed):
+    scene = ring(5, 1).replace(changed)
+    with pytest.raises(InputError, match=r"orbit.wave: a wave travels over equal sectors"):
+        find_orbit(scene)
+
+
+def test_mistuned_rings_and_loads_in_phase_have_no_wave():
+    assert period_map(ring(5, 1, detuned=1e-6)).travelling is None
+    assert period_map(ring(5, 5)).travelling is None
+    assert period_map(ring(5, 1)).travelling is not None
+
+
+def test_a_wave_is_one_orbit_of_one_period():
+    with pytest.raises(InputError, match="wave: is found over one period"):
+        ring(5, 1, to=400.0)
+    branches = orbits(ring(5, 1, periods=1500))
+    assert len(branches.branches) == 1 and len(branches.branches[0].parameter) == 1
