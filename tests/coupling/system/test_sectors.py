@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools.rings import Chain
+from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import body_loads
@@ -190,6 +191,13 @@ def test_a_compact_scene_is_assembled_written_out(file):
     assert one.bodies == 12
     assert np.array_equal(one.J, other.J)
     assert np.array_equal(one.load, other.load)
+
+
+def test_elements_that_may_name_bodies_are_rejected(file):
+    made = replace(scene(file), added={"tether": (Stop("left", 1e-4, at="tip@0"),)})
+    with pytest.raises(InputError, match="tether: may name bodies by number"):
+        unrolled(made)
+    assert unrolled(replace(made, cavity=(), damper=())).added
 
 
 def test_it_comes_back_from_its_file(file, tmp_path):
