@@ -76,7 +76,7 @@ scene = vd.Scene(
 
 def top(result):
     """The largest amplitude of any blade at any frequency, in 0.2 mm."""
-    return float(np.nanmax(result.sectors["amplitude_mean"])) / 2e-4
+    return float(np.nanmax(result.sectors["sector_amplitude_mean"])) / 2e-4
 
 
 # %%
@@ -87,7 +87,7 @@ tops = {}
 for name, deviations in (("tuned", None), ("mistuned", mistuned)):
     disk = scene if deviations is None else scene.replace({"structure.mistuning": deviations})
     sweeps = {"all": vd.sweep(disk)}
-    alone = sweeps["all"].sectors["amplitude_undamped"]
+    alone = sweeps["all"].sectors["sector_amplitude_undamped"]
     hot = int(np.argmax(alone.max(axis=0)))
     sweeps |= {f"{each}": vd.sweep(disk.replace({"cavity.c.sectors": each})) for each in ("alternate", [hot])}
     tops[name] = {"none": float(alone.max()) / 2e-4} | {
