@@ -71,8 +71,8 @@ def check_sides(
     next_one, other = (float(np.linalg.norm(second - place)) for place in (turn @ first, turn.T @ first))
     if next_one > (1.0 + _ANGLE) * other:
         raise CyclicError(
-            "ring.spring.low: low and high are swapped: a positive turn about the axis brings low of the next sector to "
-            f"high, here {high!r} is nearer to {low!r} of the one before"
+            "ring.spring.low: low and high are swapped: a positive turn about the axis leads to the next sector, but "
+            f"{high!r} is nearer to {low!r} of the one before"
         )
 
 
