@@ -5,16 +5,21 @@ from __future__ import annotations
 import weakref
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, TypeAlias
 
-from vanedamp.rom.reduced import ReducedModel
-from vanedamp.rom.ring.ring_model import RingModel
+if TYPE_CHECKING:
+    from vanedamp.rom.reduced import ReducedModel
+    from vanedamp.rom.ring.ring_model import RingModel
+    from vanedamp.rom.ring.sector_ring import SectorRing
+
+    Model: TypeAlias = ReducedModel | RingModel | SectorRing
 
 #: by model, which never changes; the files stay until the program ends
-_FILES: weakref.WeakKeyDictionary[ReducedModel | RingModel, str] = weakref.WeakKeyDictionary()
+_FILES: weakref.WeakKeyDictionary[Model, str] = weakref.WeakKeyDictionary()
 _FOLDERS: list[TemporaryDirectory[str]] = []
 
 
-def file_of(model: ReducedModel | RingModel) -> str:
+def file_of(model: Model) -> str:
     """Return the file of a model in memory, written on the first call to a temporary folder of this process."""
     if model not in _FILES:
         if not _FOLDERS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
@@ -65,16 +64,16 @@ class Rigid:
 
 
 #: models of a scene by the types of those in memory
-_KINDS = {"ReducedModel": "rom", "RingModel": "ring"}
+_KINDS = {"ReducedModel": "rom", "RingModel": "ring", "SectorRing": "ring"}
 
 
 def _file(model: Any) -> Any:
     """Return the file of a reduced model, or of a reduced ring, in memory; anything else as it is."""
-    if isinstance(model, str | Mapping):
+    if type(model).__name__ not in _KINDS:
         return model
-    from vanedamp.rom.in_memory import ReducedModel, RingModel, file_of
+    from vanedamp.rom.in_memory import file_of
 
-    return file_of(model) if isinstance(model, ReducedModel | RingModel) else model
+    return file_of(model)
 
 
 def _structure(structure: Any) -> Any:

@@ -25,8 +25,6 @@ from vanedamp.rom.ring.sector_ring import SectorRing
 # half-bandwidths around every resonance at which a response is sampled, and halvings of the bracket of a peak
 _AROUND = np.array([-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
 _ROUNDS = 16
-# modes of a ring by sectors, over those of its model
-_MORE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +151,8 @@ def natural_of(
     """
     deviations = deviations or Deviations()
     if isinstance(ring, SectorRing):
-        # modes above those of the model, too, which respond to the same forces
-        return OfModel(ring.model(deviations, speed, min(_MORE * ring.modes, ring.size)))
+        # a family above those of the model, too, which responds to the same forces
+        return OfModel(ring.model(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
     mass, stiffness = ring.matrices(deviations, speed)
     squares, shapes = linalg.eigh(stiffness, mass)
     if squares[0] <= 0.0:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.cyclic_faces import rotation
 from vanedamp.rom.checks import unit
-from vanedamp.rom.reduced import NORMAL, ROTATION
+from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.ring.deviations import RingError
 
 
@@ -24,6 +25,7 @@ class Ring:
     normals: np.ndarray
     positions: np.ndarray
     arms: np.ndarray
+    damping_ratio: float
     provenance: Mapping[str, Any]
 
     def _settle(self) -> None:
@@ -38,6 +40,33 @@ class Ring:
     def labels(self) -> tuple[str, ...]:
         """The N k labels, sector by sector."""
         return tuple(sector_label(label, sector) for sector in range(self.sectors) for label in self.interface)
+
+    def natural_model(
+        self, squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, static: np.ndarray, load: np.ndarray,
+        added: np.ndarray | None,
+    ) -> ReducedModel:  # fmt: skip
+        """Return the whole ring in natural modes, with residual flexibility.
+
+        squares (m,), shapes (n, m) of the modes in coordinates of the ring; rows (N k, n) of the interface and static
+        (n, N k), the response to its forces; load (n, 3) of the base; added (m, m) damping beside that of the ratio.
+        Raises RingError for a ring that can move freely, or is unstable.
+        """
+        if squares[0] <= 0.0:
+            raise RingError("the ring can move freely, or is unstable at that speed: its modes do not hold it")
+        selection = rows @ shapes
+        damping = np.diag(2.0 * self.damping_ratio * np.sqrt(squares))
+        if added is not None:
+            damping = damping + added
+        return ReducedModel(
+            mass=np.eye(len(squares)), stiffness=np.diag(squares), damping=damping, selection=selection,
+            damping_ratio=self.damping_ratio if added is None else None, free_modes=len(squares),
+            residual_flexibility=symmetric_part(rows @ static - (selection / squares) @ selection.T),
+            base_load=shapes.T @ load, **self.placed(), **self._turning(),
+        )  # fmt: skip
+
+    def _turning(self) -> dict[str, Any]:
+        """Return the axis of rotation as fields of a ReducedModel; none of a ring that does not rotate."""
+        return {}
 
     def placed(self) -> dict[str, Any]:
         """Return labels, places and provenance of the whole ring, as fields of a ReducedModel."""

@@ -10,16 +10,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom.checks import shaped, symmetric
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.placement import Ring, turns
 from vanedamp.rom.ring.waves import Waves
-from vanedamp.rom.truncation import massless
 
 _KIND = "ring-model"
 _ARRAYS = {
@@ -126,32 +127,42 @@ class RingModel(Ring, Displayed):
         damping ratio holds for every mode; deviations of damping add the part's share to it. Raises RingError or
         ReducedModelError.
         """
-        whole = self.whole(deviations)
         if speed is None and self.centrifugal_stiffness is not None:
-            return whole
-        at_speed = whole.at_speed(speed or 0.0)
-        tuned = deviations is None or not deviations.any()
-        return self._of_waves(at_speed) if tuned and not speed else massless(at_speed, self.modes)
+            return self.whole(deviations)
+        deviations = deviations or Deviations()
+        rows = self.rows.reshape(-1, self.size)
+        if deviations.any() or speed:
+            mass, stiffness = self.matrices(deviations, speed or 0.0)
+            squares, shapes = linalg.eigh(stiffness, mass, subset_by_index=[0, self.modes - 1])
+            static = linalg.solve(stiffness, rows.T, assume_a="sym")
+        else:
+            squares, shapes = self.squares[: self.modes], np.eye(self.size)[:, : self.modes]
+            static = (rows / self.squares).T
+        added = self.added_damping(deviations)
+        added = None if added is None else symmetric_part(shapes.T @ added @ shapes)
+        return self.natural_model(squares, shapes, rows, static, self._base_load(deviations), added)
 
     def whole(self, deviations: Deviations | None = None) -> ReducedModel:
         """Return the reduced model in all n waves, without residual flexibility. Errors: as `model`."""
         deviations = deviations or Deviations()
         mass, stiffness = self.matrices(deviations)
-        damping = modal_damping(mass, stiffness, self.damping_ratio)
-        added = self.added_damping(deviations)
-        lighter = deviations.of("mass", self.sectors)
+        damping, added = modal_damping(mass, stiffness, self.damping_ratio), self.added_damping(deviations)
+        if added is not None:
+            damping = damping + added
         return ReducedModel(
-            mass=mass, stiffness=stiffness, damping=damping if added is None else damping + added, **self.placed(),
-            selection=self.rows.reshape(-1, len(self.squares)),
-            base_load=self._load(1.0, self.base_load) + self._load(lighter, self.part_load),
-            damping_ratio=self.damping_ratio if added is None else None, **self._rotation,
+            mass=mass, stiffness=stiffness, damping=damping, selection=self.rows.reshape(-1, self.size),
+            base_load=self._base_load(deviations), damping_ratio=self.damping_ratio if added is None else None,
+            centrifugal_stiffness=self.centrifugal_stiffness, greatest_speed=self.greatest_speed, **self.placed(),
+            **self._turning(),
         )  # fmt: skip
 
     def matrices(self, deviations: Deviations, speed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return mass and stiffness (n, n) of the whole ring with deviations, at a speed, rad/s."""
+        """Return mass and stiffness (n, n) of the whole ring with deviations, at a speed, rad/s. Raises RingError."""
         mass = np.eye(len(self.squares)) + self.around("mass", deviations.of("mass", self.sectors))
         stiffness = np.diag(self.squares) + self.around("stiffness", deviations.of("stiffness", self.sectors))
-        if speed and self.centrifugal_stiffness is not None:
+        if speed:
+            if self.centrifugal_stiffness is None or not 0.0 < speed <= self.greatest_speed * (1.0 + 1e-12):
+                raise RingError(f"speed: the ring holds up to {self.greatest_speed:.6g} rad/s, not at {speed:.6g}")
             stiffness = stiffness + speed**2 * self.centrifugal_stiffness
         return mass, stiffness
 
@@ -182,28 +193,17 @@ class RingModel(Ring, Displayed):
     def _travelling(self) -> dict[str, np.ndarray]:
         return {name: self.waves.travelling(getattr(self, name)) for name in ("stiffness", "mass")}
 
-    def _load(self, weights: np.ndarray | float, load: np.ndarray) -> np.ndarray:
-        """Return the load (n, 3) of the whole ring by an acceleration of the base, from a sector's by weights."""
-        weighted = np.broadcast_to(weights, self.sectors)[:, None, None] * self.waves.in_sectors(load.T)
-        return np.asarray(np.einsum("sai,sba->ib", weighted, turns(self.axis, self.sectors)))
+    def _base_load(self, deviations: Deviations) -> np.ndarray:
+        """Return the load (n, 3) of the whole ring by an acceleration of the base along x, y, z."""
+        lighter = deviations.of("mass", self.sectors)[:, None, None]
+        own = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
+        return np.asarray(np.einsum("sai,sba->ib", own, turns(self.axis, self.sectors)))
 
-    @property
-    def _rotation(self) -> dict[str, Any]:
+    def _turning(self) -> dict[str, Any]:
+        """Return the axis of rotation as fields of a ReducedModel; none of a ring that does not rotate."""
         if self.centrifugal_stiffness is None:
             return {}
-        return {
-            "centrifugal_stiffness": self.centrifugal_stiffness, "rotation_axis": self.axis,
-            "rotation_point": self.point, "greatest_speed": self.greatest_speed,
-        }  # fmt: skip
-
-    def _of_waves(self, whole: ReducedModel) -> ReducedModel:
-        """Return the tuned ring in its natural modes as they stand, pair by pair, with residual flexibility."""
-        kept, rest = np.arange(self.modes), slice(self.modes, None)
-        felt = whole.selection[:, rest]
-        return whole.projected(
-            np.eye(whole.size)[:, kept], free_modes=self.modes, centrifugal_stiffness=None, greatest_speed=0.0,
-            residual_flexibility=(felt / self.squares[rest]) @ felt.T,
-        )  # fmt: skip
+        return {"rotation_axis": self.axis, "rotation_point": self.point}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an HDF5 record that xarray opens."""

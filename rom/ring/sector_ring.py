@@ -126,22 +126,14 @@ class SectorRing(Ring, Displayed):
             mass, count, factors.solve, self.size, 0.0,
             lambda: linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, count - 1]),
         )  # fmt: skip
-        if squares[0] <= 0.0:
-            raise RingError("the ring can move freely: it has no flexibility to add to its modes")
-        rows = self._joined(np.broadcast_to(self.selection, (self.sectors, *self.selection.shape)))
-        selection, static = rows @ shapes, factors.solve(rows.toarray().T)
-        damping = np.diag(2.0 * self.damping_ratio * np.sqrt(squares))
-        extra = deviations.of("damping", self.sectors)
+        rows = self._joined(np.broadcast_to(self.selection, (self.sectors, *self.selection.shape))).toarray()
+        extra, added = deviations.of("damping", self.sectors), None
         if extra.any():
             share = np.sqrt(2.0 * self.damping_ratio) * squares**-0.25
-            added = shapes.T @ (self._summed(extra[:, None, None] * self.part_stiffness) @ shapes)
-            damping = damping + symmetric_part(share[:, None] * added * share)
-        return ReducedModel(
-            mass=np.eye(count), stiffness=np.diag(squares), damping=damping, selection=selection,
-            damping_ratio=None if extra.any() else self.damping_ratio, free_modes=count,
-            residual_flexibility=symmetric_part(rows @ static - (selection / squares) @ selection.T),
-            base_load=shapes.T @ self._load(deviations.of("mass", self.sectors)), **self.placed(),
-        )  # fmt: skip
+            moved = shapes.T @ (self._summed(extra[:, None, None] * self.part_stiffness) @ shapes)
+            added = symmetric_part(share[:, None] * moved * share)
+        load = self._load(deviations.of("mass", self.sectors))
+        return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added)
 
     def matrices(self, deviations: Deviations) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Return stiffness and mass of the whole ring, sparse."""

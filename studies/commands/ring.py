@@ -97,23 +97,28 @@ def _summary(found: Interference) -> Iterator[str]:
     """Yield frequencies by nodal diameter, the engine orders of each, and the meetings."""
     rows, modes = found.by_diameter(), found.modes
     families = min(len(rows[0][1]), _MOST_FAMILIES)
+    wide = max(8, *(len(found.label(diameter)) for diameter, _ in rows))
     at = "" if found.speed is None else f" at {found.speed * RPM:.6g} rpm"
     yield f"natural frequencies in Hz of {modes.sectors} sectors by nodal diameter{at}"
-    yield "diameter  engine orders     " + "".join(f"  family {family + 1:2}" for family in range(families))
+    yield f"{'diameter':>{wide}}  engine orders     " + "".join(
+        f"  family {family + 1:2}" for family in range(families)
+    )
     for diameter, row in rows:
         orders = found.exciting(diameter)
         listed = ", ".join(map(str, orders[:_MOST_ORDERS])) + (" ..." if len(orders) > _MOST_ORDERS else "")
-        yield f"{found.label(diameter):>8}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
+        yield f"{found.label(diameter):>{wide}}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
     if found.operating is None and not found.speeds.size:
         yield "no speed is known at which engine orders could meet them: [rotation], [campbell] or --rpm gives it"
         return
     margin = "" if found.operating is None else "  margin to operation"
-    yield f"meetings with engine orders\n  diameter  family  order         rpm       rad/s          Hz{margin}"
+    yield "meetings with engine orders"
+    yield f"{'diameter':>{wide + 2}}  family  order         rpm       rad/s          Hz{margin}"
     for each in found.meetings[:_MOST_MEETINGS]:
         told = "" if found.operating is None else f"  {format_margin(each.margin(found.operating)):>19}"
+        diameter, family = int(modes.diameters[each.mode]), modes.families[each.mode] + 1
         yield (
-            f"{found.label(int(modes.diameters[each.mode])):>10}{modes.families[each.mode] + 1:8}{each.order:7g}"
-            f"{each.rpm:12.3f}{each.speed:12.4f}{each.frequency_hz:12.4f}{told}"
+            f"{found.label(diameter):>{wide + 2}}{family:8}{each.order:7g}{each.rpm:12.3f}{each.speed:12.4f}"
+            f"{each.frequency_hz:12.4f}{told}"
         )
     more = len(found.meetings) - _MOST_MEETINGS
     if more > 0:

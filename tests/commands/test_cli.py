@@ -318,7 +318,7 @@ def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, fold
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
         (
             ["report", ".", "-o", "report.html"],
-            "no results that a report shows (modes, calibration, ",
+            "no results that a report shows (modes, ring-modes, ",
         ),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),

@@ -51,7 +51,7 @@ def test_errors_are_those_of_noise():
     stiffness, mass = chain.matrices(Deviations(GIVEN))
     squares, shapes = linalg.eigh(stiffness, mass)
     random, misses = np.random.default_rng(0), []
-    for _ in range(60):
+    for _ in range(30):
         noisy = shapes.T * (1 + 1e-3 * random.standard_normal(shapes.shape))
         hz = np.sqrt(squares) / (2 * np.pi) * (1 + 1e-4 * random.standard_normal(SIZE))
         found = deviations_of_modes(chain.ring(), hz, noisy, "tip")

@@ -106,7 +106,11 @@ def test_speed():
     whole = ring.model(deviations)
     np.testing.assert_allclose(whole.at_speed(speed).squares[:6], exact, rtol=1e-7)
     np.testing.assert_allclose(ring.model(deviations, speed).squares[:6], exact, rtol=1e-7)
-    assert ring.model(deviations, speed).residual_flexibility is not None
+    at_speed = ring.model(deviations, speed)
+    assert at_speed.residual_flexibility is not None
+    np.testing.assert_array_equal(at_speed.rotation_axis, [0.0, 0.0, 1.0])
+    with pytest.raises(RingError, match="up to 800 rad/s, not at 900"):
+        ring.model(speed=900.0)
     peak = forced(ring, 1, "tip", deviations=deviations, speed=speed).peaks(300.0, 700.0)
     standing = forced(ring, 1, "tip", deviations=deviations).peaks(300.0, 700.0)
     assert peak[1].max() > 1.02 * standing[1].max()

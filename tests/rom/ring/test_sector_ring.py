@@ -4,15 +4,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic.dataclasses import dataclass
 from scipy import linalg, sparse
 
 from tests.rom.ring.test_ring_reduction import TIP, drawn, part, rows
 from tests.tools.rings import LumpedDisk
+from vanedamp.coupling.scene.structures import Structure
+from vanedamp.files.toml_input import STRICT, validate
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.forced import forced_response
 from vanedamp.rom.ring.reduction import reduce_ring
 from vanedamp.rom.ring.sector_ring import SectorRing, load_ring
 from vanedamp.rom.ring.study import amplification
+
+
+@dataclass(frozen=True, config=STRICT)
+class Holder:
+    """A file with a structure."""
+
+    structure: Structure
+
 
 DISKS = {"faces": LumpedDisk(7), "springs": LumpedDisk(7, springs=2e6)}
 
@@ -83,3 +94,8 @@ def test_rotation_is_rejected():
         reduce_ring(disk.sector(), TIP, 2, centrifugal=added, greatest_speed=100.0, basis="sectors")
     with pytest.raises(RingError, match="at standstill"):
         ring_of(disk).model(speed=100.0)
+
+
+def test_a_ring_in_memory_is_a_structure_of_scenes():
+    found = validate(Holder, {"structure": ring_of(DISKS["faces"])}, "scene").structure
+    assert found.model == "ring" and isinstance(load_ring(found.file), SectorRing)
