@@ -207,7 +207,7 @@ def mistuning_study(
     points   of the frequencies of the first draw's responses
     report   called with the number of draws done, and of all
 
-    A ring that rotates turns past a load at rest, so that the forces come earlier from sector to sector, later otherwise.
+    A ring that rotates turns past a load at rest: forces come earlier from sector to sector, in other rings later.
     Raises RingError, and what the table raises.
     """
     label = ring.interface[0] if label is None else label
