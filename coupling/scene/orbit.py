@@ -41,8 +41,7 @@ class Orbit:
     start: Literal["run", "linear"] = "run"
     """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
     wave: bool = False
-    """find a travelling wave of a tuned ring, in which each sector does the same one phase later, in a part of the
-    time; of a single orbit"""
+    """find the travelling wave of a tuned ring, in which each sector does the same one phase later: a single orbit"""
     parameter: str = "excitation.frequency"
     """dotted path of the number that changes along the branch"""
     from_: Annotated[Real | None, Field(alias="from")] = None

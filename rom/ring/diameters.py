@@ -19,6 +19,7 @@ from scipy import linalg, sparse
 from vanedamp.modal.cyclic import CyclicSector, Diameter
 from vanedamp.modal.cyclic_modes import RingModes, ring_modes
 from vanedamp.rom.bases.projection import Factorize
+from vanedamp.rom.ring.deviations import RingError
 
 # relative change of a squared frequency, per squared deviation, that static responses to deviations may leave out
 _LEFT_OUT = 1e-5
@@ -75,6 +76,8 @@ def ring_waves(
         stiffness = sector.matrices.stiffness + greatest_speed**2 * centrifugal
         sectors.append(replace(sector, matrices=replace(sector.matrices, stiffness=stiffness)))
     found = [ring_modes(one, families, max_frequency) for one in sectors]
+    if found[0].frequencies_hz.min() == 0.0:
+        raise RingError("support: the ring can move freely; hold it, since its static responses are part of the model")
     forces = np.vstack([_forces(modes, part) for modes in found])
     waves, errors, total, top = [], [], len(sector.diameters), _top(found[0])
     for done, number in enumerate(sector.diameters):

@@ -111,27 +111,6 @@ COMMANDS = (
         reads=Function("support.cases:read_ring_case"),
     ),
     Command(
-        "mistuning", "amplification of a mistuned ring under engine orders, over draws of its deviations", 28,
-        (
-            input_file("CASE.toml"), output_file("MISTUNING.h5"), json_file,
-            argument(
-                "--orders", type=count, nargs="+", metavar="R",
-                help="engine orders (default: 1 to half the number of sectors)",
-            ),
-            argument(
-                "--seeds", type=family_count, default=100, metavar="N",
-                help="draws, by the seeds from that of [mistuning] on (default: %(default)s)",
-            ),
-            argument("--at", metavar="LABEL", help="interface label of force and response (default: the first)"),
-            argument(
-                "--family", type=family_count, default=1, metavar="N",
-                help="family of modes around which peaks count (default: the first)",
-            ),
-            argument("--ring", metavar="RING.h5", help="reduced ring of the case (default: the case is reduced)"),
-        ),
-        writes={"output": _RECORD}, reads=Function("support.cases:read_ring_case"),
-    ),
-    Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,
         (
             input_file("CASE.toml"), output_file("CALIBRATION.h5"),

@@ -305,7 +305,7 @@ _KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] =
     "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
     "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
     "ring-sectors": ("the reduced model of a ring, by sectors", "reduce", _ring_model),
-    "mistuning": ("amplification of a mistuned ring", "mistuning", _mistuning),
+    "mistuning": ("amplification of a mistuned ring", "ring", _mistuning),
     "response": ("the response of a scene", "run", _response),
     "sweep": ("responses of a scene over a grid", "sweep", _sweep),
     "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),

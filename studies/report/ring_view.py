@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
+from vanedamp.studies.report.charts import Table
 from vanedamp.studies.report.mode_chart import (
     MOST_TRIANGLES,
     deformed_mesh,
@@ -94,6 +95,14 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
         "sector": _packed(ring.sector, "<u2"), "node": _packed(place, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,
     })  # fmt: skip
+
+
+def sector_table(modes: RingModes, ring: WholeRing, mode: int) -> Table:
+    """Return x, y, z (m) of the surface's nodes in sector 0, and real and imaginary part of a mode's shape there."""
+    own = ring.sector == 0
+    shape = modes.shapes[mode].reshape(-1, 3)[ring.node[own]]
+    header = [*"xyz", *(f"d{axis} {part}" for part in ("real", "imaginary") for axis in "xyz")]
+    return header, np.column_stack([ring.points[own], shape.real, shape.imag]).tolist()
 
 
 def _packed(values: np.ndarray, dtype: str) -> str:

@@ -23,6 +23,7 @@ FILES = {
     "work-precision": {f"work_precision.{ending}" for ending in ("json", "csv", "png")},
     "stability": {f"stability.{ending}" for ending in ("json", "csv", "png")},
     "sensitivity": {f"bench_sensitivity.{ending}" for ending in ("json", "csv")},
+    "sectors": {f"bench_sectors.{ending}" for ending in ("json", "csv")},
     "identification": {f"bench_identification.{ending}" for ending in ("json", "csv")},
     "doubling": {f"bench_doubling.{ending}" for ending in ("json", "csv", "png")},
     "ladder": {

@@ -208,6 +208,7 @@ def test_info(folder, found, capsys):
         (DISK.partition("[ring]")[0], [], "ring: missing; give the number of sectors"),
         (DISK, ["--mistuning", "m.h5"], "--mistuning: the case has no table [mistuning]"),
         (DISK + MISTUNED.partition("[mistuning]")[1] + "\nmass = {std = 0.1}", [], "interface: missing"),
+        (DISK.replace('clamped = ["bore"]', "") + MISTUNED, [], "support: the ring can move freely"),
         (DISK, ["--rpm", "2000", "1000"], "--rpm: expected the lowest speed, then the highest"),
         (DISK.replace('high = "high"', 'high = "hgih"'), [], "ring.high: no facet group 'hgih'"),
         (

@@ -29,6 +29,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
+from vanedamp.studies.identification.deviations import load_table
 from vanedamp.studies.identification.tables import IdentificationFile
 from vanedamp.studies.life.study import LifeStudy
 from vanedamp.studies.optimisation.study import Study
@@ -97,7 +98,7 @@ OSCILLATOR = changed(SCENE, ("stiffness = 1e4", "stiffness = 2.26e8"), ("frequen
 
 def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
-    if {"matrices", "numbers", "pair"} & tables.keys():
+    if {"matrices", "numbers", "pair", "deviations"} & tables.keys():
         return tables
     scene = {
         "structure",
@@ -150,6 +151,8 @@ def test_files_are_read(example, tmp_path):
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "numbers" in tables:
         assert len(validate(IdentificationFile, tables, "study").numbers) == 2
+    elif "deviations" in tables:
+        assert load_table(path).at == "tip"
     elif "pair" in tables:
         assert validate(ContactFile, tables, "pair").pair.contact is not None
     elif "contact" in tables:

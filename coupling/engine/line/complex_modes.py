@@ -174,15 +174,29 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return `complex_modes` of real ones that damping hardly couples, by a fixed point; None where it is not found.
-
-    Row k of the equation of mode k gives its eigenvalue, the others its small parts in other real modes.
-    """
-    k = len(w)
-    own, apart, diagonal = np.diag(damping), damping - np.diag(np.diag(damping)), np.arange(k)
-    if np.any(own >= w):
+    """Return `complex_modes` of real ones that damping hardly couples; None where they are not found."""
+    own = np.diag(damping)
+    with np.errstate(all="ignore"):  # numbers of a fixed point that is none
+        found = None if np.any(own >= w) else _fixed_point(w, own, damping - np.diag(own))
+    if found is None:
         return None
-    shapes = older = np.eye(k, dtype=complex)  # columns; each has 1 in its own real mode
+    values, shapes = found
+    left, norm = _left(values, shapes.T, w)
+    left /= norm[:, None]
+    right = np.vstack([shapes, shapes * values])
+    # modes of nearly equal frequencies are known to round-off over their distance
+    left += left - left @ right @ left
+    return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
+
+
+def _fixed_point(w: np.ndarray, own: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return upper eigenvalues (k,) and displacements (k, k) of modes, columns with 1 in their own real mode.
+
+    own: (k,) damping of the real modes; apart: (k, k) that between them. Row k of the equation of mode k gives its
+    eigenvalue, the others its small parts in other real modes. None where these do not settle, or are not small.
+    """
+    diagonal = np.arange(len(w))
+    shapes = older = np.eye(len(w), dtype=complex)
     for _ in range(STEPS):
         coupling = (apart @ shapes.view(float)).view(complex)
         half = (own + coupling[diagonal, diagonal]) / 2
@@ -196,17 +210,8 @@ def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np
         older, shapes = shapes, -values * coupling / stiffness
         shapes[diagonal, diagonal] = 1.0
         if float(np.abs(shapes - older).max()) <= SETTLED:
-            break
-    else:
-        return None
-    if np.abs(shapes).sum(axis=0).max() > 1.0 + LIGHT:
-        return None
-    left, norm = _left(values, shapes.T, w)
-    left /= norm[:, None]
-    right = np.vstack([shapes, shapes * values])
-    # modes of nearly equal frequencies are known to round-off over their distance
-    left += left - left @ right @ left
-    return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
+            return (values, shapes) if np.abs(shapes).sum(axis=0).max() <= 1.0 + LIGHT else None
+    return None
 
 
 def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -73,7 +73,7 @@ class Flows(NamedTuple):
     tied: Annotated[np.ndarray, "s", bool]  # whether there are any
     body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
-    impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse (no rigid row closed)
+    impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
 
     # sizes of modes, and steps of the search for the peak
     speed: Annotated[np.ndarray, "s m"]  # largest speed of a mode over all rows and the response

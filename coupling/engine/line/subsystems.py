@@ -70,8 +70,7 @@ class Subsystems(NamedTuple):
     push: Annotated[np.ndarray, "k m N", complex]  # rate of an amplitude by loads on (p, x)
     motion: Annotated[np.ndarray, "k r m", complex]  # displacement of each row
     force: Annotated[np.ndarray, "k r m", complex]  # force of each closed row
-    # change of the amplitudes by a unit impulse on a row, where no rigid one is closed
-    impulse_response: Annotated[np.ndarray, "k r m", complex]
+    impulse_response: Annotated[np.ndarray, "k r m", complex]  # change of the amplitudes by a unit impulse on a row
     response: Annotated[np.ndarray, "k m", complex]  # displacement of the response
     momentum: Annotated[np.ndarray, "k m", complex]  # momentum of all bodies
     speed: Annotated[np.ndarray, "k m"]  # largest speed of a mode over all rows and the response
@@ -184,9 +183,8 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
         "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
         "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
         "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(kept) > 0, "push": push,
+        "impulse_response": _times(system.J[:, :n], project[:, 1, :n].T),
     }  # fmt: skip
-    if not len(rigid):
-        values["impulse_response"] = _times(system.J[:, :n], project[:, 1, :n].T)
     for name, value in values.items():
         getattr(stack, name)[(k, *map(slice, np.shape(value)))] = value
 

@@ -20,7 +20,7 @@ from vanedamp.studies.report.ring_charts import (
     ring_campbell_figure,
     ring_campbell_table,
 )
-from vanedamp.studies.report.ring_view import ring_surface, ring_view
+from vanedamp.studies.report.ring_view import ring_surface, ring_view, sector_table
 from vanedamp.studies.ring_mesh import WholeRing
 
 ORDER = 15
@@ -47,9 +47,7 @@ def _ring(file: str, record: tuple[RingModes, Interference, WholeRing | None], p
     if surface is not None:
         # begins with a wave that travels
         mode = int(np.flatnonzero(found.diameters == np.unique(found.diameters)[:2][-1])[0])
-        moved = modes.whole(mode)[surface.sector, surface.node]
-        rows = np.column_stack([surface.points, moved]).tolist()
-        view = page.chart("ring", ring_view(modes, surface, mode), ("x", "y", "z", "dx", "dy", "dz"), rows, [file])
+        view = page.chart("ring", ring_view(modes, surface, mode), *sector_table(modes, surface, mode), [file])
     margins = [found.operating and format_margin(each.margin(found.operating)) for each in found.meetings]
     return {
         "file": file, "diagram": diagram, "campbell": campbell, "view": view, "record": found, "margins": margins,

@@ -87,7 +87,10 @@ def test_a_wave_lags_from_sector_to_sector(file):
 
 def test_a_whole_engine_order_is_a_wave_and_no_other_is(file):
     turning = {"rotation": {"speed": 500.0}, "excitation": {"engine_order": 4.0, "force": 1.0, "at": "tip"}}
-    assert len(unrolled(scene(file, **turning)).excitation.load) == 6
+    load = unrolled(scene(file, **turning)).excitation.load
+    assert len(load) == 6
+    # the load at rest cos(4 theta) meets sector j at theta = speed t + 2 pi j/6: earlier by 4 j/6 of a period
+    assert load[1].amplitude == pytest.approx(np.exp(2j * np.pi * 4 / 6))
     turning["excitation"]["engine_order"] = 2.5
     assert unrolled(scene(file, **turning)).excitation.load == ()
     assert unrolled(scene(file, **turning)).excitation.at == "tip@0"

@@ -14,7 +14,7 @@ from tests.tools.rings import whole_ring
 from vanedamp.files.store import kind_of
 from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
-from vanedamp.rom.ring.study import MistuningStudy, amplification
+from vanedamp.rom.ring.study import amplification
 from vanedamp.studies.case.ring_stages import ring_reduction, ring_sector
 from vanedamp.studies.case.stages import assemble, interface
 from vanedamp.studies.case.tables import Case
@@ -109,26 +109,6 @@ def test_command(tmp_path: Path, capsys):
     assert "basis: expected one of modes, sectors" in capsys.readouterr().err
     assert main(["reduce", str(case), "-o", str(output), "--basis", "sectors", "--json", "-"]) == 0
     assert kind_of(output) == "ring-sectors"
-
-
-def test_mistuning_command(tmp_path: Path, capsys):
-    case, output = tmp_path / "case.toml", tmp_path / "mistuning.h5"
-    case.write_text(CASE)
-    ring = tmp_path / "ring.h5"
-    assert main(["reduce", str(case), "-o", str(ring)]) == 0
-    words = ["mistuning", str(case), "--orders", "1", "--seeds", "12", "-o", str(output)]
-    assert main([*words, "--ring", str(ring), "--json", "-"]) == 0
-    result = json.loads(capsys.readouterr().out.partition("nodal diameter 3")[2].partition("\n")[2])
-    study = MistuningStudy.load(output)
-    assert study.to_json()["orders"] == result["orders"] and study.seeds.tolist() == list(range(12))
-    deviations = Case.load(case).mistuning.deviations(6)
-    np.testing.assert_array_equal(study.stiffness, deviations.stiffness)
-    one = amplification(RingModel.load(ring), deviations, 1, "tip", study.band_hz)
-    assert study.amplification[0, 0] == pytest.approx(one.factor, rel=1e-9)
-    assert main(["info", str(output)]) == 0
-    assert "amplification up to" in capsys.readouterr().out
-    assert main([*words[:2], "--ring", str(ring), "--at", "top"]) == 2
-    assert "no interface coordinate 'top'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

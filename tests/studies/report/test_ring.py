@@ -12,7 +12,7 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.report import ring_view as module
 from vanedamp.studies.report.ring_charts import interference_figure, ring_campbell_figure
 from vanedamp.studies.report.ring_picture import interference_picture
-from vanedamp.studies.report.ring_view import ring_surface, ring_view
+from vanedamp.studies.report.ring_view import ring_surface, ring_view, sector_table
 from vanedamp.studies.ring_mesh import whole_ring
 
 SECTORS = 8
@@ -159,6 +159,11 @@ def test_view_has_what_its_script_needs(modes, surface):
         expected = modes.whole(mode)[surface.sector, surface.node]
         largest = np.abs(modes.shapes[mode]).max()  # along z only
         np.testing.assert_allclose(np.einsum("nij,nj->ni", turns[sector], local), expected / largest, atol=1e-4)
+    header, rows = sector_table(modes, surface, 3)
+    rows = np.array(rows)
+    angle, radius = np.arctan2(rows[:, 1], rows[:, 0]), np.hypot(rows[:, 0], rows[:, 1])
+    assert header[5] == "dz real" and header[8] == "dz imaginary" and len(rows) == np.count_nonzero(surface.sector == 0)
+    np.testing.assert_allclose(rows[:, 5] + 1j * rows[:, 8], radius * np.exp(3j * angle), atol=1e-12)
     moved = 1e3 * surface.points + meta["scale"] * modes.whole(1)[surface.sector, surface.node] / 0.2
     np.testing.assert_allclose(np.column_stack([drawn.x, drawn.y, drawn.z]), moved, atol=1e-3)
 

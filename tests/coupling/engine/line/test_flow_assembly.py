@@ -251,7 +251,10 @@ def test_linear_maps_are_antiderivatives(places):
 
 
 def test_impulses_change_forms_and_maps(places):
-    for _, place, _ in places:
+    """Where impacts between free flights happen: no rigid row is closed."""
+    for system, place, _ in places:
+        if np.isinf(system.spring[place.active_set]).any():
+            continue
         change = np.ascontiguousarray(place.functional("impulse_response")).view(float)
         for i, form in enumerate((place.loss, place.square, place.dashpot)):
             exact = change @ form[: 2 * place.m, : 2 * place.m]
