@@ -19,7 +19,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
-from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, paired, rotation
+from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, check_sides, paired, rotation
 from vanedamp.modal.matrices import SystemMatrices, patch_average, unit_direction
 
 # directions in which a node on the axis obeys u = exp(i h alpha) R u to this
@@ -284,5 +284,5 @@ def cyclic_sector(
     if low is not None and high is not None:
         nodes, ends, distance = paired(matrices, low, high, int(sectors), direction, origin, tolerance)
     for spring in couplings:
-        matrices.patch(spring.low), matrices.patch(spring.high)
+        check_sides(matrices, spring.low, spring.high, int(sectors), direction, origin)
     return CyclicSector(matrices, int(sectors), direction, origin, nodes, ends, distance, tuple(couplings))

@@ -50,17 +50,18 @@ def ring_campbell(
         travels = sector.travels(diameter)
         turning = rotating_diameter(sector, rotating, diameter)
         asked = min((2 if travels else 1) * count, turning.standing.free.size)
+        alike = [(float(order), aliased(int(order), sector.sectors)) for order in orders]
+        exciting = [(order, sense) for order, (excited, sense) in alike if excited == diameter]
         made = _Waves if travels else SpeedRange
         with made(turning, float(wanted[0]), float(wanted[-1]), asked, gyroscopic, keep) as source:
-            errors.append(_refined(source, wanted, tolerance))
-            solved |= set(source.solved)
-            for sense in (1, -1) if travels and gyroscopic else (1,):
-                small = source.of_sense(sense) if isinstance(source, _Waves) else source.small
-                met = [k for k in orders if aliased(int(k), sector.sectors) in ((diameter, sense), (diameter, 0))
-                       or (not gyroscopic and aliased(int(k), sector.sectors)[0] == diameter)]  # fmt: skip
-                crossings += _crossings(small, met, wanted, count, len(curves))
-                frequencies = np.array([ritz_modes(small, float(speed))[0][:count] for speed in wanted]).T
+            for sense, frequencies, met in _waves(source, exciting, wanted, count, tolerance):
+                crossings += [
+                    Crossing(len(curves) + family, order, speed, order * speed / (2.0 * np.pi))
+                    for order, family, speed in met
+                ]
                 curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
+            errors.append(_errors(source, wanted))
+            solved |= set(source.solved)
     worst = np.max(errors, axis=0)
     warnings = [] if worst.max() <= tolerance else [f"frequencies are estimated to be wrong by up to {worst.max():.2g}"]
     return Campbell(
@@ -87,25 +88,59 @@ class _Curve(NamedTuple):
     frequencies: np.ndarray
 
 
-def _crossings(
-    small: Sequence[np.ndarray], orders: Sequence[float], speeds: np.ndarray, count: int, first: int
-) -> list[Crossing]:
-    """Return where orders meet the `count` lowest curves of small matrices, the modes from `first` on."""
-    return [
-        Crossing(first + place, float(order), speed, order * speed / (2.0 * np.pi))
-        for order in orders
-        for place, speed in enumerate(meetings(small, order)[:count].tolist())
+class _Wave(NamedTuple):
+    """Frequencies (k, s), rad/s, of the waves of one sense, and where orders meet them: order, family, speed."""
+
+    sense: int
+    frequencies: np.ndarray
+    met: list[tuple[float, int, float]]
+
+
+def _waves(
+    source: SpeedRange, exciting: Sequence[tuple[float, int]], speeds: np.ndarray, count: int, tolerance: float
+) -> list[_Wave]:
+    """Return the waves of a diameter, of either sense with gyroscopic coupling, from a basis that is refined.
+
+    exciting: orders that excite the diameter, each with its sense.
+    """
+    senses = (1, -1) if isinstance(source, _Waves) and source.gyroscopic else (1,)
+    places = speeds
+    for _ in range(2):  # then with the speeds of the crossings, to which the first ones are near enough
+        _refine(source, places, tolerance)
+        waves = [_of_sense(source, sense, exciting, speeds, count, len(senses) > 1) for sense in senses]
+        places = np.union1d(speeds, [speed for wave in waves for _, _, speed in wave.met])
+    return waves
+
+
+def _of_sense(
+    source: SpeedRange, sense: int, exciting: Sequence[tuple[float, int]], speeds: np.ndarray, count: int, split: bool
+) -> _Wave:
+    """Return the `count` lowest waves of one sense; split: whether orders of the other one do not excite them."""
+    small = source.of_sense(sense) if isinstance(source, _Waves) else source.small
+    frequencies = np.array([ritz_modes(small, float(speed))[0][:count] for speed in speeds]).T
+    # of the waves of one sense, some may lie above all that the basis is for
+    known = np.array([source.modes(float(speed)).frequencies[-1] for speed in speeds]) * (1.0 + 1e-9)
+    met = [
+        (order, family, speed)
+        for order, own in exciting
+        if own == sense or not split
+        for family, speed in enumerate(meetings(small, order)[:count].tolist())
         if speeds[0] <= speed <= speeds[-1]
     ]
+    return _Wave(sense, np.where(frequencies <= known, frequencies, np.nan), met)
 
 
-def _refined(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> np.ndarray:
-    """Solve the full problem at more speeds until all errors (s,) meet a tolerance, and return them."""
+def _errors(source: SpeedRange, speeds: np.ndarray) -> np.ndarray:
+    return np.array([source.errors(float(speed)).max() for speed in speeds])
+
+
+def _refine(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> None:
+    """Solve the full problem at more speeds until the errors at all of them meet a tolerance."""
     while True:
-        errors = np.array([source.errors(float(speed)).max() for speed in speeds])
+        errors = _errors(source, speeds)
         worst = float(speeds[np.argmax(errors)])
         if errors.max() <= tolerance or worst in source.solved:
-            return errors
+            return
         source.add(worst)
 
 

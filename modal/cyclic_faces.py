@@ -59,6 +59,23 @@ def paired(
     return nodes, second.nodes, float(distances[worst])
 
 
+def check_sides(
+    matrices: SystemMatrices, low: str, high: str, sectors: int, axis: np.ndarray, point: np.ndarray
+) -> None:
+    """Raise CyclicError where `high` is nearer to the other neighbour's `low`: springs would cross the sector."""
+    first, second = (
+        patch.weights @ (matrices.coordinates[patch.nodes] - point) / patch.area
+        for patch in (matrices.patch(low), matrices.patch(high))
+    )
+    turn = rotation(axis, 2.0 * math.pi / sectors)
+    next_one, other = (float(np.linalg.norm(second - place)) for place in (turn @ first, turn.T @ first))
+    if next_one > (1.0 + _ANGLE) * other:
+        raise CyclicError(
+            "ring.spring.low: low and high are swapped: a positive turn about the axis leads to the next sector, but "
+            f"{high!r} is nearer to {low!r} of the one before"
+        )
+
+
 def _check_angle(
     places: np.ndarray, ends: np.ndarray, patches: tuple[Patch, Patch], sectors: int, axis: np.ndarray, size: float
 ) -> None:

@@ -59,8 +59,8 @@ class Excitation:
     at: str | None = None
     """interface label of a reduced model where the force acts and the response is taken; in a ring "tip" is "tip@0" """
     wave: Whole | None = None
-    """engine order r of a wave: the force acts in all sectors of a ring, in sector j of N later by 360 r j/N degrees;
-    harmonics by their multiples of that (default: a whole engine_order)"""
+    """the force acts in all sectors of a ring, in sector j of N later by 360 wave j/N degrees, harmonics by multiples
+    of that (default: minus a whole engine_order: a ring that turns meets a load at rest the earlier, the larger j)"""
     harmonic: tuple[Harmonic, ...] = ()
     """sines whose sum excites; that of order 1 has amplitude 1 and phase 0 unless it is among them"""
     waveform: AnyWaveform | None = None
@@ -123,7 +123,7 @@ class Excitation:
         if (self.force is None and self.resonance_amplitude is None) or self.distributed:
             return None
         order = self.engine_order
-        return self.wave if self.wave is not None or order is None or order % 1.0 else int(order)
+        return self.wave if self.wave is not None or order is None or order % 1.0 else -int(order)
 
     @property
     def distributed(self) -> bool:

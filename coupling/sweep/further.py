@@ -85,7 +85,8 @@ def sectors_of(values: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[str
     """Yield the response of the sectors over a grid from the columns (points, n) of its points."""
     if values.shape[1]:
         yield from ((name, frozen(values[:, place].reshape(shape))) for place, name in enumerate(OF_RING))
-        by_sector = values[:, len(OF_RING) :].reshape(*shape, len(BY_SECTOR), -1)
+        sectors = (values.shape[1] - len(OF_RING)) // len(BY_SECTOR)
+        by_sector = values[:, len(OF_RING) :].reshape(*shape, len(BY_SECTOR), sectors)
         yield from ((f"sector_{name}", frozen(by_sector[..., place, :])) for place, name in enumerate(BY_SECTOR))
 
 

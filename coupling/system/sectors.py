@@ -30,11 +30,16 @@ def unrolled(scene: Scene) -> Scene:
     """Return a scene of a ring with its tables repeated over their sectors; any other scene as it is.
 
     Ranges are left out: their numbers are the scene's. Raises InputError for a sector that the ring does not have, a
-    label that no sector has, and a gap that its scatter leaves none of.
+    label that no sector has, a gap that its scatter leaves none of, and elements that other code adds.
     """
     ring = ring_in_file(scene.structure)
     if ring is None or not scene.repeats:
         return scene
+    if scene.added and any(cavity.sectors is not None for cavity in scene.cavity):
+        table = next(iter(scene.added))
+        raise InputError(
+            f"{table}: may name bodies by number, which sectors change; write their cavities out by sector"
+        )
     shown = str(scene.excitation.at).partition("@")[0]
     cavities, bodies = _cavities(scene, ring)
     dampers = _repeated(scene.friction_damper, "friction_damper", ("at",), shown, ring)

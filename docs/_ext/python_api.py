@@ -50,7 +50,7 @@ PARTS = (
     Part("vanedamp.coupling.scene"),
     Part("vanedamp.coupling.scene.contact_laws"),
     Part("vanedamp.coupling.scene.waveforms"),
-    Part("vanedamp.coupling.response", ("response", "restart_state", "spot_stress", "steady_state")),
+    Part("vanedamp.coupling.response", ("response", "restart_state", "sector_response", "spot_stress", "steady_state")),
     Part("vanedamp.coupling.sweep", ("sweep", "record", "steady_states")),
     Part("vanedamp.coupling.ensembles", ("design", "record")),
     Part("vanedamp.coupling.orbits", ("orbits", "branch", "border", "multipliers", "bifurcations", "history")),

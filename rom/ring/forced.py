@@ -77,6 +77,7 @@ def forced_response(
     """Return the complex amplitudes (f, N), m/N, of every sector under an engine order of unit force at a label.
 
     model       a reduced ring, or the ReducedModel of a whole one
+    order       the force comes later from sector to sector, earlier with a negative one
     label, at   interface labels of a sector where the force acts, and the response is taken (default: where it acts)
     deviations  of the sectors of a reduced ring
 

@@ -207,6 +207,7 @@ def mistuning_study(
     points   of the frequencies of the first draw's responses
     report   called with the number of draws done, and of all
 
+    A ring that rotates turns past a load at rest: forces come earlier from sector to sector, in other rings later.
     Raises RingError, and what the table raises.
     """
     label = ring.interface[0] if label is None else label
@@ -215,7 +216,8 @@ def mistuning_study(
         raise RingError("seeds: expected at least one draw, and one engine order")
     tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, family) if band_hz is None else band_hz
-    nominal = [tuned.forced(order, label) for order in orders]
+    waves = [-order if speed else order for order in orders]
+    nominal = [tuned.forced(wave, label) for wave in waves]
     peaks = [one.peaks(low, high) for one in nominal]
     largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
     references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
@@ -227,7 +229,7 @@ def mistuning_study(
             report(done, len(numbers))
         deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
         natural = natural_of(ring, deviations, speed)
-        responses = [natural.forced(order, label) for order in orders]
+        responses = [natural.forced(wave, label) for wave in waves]
         first = first or (deviations, responses)
         found.append([_amplified(one, top, low, high) for one, top in zip(responses, references, strict=True)])
     assert first is not None

@@ -180,6 +180,11 @@ def test_separate_structures_with_springs_are_the_ring_with_its_springs():
     assert every(ring_modes(sector, 6)) == pytest.approx(known / (2 * np.pi), rel=1e-10)
 
 
+def test_springs_to_the_neighbour_on_the_other_side_are_rejected():
+    with pytest.raises(CyclicError, match=r"ring.spring.low: low and high are swapped: .* 'left' is nearer to 'right'"):
+        cyclic_sector(block_of_springs(5), None, None, 5, couplings=[Spring("right", "left", (1.0, 1.0, 1.0))])
+
+
 def corner(angle=30.0, lift=0.0, more=()):
     """Two triangles of nodes with their centres, at an angle (degrees) about z, the second one lifted.
 

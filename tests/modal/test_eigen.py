@@ -274,12 +274,13 @@ def test_one_analysis_serves_matrices_of_one_pattern():
     pattern = sparse.csr_array(base + base.T + 40.0 * sparse.identity(40))
     load = random.standard_normal(40)
     with one_analysis():
-        for shift, other in ((0.0, 0.0), (-3.0, 0.0), (55.0, 0.0), (0.0, 1.0), (0.0, 0.0)):
+        for shift, other in ((0.0, 0.0), (-3.0, 0.0), (39.5, 0.0), (55.0, 0.0), (0.0, 1.0), (0.0, 0.0)):
             matrix = sparse.csr_array(pattern - shift * sparse.identity(40))
             matrix = sparse.csr_array(
                 matrix + other * sparse.csr_array(([1.0, 1.0], ([0, 39], [39, 0])), shape=(40, 40))
             )
             known = linalg.eigvalsh(matrix.toarray())
+            assert np.all(matrix.diagonal() > 0.0) or shift == 55.0
             assert negative_eigenvalues(matrix) == np.count_nonzero(known < 0.0)
             with factorize(matrix) as factors:
                 assert matrix @ factors.solve(load) == pytest.approx(load, abs=1e-10)

@@ -11,6 +11,7 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.sweep.further import sectors_of
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_peaks
@@ -179,6 +180,12 @@ def test_a_sweep_over_the_frequency_has_the_peaks_of_its_ring(file):
 def test_a_sweep_that_has_no_points_says_so(file, changes, message):
     with pytest.raises(InputError, match=message):
         sweep(scene(file, **changes))
+
+
+def test_no_points_have_no_sectors_but_their_number():
+    columns = dict(sectors_of(np.zeros((0, 2 + 5 * 6)), (0,)))
+    assert columns["sector_amplitude_mean"].shape == (0, 6)
+    assert columns["localisation"].shape == (0,)
 
 
 def test_a_sweep_over_rings_of_other_sizes_is_rejected(file, tmp_path):

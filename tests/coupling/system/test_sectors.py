@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools.rings import Chain
+from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import body_loads
@@ -86,7 +87,10 @@ def test_a_wave_lags_from_sector_to_sector(file):
 
 def test_a_whole_engine_order_is_a_wave_and_no_other_is(file):
     turning = {"rotation": {"speed": 500.0}, "excitation": {"engine_order": 4.0, "force": 1.0, "at": "tip"}}
-    assert len(unrolled(scene(file, **turning)).excitation.load) == 6
+    load = unrolled(scene(file, **turning)).excitation.load
+    assert len(load) == 6
+    # the load at rest cos(4 theta) meets sector j at theta = speed t + 2 pi j/6: earlier by 4 j/6 of a period
+    assert load[1].amplitude == pytest.approx(np.exp(2j * np.pi * 4 / 6))
     turning["excitation"]["engine_order"] = 2.5
     assert unrolled(scene(file, **turning)).excitation.load == ()
     assert unrolled(scene(file, **turning)).excitation.at == "tip@0"
@@ -190,6 +194,13 @@ def test_a_compact_scene_is_assembled_written_out(file):
     assert one.bodies == 12
     assert np.array_equal(one.J, other.J)
     assert np.array_equal(one.load, other.load)
+
+
+def test_elements_that_may_name_bodies_are_rejected(file):
+    made = replace(scene(file), added={"tether": (Stop("left", 1e-4, at="tip@0"),)})
+    with pytest.raises(InputError, match="tether: may name bodies by number"):
+        unrolled(made)
+    assert unrolled(replace(made, cavity=(), damper=())).added
 
 
 def test_it_comes_back_from_its_file(file, tmp_path):
