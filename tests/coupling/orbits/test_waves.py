@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
+from tests.tools.rings import Chain
 from vanedamp.coupling.orbits.newton import find_orbit as newton_orbit
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
@@ -87,6 +88,26 @@ def test_scenes_without_a_wave(changed):
     scene = ring(5, 1).replace(changed)
     with pytest.raises(InputError, match=r"orbit.wave: a wave travels over equal sectors"):
         find_orbit(scene)
+
+
+def test_a_wave_of_a_ring_scene(tmp_path):
+    """Of a scene that names its cavity and its body once: the orbit is that of whole periods."""
+    chain = Chain(sectors=5, damping_ratio=0.01)
+    chain.ring().save(tmp_path / "ring.h5")
+    scene = vd.Scene.of({
+        "structure": {"model": "ring", "file": str(tmp_path / "ring.h5")},
+        "excitation": {
+            "frequency": float(np.sqrt(chain.squares([2])[0]) / (2 * np.pi)), "force": 25.0, "at": "tip", "wave": 2
+        },
+        "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all"}],
+        "damper": [{"cavity": "c", "mass": 0.01, "friction": 0.2, "restitution": 0.3}],
+        "time": {"periods": 600, "transient": 300}, "orbit": {"wave": True},
+    }, "scene")  # fmt: skip
+    final = vd.simulate(scene).final
+    wave, whole = find_orbit(scene, final), find_orbit(scene.replace({"orbit.wave": False}), final)
+    assert wave.status == whole.status == "ok" and wave.stable and whole.stable
+    assert np.abs(wave.state - whole.state).max() < 1e-8 * np.abs(whole.state).max()
+    assert wave.impacts_per_period == whole.impacts_per_period
 
 
 def test_mistuned_rings_and_loads_in_phase_have_no_wave():
