@@ -200,7 +200,8 @@ def _apply_impulses(system, st, scratch, k):
             elif system.right_body[r] < 0:
                 speed[system.left_body[r]] = -after
         else:
-            scratch.touching[r] = abs(speed[r]) <= tiny
+            # one that still approaches does so by less than the solver tells from zero
+            scratch.touching[r] = speed[r] <= tiny
         if scratch.touching[r] and not system.moves_with_floor[r]:
             speed[r] = 0.0
     join_speeds(system, st, scratch)

@@ -739,3 +739,30 @@ def test_what_held_a_body_may_go_to_its_bound():
     }  # fmt: skip
     worst = check_events(validate(Scene, data, "scene"))
     assert worst.impacts > 50
+
+
+@pytest.mark.parametrize("coupling", [1e-12, 3e-12, 1e-11])
+def test_an_impact_far_away_does_not_press_a_resting_body_into_its_wall_for_ever(coupling):
+    # in a ring an impact reaches a body at rest some sectors away with a billionth of a millionth of its speed
+    model = ReducedModel.from_matrices(
+        [[0.1, coupling], [coupling, 0.1]], 1e5 * np.eye(2), {"a": 0, "b": 1}, damping_ratio=0.01
+    )
+    frequency = float(model.natural_frequencies_hz[0])
+    for force in (1.5, 2.0, 2.5):
+        response = simulate(
+            Scene(
+                structure=model,
+                excitation={
+                    "frequency": frequency, "at": "a",
+                    "load": [{"at": "a", "force": 2.0}, {"at": "b", "force": force, "phase": 70.0}],
+                },
+                cavity=[{"name": name, "gap": 3e-4, "floor": name} for name in "ab"],
+                damper=[
+                    {"cavity": name, "mass": 0.002, "friction": 0.2, "restitution": restitution}
+                    for name, restitution in (("a", 0.7), ("b", 0.3))
+                ],
+                solver={"max_events": 20000}, time={"periods": 200, "transient": 100},
+            )
+        )  # fmt: skip
+        assert response.status in (Status.OK, Status.NOT_STEADY)
+        assert response.energy_residual < 1e-10
