@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
-from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT
+from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
 from vanedamp.coupling.engine.run import ROOM, places, with_free_place
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
@@ -262,7 +262,12 @@ def _functionals(
     motion[np.abs(motion) <= CANCELLED * terms] = 0.0
     response, rate = system.response[:n] @ p, np.abs(eigenvalue)
     size = np.maximum(np.abs(motion).max(axis=0, initial=0.0), np.abs(response))
-    held = np.maximum(held.max(axis=0, initial=0.0), np.abs(system.response[:n]) @ np.abs(p))
+    # in the rows as if no body were held: friction that holds one depends on modes that move no slip
+    loose = np.abs(system.J[:, :n]) @ np.abs(p)
+    held = np.maximum(held.max(axis=0, initial=0.0), loose.max(axis=0, initial=0.0))
+    held = np.maximum(held, np.abs(system.response[:n]) @ np.abs(p))
+    largest = np.abs(np.vstack([system.J[:, :n], system.response[:n]])).max(initial=0.0)
+    held = np.maximum(held, UNSEEN * largest * np.abs(p).max(axis=0, initial=0.0))
     return {
         "body": body.T, "motion": motion, "response": response, "speed": size * rate,
         "acceleration": np.maximum(size, held) * rate**2, "momentum": (system.mass[n:] @ body) * eigenvalue,

@@ -28,6 +28,9 @@ MOVES_ALIKE = 1e-12
 # --- modes
 #: acceleration of a mode, times the largest of all modes, below which the mode is inactive until the next impact
 INACTIVE = 1e-14
+#: fraction of a mode's coordinates, times the largest entry of the rows and the response, that its acceleration counts
+#: even where these do not feel it: it then becomes inactive when its energy is round-off
+UNSEEN = 1e-7
 #: |i omega_h - lambda| times the period, below which a harmonic drives a mode. Beyond, the steady-state response is at
 #: most 1/DRIVEN times the growth in one period: less than two digits cancel. Driven modes cost time: a wider bound
 #: would slow down scenes more than 0.3 % off their resonance. numerics.exponentials.secular relies on it

@@ -766,3 +766,28 @@ def test_an_impact_far_away_does_not_press_a_resting_body_into_its_wall_for_ever
         )  # fmt: skip
         assert response.status in (Status.OK, Status.NOT_STEADY)
         assert response.energy_residual < 1e-10
+
+
+def test_what_happens_does_not_depend_on_where_the_response_is_taken():
+    # two oscillators without any coupling, the body on one: what it does cannot depend on where the response is taken
+    model = ReducedModel.from_matrices(0.1 * np.eye(2), 1e5 * np.eye(2), {"a": 0, "b": 1}, damping_ratio=0.01)
+    runs = {}
+    for at in "ab":
+        runs[at] = simulate(
+            Scene(
+                structure=model,
+                excitation={
+                    "frequency": 150.0, "at": at,
+                    "load": [{"at": "a", "force": 2.0}, {"at": "b", "force": 6.0, "phase": 70.0}],
+                },
+                cavity=[{"name": "c", "gap": 1.0, "floor": "b"}],
+                damper=[{"cavity": "c", "mass": 0.002, "friction": 5.0}],
+                time={"periods": 60, "transient": 0},
+            ),
+            events=True,
+        )  # fmt: skip
+    for run in runs.values():
+        assert run.energy_residual < 1e-12
+        assert {event.kind for event in run.event_list} == {"slip", "stick"}
+    energies = [run.energy for run in runs.values()]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
