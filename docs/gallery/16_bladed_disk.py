@@ -41,7 +41,7 @@ figure, axes = plt.subplots(figsize=(7.5, 3.5), layout="constrained")
 for family in range(2):
     own = modes.families == family
     axes.plot(modes.diameters[own], modes.frequencies_hz[own], "o-", label=f"family {family + 1}")
-axes.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
+axes.set(xlabel="nodal diameter (-)", ylabel="natural frequency (Hz)")
 axes.legend()
 plt.show()
 
@@ -56,7 +56,7 @@ factors, worst = draws.amplification[0], int(draws.seeds[np.argmax(draws.amplifi
 figure, axes = plt.subplots(figsize=(7.5, 3), layout="constrained")
 axes.hist(factors, bins=20, color="0.7")
 axes.axvline(draws.bound, color="k", linestyle="--", label="Whitehead's bound")
-axes.set(xlabel="largest amplitude of a blade over the tuned one", ylabel="disks")
+axes.set(xlabel="largest amplitude of a blade over the tuned one (-)", ylabel="number of disks (-)")
 axes.legend()
 plt.show()
 print(f"median {np.median(factors):.2f}, largest {factors.max():.2f} (seed {worst}), bound {draws.bound:.2f}")
@@ -102,7 +102,7 @@ figure, axes = plt.subplots(figsize=(7.5, 3.5), layout="constrained")
 for place, (name, values) in enumerate(tops.items()):
     axes.bar(np.arange(4) + 0.4 * place - 0.2, list(values.values()), 0.38, label=f"{name} disk")
 axes.set_xticks(np.arange(4), list(tops["tuned"]))
-axes.set(xlabel="blades with a body", ylabel="largest amplitude of a blade (0.2 mm)")
+axes.set(xlabel="blades with a body (-)", ylabel="largest amplitude of a blade (0.2 mm)")
 axes.legend()
 plt.show()
 for name, values in tops.items():

@@ -37,7 +37,7 @@ first = modes.families == 0
 
 figure, axes = plt.subplots(figsize=(7.5, 3), layout="constrained")
 axes.plot(modes.diameters[first], modes.frequencies_hz[first], "o-")
-axes.set(xlabel="nodal diameter", ylabel="first bending (Hz)")
+axes.set(xlabel="nodal diameter (-)", ylabel="first bending (Hz)")
 plt.show()
 
 # %%

@@ -183,6 +183,7 @@ def amplification(
     tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
     reference = float(tuned.forced(order, label).peaks(low, high)[0].max())
+    _check_reference(ring, reference, order, label)
     return _amplified(natural_of(ring, deviations, speed).forced(order, label), reference, low, high)
 
 
@@ -221,6 +222,8 @@ def mistuning_study(
     peaks = [one.peaks(low, high) for one in nominal]
     largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
     references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
+    for order, reference in zip(orders, references, strict=True):
+        _check_reference(ring, reference, order, label)
     frequencies = np.linspace(low, high, points)
     first: tuple[Deviations, list[Forced]] | None = None
     found = []
@@ -253,6 +256,15 @@ def _band(ring: RingModel | SectorRing, tuned: Natural | OfModel, family: int) -
     if len(own) < ring.sectors or not 0 <= family < ring.modes // ring.sectors:
         raise RingError(f"family: the ring has families 0 to {ring.modes // ring.sectors - 1}, not {family}")
     return float((1.0 - _MARGIN) * own[0]), float((1.0 + _MARGIN) * own[-1])
+
+
+def _check_reference(ring: RingModel | SectorRing, reference: float, order: int, label: str) -> None:
+    """Raise RingError for a peak of the tuned ring that nothing can be compared with."""
+    if not (ring.damping_ratio > 0.0 and 0.0 < reference < np.inf):
+        raise RingError(
+            f"mistuning: the tuned ring has no finite peak at {label!r} under order {order}; give it damping, and take "
+            "an interface coordinate that its modes move"
+        )
 
 
 def _amplified(response: Forced, reference: float, low: float, high: float) -> Amplification:

@@ -38,7 +38,11 @@ def test_files_with_a_mark_of_their_encoding(command, folder):
         (RANGE, '"cavity.0" = [1.0]', "cavity.0: names a table, not a value"),
         (RANGE, '"cavity.\u00b2.gap" = [1.0]', "no entry '\u00b2'; known: c1"),
         (RANGE, '"excitation.frequency.x" = [1.0]', "excitation.frequency.x: no table holds 'x'; leave it out"),
-        ("stiffness = 1e4", 'file = "rom.h5"', 'structure.file: belongs to model = "rom", not to model = "rigid"'),
+        (
+            "stiffness = 1e4",
+            'file = "rom.h5"',
+            'structure.file: belongs to model = "rom" or model = "ring", not to model = "rigid"',
+        ),
         ('"rigid"', '"prescribed"', 'structure.mass: belongs to model = "rigid", not to model = "prescribed"'),
         ("[time]", '[contact]\nlaw = "massless"\nstiffness = 1.0\n[time]', 'stiffness: belongs to law = "compliant"'),
         ('name = "c1"', 'name = ""', "cavity[0].name: expected a word that is no number"),

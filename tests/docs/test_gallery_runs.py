@@ -13,10 +13,11 @@ from matplotlib import pyplot as plt
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 #: those that take some seconds each
 SLOW = {
-    "friction_and_restitution", "gap_sweep", "methods_compared", "optimum", "orbit_branch", "run_up",
+    "bladed_disk", "friction_and_restitution", "gap_sweep", "methods_compared", "optimum", "orbit_branch", "run_up",
+    "stator_ring",
 }  # fmt: skip
 #: those of finite elements
-ELEMENTS = {"campbell_diagram", "reduced_model"}
+ELEMENTS = {"bladed_disk", "campbell_diagram", "reduced_model", "stator_ring"}
 
 
 @pytest.mark.parametrize(

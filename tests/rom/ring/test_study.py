@@ -56,3 +56,9 @@ def test_study_over_draws(tmp_path: Path):
 def test_unknown_family():
     with pytest.raises(RingError, match="families 0 to 0, not 1"):
         mistuning_study(Chain(6).ring(), Drawn(), [1], 2, family=1)
+
+
+def test_an_undamped_ring_has_no_peaks_to_compare():
+    ring = Chain(damping_ratio=0.0).ring()
+    with pytest.raises(RingError, match="no finite peak at 'tip' under order 1; give it damping"):
+        mistuning_study(ring, Drawn(), [1], 3)
