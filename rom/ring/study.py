@@ -180,10 +180,11 @@ def amplification(
     band_hz: two frequencies between which the peaks count (default: around the first family); speed: rad/s, of a ring
     that rotates. The response of a RingModel includes all of its waves. Raises RingError.
     """
+    _check_damped(ring)
     tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
     reference = float(tuned.forced(order, label).peaks(low, high)[0].max())
-    _check_reference(ring, reference, order, label)
+    _check_reference(reference, order, label)
     return _amplified(natural_of(ring, deviations, speed).forced(order, label), reference, low, high)
 
 
@@ -215,6 +216,7 @@ def mistuning_study(
     numbers = list(range(table.seed, table.seed + seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
     if not numbers or not len(orders):
         raise RingError("seeds: expected at least one draw, and one engine order")
+    _check_damped(ring)
     tuned = natural_of(ring, speed=speed)
     low, high = _band(ring, tuned, family) if band_hz is None else band_hz
     waves = [-order if speed else order for order in orders]
@@ -223,7 +225,7 @@ def mistuning_study(
     largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
     references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
     for order, reference in zip(orders, references, strict=True):
-        _check_reference(ring, reference, order, label)
+        _check_reference(reference, order, label)
     frequencies = np.linspace(low, high, points)
     first: tuple[Deviations, list[Forced]] | None = None
     found = []
@@ -258,12 +260,17 @@ def _band(ring: RingModel | SectorRing, tuned: Natural | OfModel, family: int) -
     return float((1.0 - _MARGIN) * own[0]), float((1.0 + _MARGIN) * own[-1])
 
 
-def _check_reference(ring: RingModel | SectorRing, reference: float, order: int, label: str) -> None:
+def _check_damped(ring: RingModel | SectorRing) -> None:
+    if not ring.damping_ratio > 0.0:
+        raise RingError("damping_ratio: an undamped ring has no peaks to compare; give it damping")
+
+
+def _check_reference(reference: float, order: int, label: str) -> None:
     """Raise RingError for a peak of the tuned ring that nothing can be compared with."""
-    if not (ring.damping_ratio > 0.0 and 0.0 < reference < np.inf):
+    if not 0.0 < reference < np.inf:
         raise RingError(
-            f"mistuning: the tuned ring has no finite peak at {label!r} under order {order}; give it damping, and take "
-            "an interface coordinate that its modes move"
+            f"label: the tuned ring does not move {label!r} under order {order}; take an interface coordinate that its "
+            "modes move"
         )
 
 
