@@ -23,7 +23,7 @@ case = vd.Case(
         "element_size": 0.03, "blade_length": 0.08, "blade_thickness": 0.008, "cavity_length": 0.012,
         "cavity_thickness": 0.004, "cavity_width": 0.012, "cavity_wall": 0.004,
     },
-    material={"default": {"young": 2.0e11, "poisson": 0.3, "density": 7800.0, "damping_ratio": 0.001}},
+    material={"default": {"young": 2.0e11, "poisson": 0.3, "density": 7800.0, "damping_ratio": 0.002}},
     support={"clamped": ["bore"]},
     ring={"sectors": 12, "low": "low", "high": "high", "deviating": ["blade"]},
     interface={
@@ -65,13 +65,13 @@ print(f"median {np.median(factors):.2f}, largest {factors.max():.2f} (seed {wors
 # **The scene**: engine order 4 bends the blades, each a little later than the one before. A cavity and its body are
 # written once; `sectors` says which blades have them. The force would bring the tuned disk to 0.2 mm.
 
-near = [float(factor * draws.tuned_frequency_hz[0]) for factor in (0.98, 1.005)]
+near = [float(factor * draws.tuned_frequency_hz[0]) for factor in (0.975, 1.01)]
 scene = vd.Scene(
     structure={"model": "ring", "file": ring, "modes": 24, "natural": True},
     excitation={"frequency": near[0], "wave": 4, "at": "tip", "resonance_amplitude": 2e-4, "resonance_near": near},
     cavity=[{"name": "c", "sectors": "all", "floor": "cavity", "gap": 1.5e-4, "scatter": {"position": 0.5}}],
     damper=[{"cavity": "c", "mass": 0.5e-3, "friction": 0.1, "restitution": 0.6}],
-    time={"periods": 900, "transient": 600},
+    time={"periods": 1400, "transient": 1000},
     sweep={"excitation.frequency": np.linspace(*near, 26)},
 )  # fmt: skip
 
@@ -107,3 +107,8 @@ axes.legend()
 plt.show()
 for name, values in tops.items():
     print(name, {label: round(value, 3) for label, value in values.items()})
+
+# %%
+# **Verdicts.** A body in every blade takes more than two thirds of the amplitude, and as much of a mistuned disk as of
+# the tuned one: its impacts dissipate where the wave is, wherever that is. A body in every second blade, or in the one
+# that moves most, helps hardly: the blades without one go on, and the bodies' masses mistune the disk by themselves.

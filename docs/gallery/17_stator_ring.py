@@ -79,3 +79,7 @@ plt.show()
 for name, result in (("tuned", tuned), ("mistuned", mistuned)):
     tops = [float(result.sectors[f"sector_amplitude_{key}"].max()) / 1e-4 for key in ("undamped", "mean", "fixed")]
     print(f"{name}: no bodies {tops[0]:.2f}, loose {tops[1]:.2f}, fixed {tops[2]:.2f}")
+
+# %%
+# **Verdicts.** Loose bodies in the clusters take three quarters of the peak and more; fixed ones only shift it. The
+# mistuned ring without bodies has a cluster that moves more than in the tuned one; with loose bodies that is gone.
