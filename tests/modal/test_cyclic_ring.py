@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from tests.modal.test_cyclic import STEEL, every
-from tests.tools.ring_mesh import write_ring
+from tests.tools.ring_mesh import write_ring, write_tetrahedra
 from vanedamp.meshes.sector import Sector, build
 from vanedamp.modal.cyclic import cyclic_sector
 from vanedamp.modal.cyclic_campbell import ring_campbell
@@ -256,3 +256,12 @@ def test_annular_plate_converges_to_kirchhoff(tmp_path):
 def test_annular_plate_on_a_fine_mesh(tmp_path):
     """To a thin plate's own error: solid elements have shear, and a clamp that is not quite rigid."""
     assert np.abs(plate_errors(tmp_path, 0.0018)).max() < 1e-3
+
+
+def test_curved_tetrahedra(tmp_path):
+    path = write_tetrahedra(tmp_path / "sector.msh", SECTORS)
+    whole = Solid(write_ring(path, tmp_path / "ring.msh", SECTORS), STEEL)
+    held = {f"bore@{j}": "xyz" for j in range(SECTORS)}
+    known = solve_modes(whole.assemble(held, 0.0), 20).frequencies_hz
+    found = every(ring_modes(of_ring(Solid(path, STEEL).assemble({"bore": "xyz"}, 0.0)), 4))
+    assert found[:16] == pytest.approx(known[:16], rel=1e-9)

@@ -89,3 +89,35 @@ def _read(path):
                     for kind, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity)[::2], strict=True):
                         parts.append((dimension, name, kind, place[nodes.astype(int)]))
     return points.reshape(-1, 3), parts
+
+
+def write_tetrahedra(path, sectors, order=2, size=0.03):
+    """Write a sector of an annular plate of curved tetrahedra, whose faces gmsh meshes alike.
+
+    Facet groups `low`, `high` and `bore`; volume group `disk`.
+    """
+    angle = 2.0 * np.pi / sectors
+    with session("tetrahedra"):
+        occ = gmsh.model.occ
+        corners = [occ.addPoint(radius, 0.0, 0.0) for radius in (0.05, 0.1)]
+        edge = occ.addLine(*corners)
+        face = occ.extrude([(1, edge)], 0.0, 0.0, 0.02)
+        low = next(tag for dimension, tag in face if dimension == 2)
+        made = occ.revolve([(2, low)], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, angle)
+        occ.synchronize()
+        high, volume = made[0][1], next(tag for dimension, tag in made if dimension == 3)
+        turn = np.eye(4)
+        turn[:3, :3] = rotation(np.array([0.0, 0.0, 1.0]), angle)
+        gmsh.model.mesh.setPeriodic(2, [high], [low], turn.ravel().tolist())
+        bore = [
+            tag
+            for dimension, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)
+            if np.hypot(*occ.getCenterOfMass(dimension, tag)[:2]) < 0.06 and tag not in (low, high)
+        ]
+        for dimension, tags, name in ((3, [volume], "disk"), (2, [low], "low"), (2, [high], "high"), (2, bore, "bore")):
+            gmsh.model.addPhysicalGroup(dimension, tags, name=name)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(order)
+        gmsh.write(str(path))
+    return path
