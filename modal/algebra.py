@@ -1,7 +1,8 @@
-"""Linear algebra common to modes and reduced models, in plain numpy: Ritz values, signs of shapes, symmetric parts."""
+"""Linear algebra common to modes and reduced models, in numpy: Ritz values, signs of shapes, symmetric parts, turns."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -107,3 +108,19 @@ def leading_sign(values: np.ndarray) -> float:
 def column_signs(shapes: np.ndarray) -> np.ndarray:
     """Return the signs (m,) that make the largest component of every column (n, m) positive."""
     return np.array([leading_sign(shape) for shape in shapes.T])
+
+
+def cross_matrix(axis: np.ndarray) -> np.ndarray:
+    """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
+    return np.cross(np.eye(3), axis)
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the matrix (3, 3) that turns a vector by an angle (rad) about a unit axis, right-handed (Rodrigues)."""
+    cross = cross_matrix(axis)
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
+
+
+def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
+    """Return the rotations (N, 3, 3) of the frames of N sectors about an axis (3,)."""
+    return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])

@@ -19,7 +19,8 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
-from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, check_sides, paired, rotation
+from vanedamp.modal.algebra import rotation
+from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, check_sides, paired
 from vanedamp.modal.matrices import SystemMatrices, patch_average, unit_direction
 
 # directions in which a node on the axis obeys u = exp(i h alpha) R u to this

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import rotation
 from vanedamp.modal.matrices import Patch, SystemMatrices
-from vanedamp.modal.rotating import cross_matrix
 
 #: distance of two nodes that are one, over the size of the sector
 TOLERANCE = 1e-6
@@ -21,12 +21,6 @@ _ANGLE = 1e-3
 
 class CyclicError(VanedampError):
     """A sector that makes no ring; the message starts with the argument or key."""
-
-
-def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the matrix (3, 3) that turns a vector by an angle (rad) about a unit axis, right-handed (Rodrigues)."""
-    cross = cross_matrix(axis)
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
 
 
 def paired(

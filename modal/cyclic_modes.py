@@ -14,9 +14,9 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.modal.algebra import first_largest
+from vanedamp.modal.algebra import first_largest, turns
 from vanedamp.modal.cyclic import CyclicSector, Diameter
-from vanedamp.modal.cyclic_faces import CyclicError, rotation
+from vanedamp.modal.cyclic_faces import CyclicError
 from vanedamp.modal.eigen import Modes, NoModesError, solve_modes
 from vanedamp.modal.iterative import chosen
 from vanedamp.modal.petsc import one_analysis
@@ -96,8 +96,7 @@ class RingModes(Displayed):
         steps = np.arange(self.sectors) * self.angle
         turned = np.exp(1j * (phase + self.diameters[mode] * steps))
         own = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
-        turns = np.array([rotation(self.axis, step) for step in steps])
-        return np.einsum("sij,snj->sni", turns, own)
+        return np.einsum("sij,snj->sni", turns(self.axis, self.sectors), own)
 
     def save(
         self,

@@ -14,9 +14,10 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
+from vanedamp.modal.algebra import cross_matrix
 from vanedamp.modal.eigen import SolverError
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
-from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix, nodal_product
+from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product
 from vanedamp.modal.statics import Statics
 from vanedamp.modal.temperature import Temperature, TemperatureError
 

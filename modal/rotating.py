@@ -68,8 +68,3 @@ def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_arra
     Each component of a solid has the same inertia, so that its mass is a nodal matrix times the unit matrix.
     """
     return sparse.csr_array(sparse.kron(mass[::3, ::3], matrix, format="csr"))
-
-
-def cross_matrix(axis: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
-    return np.cross(np.eye(3), axis)

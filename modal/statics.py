@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from vanedamp.modal.eigen import stable_share, static_shape
 from vanedamp.modal.matrices import SystemMatrices
 
 
@@ -13,12 +14,8 @@ class Statics:
 
     def shape(self, matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
         """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError where nothing holds it."""
-        from vanedamp.modal.eigen import static_shape  # PETSc, which scenes of rings do without
-
         return static_shape(matrices, load)
 
     def stable_share(self, matrices: SystemMatrices, added: sparse.csr_array) -> float:
         """Return the largest fraction (0 to 1) of a stiffness (N, N) that leaves the structure stable."""
-        from vanedamp.modal.eigen import stable_share
-
         return stable_share(matrices, added)

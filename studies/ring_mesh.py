@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
+from vanedamp.modal.algebra import rotation, turns
 from vanedamp.modal.cyclic_modes import RingModes
 
 #: distance up to which nodes of two sectors are one, over the sector's size
@@ -36,7 +36,8 @@ class WholeRing(NamedTuple):
 
 def joints(modes: RingModes, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes (k,) of a sector's low face and, in the same order, those of its high face, which they meet."""
-    away, nearest = cKDTree(coordinates).query(_turned(modes, coordinates, 1))
+    turn = rotation(modes.axis, modes.angle)
+    away, nearest = cKDTree(coordinates).query((coordinates - modes.point) @ turn.T + modes.point)
     low = np.flatnonzero(away <= _SAME * np.linalg.norm(np.ptp(coordinates, axis=0)))
     return low, nearest[low]
 
@@ -52,14 +53,8 @@ def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> 
     numbers[:, on_axis] = on_axis
     kept, places = np.unique(numbers, return_inverse=True)
     sector, node = np.divmod(kept, count)
-    points = np.array([_turned(modes, coordinates, place) for place in range(sectors)])[sector, node]
+    points = np.einsum("sij,nj->sni", turns(modes.axis, sectors), coordinates - modes.point)[sector, node] + modes.point
     return WholeRing(sector, node, points, places.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
-
-
-def _turned(modes: RingModes, coordinates: np.ndarray, sectors: int) -> np.ndarray:
-    """Return the nodes of sector 0 at their places in another one."""
-    turn = Rotation.from_rotvec(2.0 * np.pi * sectors / modes.sectors * modes.axis)
-    return np.asarray(turn.apply(coordinates - modes.point) + modes.point)
 
 
 def with_parts(shapes: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:

@@ -2,20 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import json
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vanedamp.modal.algebra import symmetric_part
-from vanedamp.modal.cyclic_faces import rotation
-from vanedamp.rom.checks import unit
+from vanedamp.files import store
+from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.rom.checks import shaped, symmetric, unit
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.ring.deviations import RingError
 
+#: dimensions and units of the arrays that reduced rings share, in the record, too
+SHARED = {
+    "axis": (("direction",), "1"),
+    "point": (("direction",), "m"),
+    "selection": (("interface", "coordinate"), "1"),
+    "directions": (("interface", "direction"), "1"),
+    "normals": (("interface", "direction"), "1"),
+    "positions": (("interface", "direction"), "m"),
+    "arms": (("interface",), "m"),
+    "base_load": (("coordinate", "direction"), "kg"),
+    "part_load": (("coordinate", "direction"), "kg"),
+}
+
 
 class Ring:
-    """What reduced rings share: sectors about an axis, and the interface of sector 0 (see RingModel)."""
+    """What reduced rings share: sectors about an axis, and the interface of sector 0 (see RingModel).
+
+    A kind of them names its record, its arrays (as SHARED, which are among them), the symmetric and the optional ones,
+    and its numbers with their types.
+    """
+
+    _kind: ClassVar[str]
+    _arrays: ClassVar[Mapping[str, tuple[tuple[str, ...], str]]]
+    _symmetric: ClassVar[tuple[str, ...]]
+    _optional: ClassVar[tuple[str, ...]] = ()
+    _numbers: ClassVar[Mapping[str, Callable[[Any], Any]]]
 
     sectors: int
     axis: np.ndarray
@@ -28,13 +53,45 @@ class Ring:
     damping_ratio: float
     provenance: Mapping[str, Any]
 
-    def _settle(self) -> None:
-        """Bring interface and provenance into final form. Raises RingError for an empty interface."""
+    def _settle(self, lengths: Mapping[str, int]) -> None:
+        """Bring all fields into final form; lengths: of the dimensions "coordinate" and others that are not shared.
+
+        Raises RingError for an empty interface, and ReducedModelError.
+        """
+        lengths = {"interface": len(self.interface), "direction": 3, "column": lengths["coordinate"], **lengths}
+        for name, (dims, _) in self._arrays.items():
+            given = getattr(self, name)
+            if given is not None or name not in self._optional:
+                shape = tuple(lengths[dimension] for dimension in dims)
+                found = symmetric(name, given, shape[0]) if name in self._symmetric else shaped(name, given, shape)
+                object.__setattr__(self, name, found)
         object.__setattr__(self, "directions", unit(self.directions))
         object.__setattr__(self, "interface", tuple(str(label) for label in self.interface))
         object.__setattr__(self, "provenance", dict(self.provenance))
         if not self.interface:
             raise RingError("interface: empty; a reduced ring needs a coordinate that loads can act on")
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an HDF5 record that xarray opens."""
+        arrays = {name: (getattr(self, name), *layout) for name, layout in self._arrays.items()}
+        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
+        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
+        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
+        attributes = {name: getattr(self, name) for name in self._numbers}
+        store.save(path, self._kind, variables, attributes | {"provenance": dict(self.provenance)})
+
+    @classmethod
+    @store.reader
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, cls._kind)
+        fields: dict[str, Any] = {
+            name: values[name] for name in cls._arrays if name in values or name not in cls._optional
+        }
+        fields |= {name: of(attributes[name]) for name, of in cls._numbers.items()}
+        return cls(
+            **fields | {"interface": tuple(values["interface"]), "provenance": json.loads(attributes["provenance"])}
+        )
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -87,11 +144,6 @@ class Ring:
             "arms": np.tile(self.arms, self.sectors),
             "provenance": dict(self.provenance) | {"ring": ring},
         }
-
-
-def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
-    """Return the rotations (N, 3, 3) of the sectors' frames about an axis (3,)."""
-    return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])
 
 
 def sector_label(label: str, sector: int) -> str:

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.modal.algebra import symmetric_part
-from vanedamp.rom.checks import shaped, symmetric
+from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.placement import Ring, turns
+from vanedamp.rom.ring.placement import SHARED, Ring
 from vanedamp.rom.ring.waves import Waves
-
-_KIND = "ring-model"
-_ARRAYS = {
-    "axis": (("direction",), "1"),
-    "point": (("direction",), "m"),
-    "diameters": (("coordinate",), "1"),
-    "squares": (("coordinate",), "rad^2/s^2"),
-    "selection": (("interface", "coordinate"), "1"),
-    "directions": (("interface", "direction"), "1"),
-    "normals": (("interface", "direction"), "1"),
-    "positions": (("interface", "direction"), "m"),
-    "arms": (("interface",), "m"),
-    "base_load": (("coordinate", "direction"), "kg"),
-    "part_load": (("coordinate", "direction"), "kg"),
-    "stiffness": (("coordinate", "column"), "N/m"),
-    "mass": (("coordinate", "column"), "kg"),
-    "centrifugal_stiffness": (("coordinate", "column"), "kg"),
-}
-_SYMMETRIC = ("stiffness", "mass", "centrifugal_stiffness")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,6 +45,18 @@ class RingModel(Ring, Displayed):
     Raises RingError or rom.checks.ReducedModelError.
     """
 
+    _kind = "ring-model"
+    _arrays = SHARED | {
+        "diameters": (("coordinate",), "1"),
+        "squares": (("coordinate",), "rad^2/s^2"),
+        "stiffness": (("coordinate", "column"), "N/m"),
+        "mass": (("coordinate", "column"), "kg"),
+        "centrifugal_stiffness": (("coordinate", "column"), "kg"),
+    }
+    _symmetric = ("stiffness", "mass", "centrifugal_stiffness")
+    _optional = ("centrifugal_stiffness",)
+    _numbers: ClassVar[dict[str, Any]] = {"sectors": int, "modes": int, "damping_ratio": float, "greatest_speed": float}
+
     sectors: int
     axis: np.ndarray
     point: np.ndarray
@@ -89,17 +79,8 @@ class RingModel(Ring, Displayed):
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        lengths = {
-            "coordinate": len(self.squares), "column": len(self.squares), "interface": len(self.interface),
-            "direction": 3,
-        }  # fmt: skip
-        for name, (dims, _) in _ARRAYS.items():
-            if (given := getattr(self, name)) is not None:
-                shape = tuple(lengths[dimension] for dimension in dims)
-                found = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
-                object.__setattr__(self, name, found)
+        self._settle({"coordinate": len(self.squares)})
         object.__setattr__(self, "diameters", store.frozen(self.diameters, np.int64))
-        self._settle()
         _check_waves(self)
 
     @property
@@ -204,31 +185,6 @@ class RingModel(Ring, Displayed):
         if self.centrifugal_stiffness is None:
             return {}
         return {"rotation_axis": self.axis, "rotation_point": self.point}
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record that xarray opens."""
-        arrays = {name: (getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
-        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
-        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
-        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
-        attributes = {name: getattr(self, name) for name in ("sectors", "modes", "damping_ratio", "greatest_speed")}
-        store.save(path, _KIND, variables, attributes | {"provenance": dict(self.provenance)})
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> RingModel:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
-        arrays: dict[str, Any] = {name: values.get(name) for name in _ARRAYS}
-        return cls(
-            **arrays,
-            interface=tuple(values["interface"]),
-            sectors=int(attributes["sectors"]),
-            modes=int(attributes["modes"]),
-            damping_ratio=float(attributes["damping_ratio"]),
-            greatest_speed=float(attributes["greatest_speed"]),
-            provenance=json.loads(attributes["provenance"]),
-        )
 
 
 def _check_waves(ring: RingModel) -> None:

@@ -2,46 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.modal.algebra import symmetric_part
+from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.bases.projection import lowest_modes, superlu
-from vanedamp.rom.checks import shaped, symmetric
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.placement import Ring, turns
+from vanedamp.rom.ring.placement import SHARED, Ring
 from vanedamp.rom.ring.ring_model import RingModel
-
-_KIND = "ring-sectors"
-_ARRAYS = {
-    "axis": (("direction",), "1"),
-    "point": (("direction",), "m"),
-    "stiffness": (("coordinate", "column"), "N/m"),
-    "mass": (("coordinate", "column"), "kg"),
-    "part_stiffness": (("coordinate", "column"), "N/m"),
-    "part_mass": (("coordinate", "column"), "kg"),
-    "spring_high": (("spring", "coordinate"), "1"),
-    "spring_low": (("spring", "coordinate"), "1"),
-    "spring_stiffness": (("spring",), "N/m"),
-    "selection": (("interface", "coordinate"), "1"),
-    "directions": (("interface", "direction"), "1"),
-    "normals": (("interface", "direction"), "1"),
-    "positions": (("interface", "direction"), "m"),
-    "arms": (("interface",), "m"),
-    "base_load": (("coordinate", "direction"), "kg"),
-    "part_load": (("coordinate", "direction"), "kg"),
-}
-_SYMMETRIC = ("stiffness", "mass", "part_stiffness", "part_mass")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,6 +37,19 @@ class SectorRing(Ring, Displayed):
 
     Raises RingError or rom.checks.ReducedModelError.
     """
+
+    _kind = "ring-sectors"
+    _arrays = SHARED | {
+        "stiffness": (("coordinate", "column"), "N/m"),
+        "mass": (("coordinate", "column"), "kg"),
+        "part_stiffness": (("coordinate", "column"), "N/m"),
+        "part_mass": (("coordinate", "column"), "kg"),
+        "spring_high": (("spring", "coordinate"), "1"),
+        "spring_low": (("spring", "coordinate"), "1"),
+        "spring_stiffness": (("spring",), "N/m"),
+    }
+    _symmetric = ("stiffness", "mass", "part_stiffness", "part_mass")
+    _numbers: ClassVar[dict[str, Any]] = {"sectors": int, "modes": int, "faces": int, "damping_ratio": float}
 
     sectors: int
     axis: np.ndarray
@@ -85,16 +75,7 @@ class SectorRing(Ring, Displayed):
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        lengths = {
-            "coordinate": len(self.mass), "column": len(self.mass), "interface": len(self.interface), "direction": 3,
-            "spring": len(self.spring_stiffness),
-        }  # fmt: skip
-        for name, (dims, _) in _ARRAYS.items():
-            shape = tuple(lengths[dimension] for dimension in dims)
-            given = getattr(self, name)
-            found = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
-            object.__setattr__(self, name, found)
-        self._settle()
+        self._settle({"coordinate": len(self.mass), "spring": len(self.spring_stiffness)})
         if not 0 <= 2 * self.faces <= len(self.mass) or not 0 < self.modes <= self.size:
             raise RingError(f"faces: {self.faces} motions of a face and {self.modes} modes do not fit the sector")
 
@@ -175,30 +156,7 @@ class SectorRing(Ring, Displayed):
         np.add.at(found, self.places(), turned)
         return found
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record that xarray opens."""
-        variables = {name: store.Variable(getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
-        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
-        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
-        attributes = {name: getattr(self, name) for name in ("sectors", "modes", "faces", "damping_ratio")}
-        store.save(path, _KIND, variables, attributes | {"provenance": dict(self.provenance)})
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> SectorRing:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
-        return cls(
-            **{name: values[name] for name in _ARRAYS},
-            sectors=int(attributes["sectors"]),
-            modes=int(attributes["modes"]),
-            faces=int(attributes["faces"]),
-            interface=tuple(values["interface"]),
-            damping_ratio=float(attributes["damping_ratio"]),
-            provenance=json.loads(attributes["provenance"]),
-        )
-
 
 def load_ring(path: str | os.PathLike[str]) -> RingModel | SectorRing:
     """Read a reduced ring of either basis. Raises files.store.StoreError."""
-    return SectorRing.load(path) if store.kind_of(path) == _KIND else RingModel.load(path)
+    return SectorRing.load(path) if store.kind_of(path) == SectorRing._kind else RingModel.load(path)

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 import plotly.graph_objects as go
-from scipy.spatial.transform import Rotation
 
+from vanedamp.modal.algebra import turns
 from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
 from vanedamp.studies.report.charts import Table
@@ -78,7 +78,6 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     relative = np.stack([shapes.real, shapes.imag], axis=-1) / largest[:, None, None, None]
     moved = modes.whole(mode)[ring.sector, ring.node] / largest[mode]
     scale = _EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
-    turns = Rotation.from_rotvec(np.outer(2.0 * np.pi * np.arange(modes.sectors) / modes.sectors, modes.axis))
     figure = go.Figure(deformed_mesh(points + scale * moved, np.linalg.norm(moved, axis=1), ring.cells))
     in_space(figure, viewpoint(points, moved, _ELEVATIONS))
     # the axes stay while the wave travels
@@ -91,7 +90,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),
         "names": [named.name(place) for place in range(len(modes))],
-        "turns": turns.as_matrix().reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
+        "turns": turns(modes.axis, modes.sectors).reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
         "sector": _packed(ring.sector, "<u2"), "node": _packed(place, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,
     })  # fmt: skip

@@ -9,8 +9,9 @@ from scipy import linalg, sparse
 from tests.tools.ring_mesh import write_ring, write_wedge
 from tests.tools.small_structures import turned
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import rotation
 from vanedamp.modal.cyclic import Spring, aliased, cyclic_sector
-from vanedamp.modal.cyclic_faces import CyclicError, rotation
+from vanedamp.modal.cyclic_faces import CyclicError
 from vanedamp.modal.cyclic_modes import RingModes, ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
 from vanedamp.modal.eigen import NoModesError, solve_modes

@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 from tests.modal.test_cyclic import STEEL, every
 from tests.tools.ring_mesh import write_ring, write_tetrahedra
 from vanedamp.meshes.sector import Sector, build
+from vanedamp.modal.algebra import rotation
 from vanedamp.modal.cyclic import cyclic_sector
 from vanedamp.modal.cyclic_campbell import ring_campbell
-from vanedamp.modal.cyclic_faces import rotation
 from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
 from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes

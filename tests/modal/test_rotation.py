@@ -15,12 +15,13 @@ from vanedamp.files.store import load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal import gyroscopic
+from vanedamp.modal.algebra import cross_matrix
 from vanedamp.modal.eigen import SolverError, solve_modes, static_shape
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.gyroscopic import gyroscopic_modes
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.modal.msh import session
-from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix
+from vanedamp.modal.rotating import RotatingMatrices, UnstableError
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import main

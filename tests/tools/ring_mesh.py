@@ -4,7 +4,7 @@ import gmsh
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vanedamp.modal.cyclic_faces import rotation
+from vanedamp.modal.algebra import rotation
 from vanedamp.modal.msh import groups, merge, session
 
 
