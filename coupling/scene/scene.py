@@ -281,8 +281,10 @@ class Scene(OpenRecord, Displayed):
     @property
     def repeats(self) -> bool:
         """Whether labels and tables are still to be repeated over the sectors of a ring (system.sectors.unrolled)."""
+        if not isinstance(self.structure, Ring):
+            return False
         tables: tuple[Any, ...] = (*self.cavity, *self.friction_damper, *self.stop)
-        return isinstance(self.structure, Ring) and (
+        return (
             "@" not in str(self.excitation.at)
             or self.excitation.travelling is not None
             or any(entry.sectors is not None for entry in tables)

@@ -32,9 +32,10 @@ def unrolled(scene: Scene) -> Scene:
     Ranges are left out: their numbers are the scene's. Raises InputError for a sector that the ring does not have, a
     label that no sector has, a gap that its scatter leaves none of, and elements that other code adds.
     """
-    ring = ring_in_file(scene.structure)
-    if ring is None or not scene.repeats:
+    if not scene.repeats:
         return scene
+    ring = ring_in_file(scene.structure)
+    assert ring is not None
     if scene.added and any(cavity.sectors is not None for cavity in scene.cavity):
         table = next(iter(scene.added))
         raise InputError(

@@ -262,12 +262,10 @@ def _functionals(
     motion[np.abs(motion) <= CANCELLED * terms] = 0.0
     response, rate = system.response[:n] @ p, np.abs(eigenvalue)
     size = np.maximum(np.abs(motion).max(axis=0, initial=0.0), np.abs(response))
-    # in the rows as if no body were held: friction that holds one depends on modes that move no slip
-    loose = np.abs(system.J[:, :n]) @ np.abs(p)
-    held = np.maximum(held.max(axis=0, initial=0.0), loose.max(axis=0, initial=0.0))
-    held = np.maximum(held, np.abs(system.response[:n]) @ np.abs(p))
-    largest = np.abs(np.vstack([system.J[:, :n], system.response[:n]])).max(initial=0.0)
-    held = np.maximum(held, UNSEEN * largest * np.abs(p).max(axis=0, initial=0.0))
+    # in the rows as if no body were held, too: friction that holds one depends on modes that move no slip
+    felt = np.abs(np.vstack([system.J[:, :n], system.response[:n]]))
+    unseen = UNSEEN * felt.max(initial=0.0) * np.abs(p).max(axis=0, initial=0.0)
+    held = np.vstack([held, felt @ np.abs(p), unseen]).max(axis=0)
     return {
         "body": body.T, "motion": motion, "response": response, "speed": size * rate,
         "acceleration": np.maximum(size, held) * rate**2, "momentum": (system.mass[n:] @ body) * eigenvalue,
