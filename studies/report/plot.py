@@ -120,7 +120,7 @@ def _of_file(found: Results, file: str, entry: Result) -> go.Figure:
     if file in found.kinds["calibration"]:
         return _of_calibration(file, *entry.record)
     if file in found.kinds["ring-modes"]:
-        return plot(entry.record[1])
+        return plot(entry.record[0])
     if file not in found.kinds["modes"]:
         return plot(entry.record)
     values, attributes = entry.record

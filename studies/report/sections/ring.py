@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.store import load as load_record
-from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.interference import Interference
 from vanedamp.studies.headline import format_margin
 from vanedamp.studies.report.page import Page
@@ -29,8 +28,8 @@ KIND = "ring-modes"
 
 def load(path: Path) -> Result:
     """Read what `vanedamp ring` wrote."""
-    modes, (values, _) = RingModes.load(path), load_record(path, KIND)
-    return Result((modes, Interference.load(path), ring_surface(modes, values)), modes.provenance)
+    found, (values, _) = Interference.load(path), load_record(path, KIND)
+    return Result((found, ring_surface(found.modes, values)), found.modes.provenance)
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
@@ -38,8 +37,8 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
     return [_ring(file, result.record, page) for file, result in results.items()]
 
 
-def _ring(file: str, record: tuple[RingModes, Interference, WholeRing | None], page: Page) -> dict[str, Any]:
-    modes, found, surface = record
+def _ring(file: str, record: tuple[Interference, WholeRing | None], page: Page) -> dict[str, Any]:
+    found, surface = record
     diagram = page.chart("interference", interference_figure(found), *interference_table(found), [file])
     campbell, view = None, None
     if found.speeds.size:
@@ -47,7 +46,9 @@ def _ring(file: str, record: tuple[RingModes, Interference, WholeRing | None], p
     if surface is not None:
         # begins with a wave that travels
         mode = int(np.flatnonzero(found.diameters == np.unique(found.diameters)[:2][-1])[0])
-        view = page.chart("ring", ring_view(modes, surface, mode), *sector_table(modes, surface, mode), [file])
+        view = page.chart(
+            "ring", ring_view(found.modes, surface, mode), *sector_table(found.modes, surface, mode), [file]
+        )
     margins = [found.operating and format_margin(each.margin(found.operating)) for each in found.meetings]
     return {
         "file": file, "diagram": diagram, "campbell": campbell, "view": view, "record": found, "margins": margins,
