@@ -54,7 +54,9 @@ class Kind:
         self.scene, self.run, self.start = scene, run, start_of(scene, run.whole)
         transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)
         (setup, free, stuck), (loose, held) = transient.numbers, transient.parts
-        self.statistics = setup, loose, held, free, stuck, measured_of(scene, run.whole)
+        # compiled code writes the numbers of each scene into these: none is an array of the first one's records
+        self.statistics = tuple(map(_own, (setup, loose, held, free, stuck, measured_of(scene, run.whole))))
+        run.system = _own(run.system)
 
     def run_all(
         self,
@@ -104,9 +106,9 @@ class Kind:
         table = columns(self.scene, whole, line, self.start, values)
         if start is not None:
             # the state is moved to where it fits the first scene
-            whole.rest[: whole.contacts] = table.rest[0, line.friction_rows :]
-            whole.play[: whole.contacts] = table.free_travel[0, line.friction_rows :]
-            fits = start_of(self.scene, whole, start)
+            rest, play, contacts = whole.rest.copy(), whole.play.copy(), slice(line.friction_rows, None)
+            rest[: whole.contacts], play[: whole.contacts] = table.rest[0, contacts], table.free_travel[0, contacts]
+            fits = start_of(self.scene, whole._replace(rest=rest, play=play), start)
             for name in STARTS:
                 getattr(table, name)[0] = getattr(fits, name)
         return table
@@ -125,6 +127,11 @@ class Kind:
                 load = table.load[:size, np.isin(self.run.whole.order, response.order), :n]
             found.append(response.amplitude(frequency, load))
         return np.transpose(found)
+
+
+def _own(record: Any) -> Any:
+    """Return a record of compiled functions with arrays of its own."""
+    return record._make(value.copy() if isinstance(value, np.ndarray) else value for value in record)
 
 
 class _Last(threading.local):
