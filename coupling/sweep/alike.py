@@ -17,9 +17,9 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
 from vanedamp.coupling.engine.line.event_driven import EngineRun
-from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, PLACE, STAGE, Job, new_job
+from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, LEFT, PLACE, STAGE, Job, new_job
 from vanedamp.coupling.methods.registry import run_of
-from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, OUTSIDE, PERIOD
+from vanedamp.coupling.numerics.codes import OUTSIDE, PERIOD
 from vanedamp.coupling.response.figures import measured_of
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -72,23 +72,22 @@ class Kind:
         codes stay 0; keep: takes the sections of every other one, before the next begins.
         """
         run, size = self.run, len(next(iter(values.values())))
-        table = self._columns(values, start, size, linked)
-        job, leaves = new_job(size, most_periods(self.scene), linked), False
+        table, fits = self._columns(values, start, size, linked)
+        job = new_job(size, most_periods(self.scene), linked)
         for count in [size] if keep is None else range(1, size + 1):
             job.at[COUNT] = count
-            while run.run_many(job, table, self.statistics) == OUTSIDE:
-                place = int(job.at[PLACE])
-                left = alone(place, self._left(place, start) if linked else None)
-                leaves = leaves or left is not None
+            while not fits or run.run_many(job, table, self.statistics) == OUTSIDE:
+                place, fits = int(job.at[PLACE]), True
+                left = alone(place, self._left(job, place, start) if linked else None)
                 if linked:
                     for name in STARTS:
                         column = getattr(table, name)
                         column[place + 1] = column[place] if left is None else getattr(left, name)
                 job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
+                job.at[LEFT] = job.at[LEFT] if left is None else place + 1
             if keep is not None and job.codes[count - 1]:
                 keep(count - 1, self._section(job))
-        leaves = linked and (leaves or bool(np.isin(job.codes, (DONE, NOT_STEADY)).any()))
-        return job, self._linear(table, values), self._left(size, start) if leaves else start
+        return job, self._linear(table, values), self._left(job, size, start) if linked else start
 
     def _section(self, job: Job) -> np.ndarray:
         """Return the sections (p, s) of the evaluated periods of the run that has just ended."""
@@ -98,24 +97,29 @@ class Kind:
 
     def _columns(
         self, values: Mapping[str, np.ndarray], start: RestartState | None, size: int, linked: bool
-    ) -> Columns:
-        """Return the columns of scenes; of linked ones with a row more, for the state that the last one leaves."""
+    ) -> tuple[Columns, bool]:
+        """Return the columns of scenes; of linked ones with a row more, for the state that the last one leaves.
+
+        And whether the start fits the first scene as it is: otherwise Python moves it.
+        """
         whole, line = self.run.whole, self.run.system
         if linked:
             values = {path: np.append(numbers, numbers[-1]) for path, numbers in values.items()}
         table = columns(self.scene, whole, line, self.start, values)
+        fits = True
         if start is not None:
-            # the state is moved to where it fits the first scene
             rest, play, contacts = whole.rest.copy(), whole.play.copy(), slice(line.friction_rows, None)
             rest[: whole.contacts], play[: whole.contacts] = table.rest[0, contacts], table.free_travel[0, contacts]
-            fits = start_of(self.scene, whole._replace(rest=rest, play=play), start)
+            moved = start_of(self.scene, whole._replace(rest=rest, play=play), start)
             for name in STARTS:
-                getattr(table, name)[0] = getattr(fits, name)
-        return table
+                getattr(table, name)[0] = getattr(start, name)
+            fits = all(np.array_equal(getattr(start, name), getattr(moved, name)) for name in STARTS)
+        return table, fits
 
-    def _left(self, place: int, start: RestartState | None) -> RestartState | None:
-        """Return the state with which linked scene k begins, which the one before has left."""
-        return start if place == 0 else marked_with_speed(self.scene, self.run.start_in(place))
+    def _left(self, job: Job, place: int, start: RestartState | None) -> RestartState | None:
+        """Return the state with which linked scene k begins: that of the last one before that has left one."""
+        left = int(job.at[LEFT])
+        return start if left == 0 else marked_with_speed(self.scene, self.run.start_in(place, left - 1))
 
     def _linear(self, table: Columns, values: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the amplitudes (k, 2) without bodies and with fixed ones, m."""

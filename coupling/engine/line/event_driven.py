@@ -209,10 +209,10 @@ class EngineRun(EventDrivenRun):
         self.job.at[STAGE] = LEAVES
         self._advance(0, 0)
         self.job.at[STAGE] = RUNS
-        return self.start_in(int(self.job.at[PLACE]))
+        return self.start_in(int(self.job.at[PLACE]), 0)
 
-    def start_in(self, k: int) -> RestartState:
-        """Return the start of scene k in the columns, in the cavities of the scene that has left it."""
+    def start_in(self, k: int, left: int) -> RestartState:
+        """Return the start of scene k in the columns, in the cavities of the scene, by its place, that has left it."""
         parts = [getattr(self.columns, name)[k] for name in STARTS]
-        travels = self.columns.free_travel[max(k - 1, 0), self.system.friction_rows :]
+        travels = self.columns.free_travel[left, self.system.friction_rows :]
         return RestartState(*map(frozen, (*parts, travels)))

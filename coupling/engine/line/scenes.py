@@ -41,8 +41,8 @@ _SLICES = 64
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
 # those left out and the longest run; the code that ends it; slices since Python has seen it; whether a scene begins
-# with the state that the one before has left
-COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SLICES, LINKED = range(9)
+# with the state that the one before has left; the number of the last scene that has left one, from 1, 0: none
+COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SLICES, LINKED, LEFT = range(10)
 #: what comes next with a scene: it begins, goes on, or leaves its state in its columns
 BEGINS, RUNS, LEAVES = range(3)
 
@@ -60,7 +60,7 @@ class Job(NamedTuple):
 
 def new_job(scenes: int = 0, periods: int = 0, linked: bool = False) -> Job:
     """Return the job of many scenes, of at most so many periods; or of one run that the caller judges."""
-    job = room(Job, {"numbers": 9, "k": scenes, "figures": len(FIGURES), "periods": periods})
+    job = room(Job, {"numbers": 10, "k": scenes, "figures": len(FIGURES), "periods": periods})
     job.at[COUNT], job.at[LINKED] = scenes, linked
     return job
 
@@ -101,7 +101,7 @@ def run(
             _set_start(system, st, watched, columns, k)
             if at[COUNT] > 0:
                 _clear(rec, used)
-                if _is_outside(system, st, columns, k, at[LINKED]):
+                if _is_outside(system, st, columns, k, at[LINKED], at[LEFT]):
                     return OUTSIDE
                 begin_transient(setup, loose, held, free, stuck)
                 at[DROPPED], at[GOAL], at[MOST] = run_length(setup, free, stuck)
@@ -128,6 +128,7 @@ def run(
             if at[LINKED]:
                 if code == DONE:
                     _leave(system, flows, st, scratch, columns, k + 1)
+                    at[LEFT] = k + 1
                 else:  # a run that broke off within a period leaves the state that it began with
                     _repeat(columns, k)
             at[PLACE], at[STAGE], at[CODE] = k + 1, BEGINS, DONE
@@ -187,12 +188,18 @@ def _copy(own, other):
 
 
 @kernel
-def _is_outside(system, st, columns, k, linked):
-    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python."""
+def _is_outside(system, st, columns, k, linked, left):
+    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python.
+
+    left: the number of the scene that has left the state of a linked one; as long as there is none, Python says how
+    a scene begins.
+    """
+    if linked and k > 0 and left == 0:
+        return True
     for r in range(system.friction_rows, len(st.state)):
         least = 0.0
         if linked:
-            if k == 0 or (not rigid(system, r) and columns.free_travel[k, r] == columns.free_travel[k - 1, r]):
+            if k == 0 or (not rigid(system, r) and columns.free_travel[k, r] == columns.free_travel[left - 1, r]):
                 continue
             if system.left_body[r] >= 0 or system.right_body[r] >= 0:
                 least = -SIMULTANEOUS * system.free_travel[r]
