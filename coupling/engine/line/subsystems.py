@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
-from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
+from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, NEARLY_EQUAL, SURE, UNFELT, UNSEEN
 from vanedamp.coupling.engine.run import ROOM, places, with_free_place
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
@@ -39,6 +39,7 @@ class Subsystems(NamedTuple):
     sprung: Annotated[np.ndarray, "k", bool]  # whether springs are closed
     damped: Annotated[np.ndarray, "k", bool]  # whether some of them move and have dashpots
     uncoupled: Annotated[np.ndarray, "k", bool]  # whether damping couples no two complex modes
+    coalescing: Annotated[np.ndarray, "k", bool]  # whether some of these nearly coalesce
     carrier: Annotated[np.ndarray, "k b n"]  # functional of each body that moves with the structure
     functional: Annotated[np.ndarray, "k r n"]  # of p in each row
     pull: Annotated[np.ndarray, "k r 2n"]  # acceleration of each row by (p, p'), no row closed
@@ -164,7 +165,7 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
-    push = _times(loads.T, project[:, q:].T).T
+    push, coalescing = _times(loads.T, project[:, q:].T).T, _coalesce(real.frequency, eigenvalue, shape, project)
     shape = np.stack([_times(lift, part) for part in shape.reshape(2, q, m)])
     project = np.stack([_times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
     free = (cluster >= 0) & ~springs.anchored
@@ -175,7 +176,8 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     values |= _round_off(system, carrier, functional, law, sprung, shape, project)
     values |= {
         "closed": key, "held": cluster < 0, "free": free, "sprung": len(sprung) > 0,
-        "uncoupled": system.proportional and not len(closed) and m == n, "carrier": carrier, "functional": functional,
+        "uncoupled": system.proportional and not len(closed) and m == n, "coalescing": coalescing,
+        "carrier": carrier, "functional": functional,
         "static": lift / real.frequency**2 @ loads, "constrained": kept, "body_acceleration": acceleration,
         "coordinates": q, "frequency": real.frequency, "damping": real.damping,
         "mixed": np.count_nonzero(real.damping) > np.count_nonzero(np.diagonal(real.damping)), "lift": lift,
@@ -231,6 +233,13 @@ def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     keep = np.flatnonzero(values.imag >= 0)
     keep = keep[np.argsort(np.abs(values[keep]), kind="stable")]
     return values[keep], vectors[:, keep] * np.where(values[keep].imag > 0, 2.0, 1.0), inverse[keep]
+
+
+def _coalesce(frequency: np.ndarray, eigenvalue: np.ndarray, shape: np.ndarray, project: np.ndarray) -> bool:
+    """Whether some modes nearly coalesce: by the condition of an eigenvalue, lengths by energy."""
+    energy = np.r_[frequency, np.ones(len(frequency))]
+    right, left = np.linalg.norm(shape.T * energy, axis=1), np.linalg.norm(project / energy, axis=1)
+    return bool(np.any(left * right > NEARLY_EQUAL * np.where(eigenvalue.imag > 0, 2.0, 1.0)))
 
 
 def _times(real: np.ndarray, values: np.ndarray) -> np.ndarray:
