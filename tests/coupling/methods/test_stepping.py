@@ -222,7 +222,7 @@ def test_moreau_ledgers_close_with_the_step(periodic):
 @pytest.mark.parametrize("exchange", ["jacobi", "gauss_seidel"])
 @pytest.mark.parametrize("hold", [0, 1])
 def test_the_radius_of_a_macro_step(exchange, hold):
-    """That of the matrix with an exact body; a run that starts off its rest grows by it."""
+    """That of the matrix with an exact body, up to the error of the substeps."""
     for steps in (20, 60, 200):
         tables, stiffness, dashpot = coupled_pair(1.0)
         solver = {"method": "cosim", "exchange": exchange, "hold": hold, "substeps": 400, "steps_per_period": steps}

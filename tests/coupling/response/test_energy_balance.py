@@ -8,6 +8,7 @@ import pytest
 
 from tests.coupling.engine.line.test_traps import cluster
 from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Ended, evaluate, residual
 from vanedamp.coupling.response.figures import FIGURES, contact_gain
@@ -56,7 +57,7 @@ def test_contacts_that_make_energy_end_a_run_and_a_point_of_a_sweep(entry):
         assert evaluate(scene, run.outcome(), Ended(Status.OK, 0), time.perf_counter()).status == status
         figures = np.zeros(len(FIGURES))
         figures[FIGURES.index("contact_gain")] = made
-        assert worker._status(0, figures) == status
+        assert worker._status(codes.DONE, figures) == status
 
 
 @pytest.mark.parametrize("missing", [0.0, 1e-4, np.nan])
