@@ -23,13 +23,12 @@ from vanedamp.coupling.engine.line.tolerances import (
     LIGHT,
     MANY,
     MIXED,
-    NEARLY_EQUAL,
     SETTLED,
     SHIFTS,
     STEPS,
 )
 from vanedamp.coupling.engine.run import IllConditioned
-from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST
+from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST, NEARLY_EQUAL
 
 _EPS = float(np.finfo(float).eps)
 #: complex numbers in a batch of eigenpairs that are polished at once

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from vanedamp.coupling.engine.energy_forms import add_forms, add_segment, free_momentum, turning_back
+from vanedamp.coupling.engine.energy_forms import (
+    add_forms,
+    add_segment,
+    at_point,
+    free_momentum,
+    points_of,
+    turning_back,
+)
 from vanedamp.coupling.engine.line.tolerances import SAMPLE
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, HARMONIC_MAP, MEAN_MAP, MOMENTUM_MAP, PERIOD, WORK_MAP
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
-from vanedamp.coupling.numerics.tolerances import SLOW
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
-
-#: Gauss's rule on [-1, 1]: its error for a product of modes over a time 1/rate is below 1e-17
-_NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
 
 
 @inlined
@@ -119,29 +120,15 @@ def _work_on_bodies(system, flows, st, scratch, s, h, tau):
 
 @kernel
 def _add_losses(system, flows, st, rec, scratch, s, tau):
-    """Add losses and mean square of modes that nearly coalesce, by quadrature.
-
-    Their amplitudes are large and cancel: the state loses few digits by that, forms of its squares twice as many.
-    """
-    n, count, period, fastest = system.modes, st.counters[ACTIVE], st.counters[PERIOD], 0.0
-    amplitude, speed = scratch.wave, scratch.coordinates
-    for j in range(count):
-        fastest = max(fastest, abs(flows.eigenvalue[s, j]))
-    pieces = max(math.ceil(tau * fastest), 1)
-    width, rule = tau / pieces, len(_NODES)
-    for i in range(pieces * rule):
-        _grow(flows, st, s, (i // rule + 0.5 + 0.5 * _NODES[i % rule]) * width, count, amplitude)
-        weight, x, calm = 0.5 * width * _WEIGHTS[i % rule], 0.0, 0.0
-        for j in range(count):
-            part = (flows.response[s, j] * amplitude[j]).real
-            x += part
-            # its square is in energy_forms
-            calm += part if 2.0 * abs(flows.eigenvalue[s, j]) * system.period < SLOW else 0.0
-        rec.square[period] += weight * (x * x - calm * calm)
+    """Add losses and mean square of modes that nearly coalesce, which have no forms (energy_forms.at_point)."""
+    n, count, speed = system.modes, st.counters[ACTIVE], scratch.coordinates
+    points = points_of(flows, st, s, tau)
+    for i in range(points):
+        weight = at_point(system, flows, st, rec, scratch, s, tau, i, points)
         for k in range(n):
             speed[k] = 0.0
             for j in range(count):
-                speed[k] += (flows.shape[s, j, n + k] * amplitude[j]).real
+                speed[k] += (flows.shape[s, j, n + k] * scratch.wave[j]).real
         for k in range(n):
             for l in range(n):
                 st.ledger[VISCOUS] += weight * system.damping[k, l] * speed[k] * speed[l]
@@ -149,19 +136,8 @@ def _add_losses(system, flows, st, rec, scratch, s, tau):
             if flows.active_set[s, r] and system.dashpot[r] > 0.0:
                 rate = 0.0
                 for j in range(count):
-                    rate += (flows.velocity[s, r, j] * amplitude[j]).real
+                    rate += (flows.velocity[s, r, j] * scratch.wave[j]).real
                 st.ledger[CONTACT] += weight * system.dashpot[r] * rate * rate
-
-
-@inlined
-def _grow(flows, st, s, t, count, amplitude):
-    """Set the amplitudes of the active modes at a time of the segment."""
-    for j in range(count):
-        amplitude[j] = st.amplitude[j] * (1.0 + exp_minus_one(flows.eigenvalue[s, j] * t))
-    for h in range(flows.driven.shape[1] - 1):
-        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
-            growth, _ = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
-            amplitude[j] += flows.load[s, j] * st.amplitude[h] * growth
 
 
 @kernel

@@ -16,8 +16,9 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.engine.antiderivatives import coalesce
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
-from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, NEARLY_EQUAL, SURE, UNFELT, UNSEEN
+from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
 from vanedamp.coupling.engine.run import ROOM, places, with_free_place
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
@@ -165,7 +166,7 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
-    push, coalescing = _times(loads.T, project[:, q:].T).T, _coalesce(real.frequency, eigenvalue, shape, project)
+    push, coalescing = _times(loads.T, project[:, q:].T).T, coalesce(eigenvalue, shape, project)
     shape = np.stack([_times(lift, part) for part in shape.reshape(2, q, m)])
     project = np.stack([_times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
     free = (cluster >= 0) & ~springs.anchored
@@ -233,13 +234,6 @@ def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     keep = np.flatnonzero(values.imag >= 0)
     keep = keep[np.argsort(np.abs(values[keep]), kind="stable")]
     return values[keep], vectors[:, keep] * np.where(values[keep].imag > 0, 2.0, 1.0), inverse[keep]
-
-
-def _coalesce(frequency: np.ndarray, eigenvalue: np.ndarray, shape: np.ndarray, project: np.ndarray) -> bool:
-    """Whether some modes nearly coalesce: by the condition of an eigenvalue, lengths by energy."""
-    energy = np.r_[frequency, np.ones(len(frequency))]
-    right, left = np.linalg.norm(shape.T * energy, axis=1), np.linalg.norm(project / energy, axis=1)
-    return bool(np.any(left * right > NEARLY_EQUAL * np.where(eigenvalue.imag > 0, 2.0, 1.0)))
 
 
 def _times(real: np.ndarray, values: np.ndarray) -> np.ndarray:
