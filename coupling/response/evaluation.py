@@ -39,8 +39,8 @@ from vanedamp.coupling.system.transient import Transient
 
 #: periods between two checks of whether the response is steady
 _CHUNK = 100
-#: energy that contacts may have made by round-off, relative to the energy that flowed (figures.contact_gain)
-_MADE = 1e-8
+#: energy that impacts or contacts may have made by round-off, relative to the energy that flowed (figures.contact_gain)
+_MADE = 1e-9
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -248,7 +248,7 @@ def _friction(scene: Scene, run: Outcome, row: int) -> float:
 
 
 def closed_status(status: Status, imbalance: float, gain: float, bound: float) -> Status:
-    """Return the status of a run by its energies, too: their imbalance, and what contacts made (figures)."""
+    """Return the status of a run by its energies, too: their imbalance, and what impacts and contacts have made."""
     closed = imbalance <= bound and gain <= _MADE
     return Status.ENERGY if not closed and status in _USABLE else status
 

@@ -11,7 +11,7 @@ from vanedamp.coupling.numerics.compiler.function_address import quantile_addres
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.response.at_rest import at_rest
-from vanedamp.coupling.response.records import CONTACT, ENERGIES, EXCITATION, FRICTION, STORED, VISCOUS
+from vanedamp.coupling.response.records import CONTACT, ENERGIES, EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS
 from vanedamp.coupling.response.static_deflection import distance, static_deflection
 from vanedamp.coupling.response.steady_state import confidence_of
 from vanedamp.coupling.scene.scene import Scene
@@ -164,12 +164,12 @@ def imbalance(ledger, parts, done, exchanged):
 
 @strict_entry
 def contact_gain(ledger, parts, first, done, exchanged):
-    """Return the energy that friction, impacts or contacts have made, relative to the energy that flowed (_flow).
+    """Return the energy that impacts or contacts have made, relative to the energy that flowed (_flow).
 
-    The largest of the three, up to period `done`, from the start of the run or from `first` on; 0: they only took some.
+    The larger of the two, up to period `done`, from the start of the run or from `first` on; 0: they only took some.
     """
     made = 0.0
-    for entry in range(FRICTION, CONTACT + 1):
+    for entry in (IMPACT_LOSS, CONTACT):
         made = max(made, max(ledger[0, entry], ledger[first, entry]) - ledger[done, entry])
     flowed = _flow(ledger, parts, done, exchanged)
     return 0.0 if flowed == 0.0 else made / flowed
