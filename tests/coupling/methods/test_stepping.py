@@ -235,7 +235,7 @@ def test_the_radius_of_a_macro_step(exchange, hold):
 
 @pytest.mark.parametrize(("exchange", "hold"), [("jacobi", 0), ("gauss_seidel", 0), ("gauss_seidel", 1)])
 def test_a_contact_that_makes_energy_is_not_ok(exchange, hold):
-    """Whatever the residual: an elastic contact by a co-simulation a little beyond its limit, which its warning tells."""
+    """Whatever the residual: an elastic contact by a co-simulation beyond its limit, of which its warning tells."""
     data = pressed_body(0.4, contact_stiffness(0.4) / 4, restitution=1.0)
     solver = {"method": "cosim", "exchange": exchange, "hold": hold, "steps_per_period": 250}
     structure, span = data["structure"] | {"damping": DAMPING}, {"periods": 2, "transient": 0}
