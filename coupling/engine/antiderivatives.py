@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
-from vanedamp.coupling.numerics.tolerances import SLOW
+from vanedamp.coupling.numerics.tolerances import NEARLY_EQUAL, SLOW
 
 #: products (..., m, m) of a form: of the amplitudes of two modes, and of one with the conjugate of the other
 Products = tuple[np.ndarray, np.ndarray]
@@ -24,6 +24,17 @@ def products(left: np.ndarray, right: np.ndarray) -> Products:
     """Return the products of two signals (..., k, m), summed over k: symmetric, and Hermitian."""
     both, mixed = left.swapaxes(-2, -1) @ right, left.swapaxes(-2, -1) @ right.conj()
     return 0.5 * (both + both.swapaxes(-2, -1)), 0.5 * (mixed + mixed.conj().swapaxes(-2, -1))
+
+
+def coalesce(rate: np.ndarray, vectors: np.ndarray, inverse: np.ndarray) -> bool:
+    """Return whether some modes nearly coalesce, by the condition of each eigenvalue (m,), lengths by energy.
+
+    vectors (2q, m) and their inverse (m, 2q), of pairs one of them, twice: on coordinates and rates of unit mass.
+    """
+    energy = np.ones((len(vectors), len(rate)))
+    energy[: len(vectors) // 2] = np.abs(rate)
+    size = np.linalg.norm(vectors * energy, axis=0) * np.linalg.norm(inverse.T / energy, axis=0)
+    return bool(np.any(size > NEARLY_EQUAL * np.where(rate.imag > 0, 2, 1)))
 
 
 def fill_forms(

@@ -7,21 +7,30 @@ imaginary parts.
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from vanedamp.coupling.engine.peaks import highest
 from vanedamp.coupling.numerics.codes import (
+    ACTIVE,
     CALM,
     DIFFERENCE,
     FREE_MOMENTUM_MAP,
     HARMONIC_MAP,
     MEAN_MAP,
     MOMENTUM_MAP,
+    PERIOD,
     SINGLE,
     WORK_MAP,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
-from vanedamp.coupling.numerics.tolerances import LAST_TERM
+from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular
+from vanedamp.coupling.numerics.tolerances import LAST_TERM, SLOW
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
 
+#: Gauss's rule on [-1, 1]: its error for a product of modes over a time 1/rate is below 1e-17
+_NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
 #: terms of the series for products with driven modes: the remainder is below 1e-16
 _TERMS = 11
 
@@ -268,3 +277,37 @@ def _driven_integral(c, decay, drive, other, other_decay, other_drive):
         if n > 2 and abs(product.real) + abs(product.imag) <= LAST_TERM * (abs(total.real) + abs(total.imag)):
             break
     return total
+
+
+@kernel
+def points_of(flows, st, s, tau):
+    """Return at how many points of the segment modes that nearly coalesce are integrated."""
+    fastest = 0.0
+    for j in range(st.counters[ACTIVE]):
+        fastest = max(fastest, abs(flows.eigenvalue[s, j]))
+    return len(_NODES) * max(math.ceil(tau * fastest), 1)
+
+
+@kernel
+def at_point(system, flows, st, rec, scratch, s, tau, i, points):
+    """Set the amplitudes (scratch.wave) at point i of the segment, and add its squared response. Return its weight.
+
+    Amplitudes of modes that nearly coalesce are large and cancel: states lose their digits once by that, forms of
+    amplitudes twice.
+    """
+    rule, count, value, x, calm = len(_NODES), st.counters[ACTIVE], scratch.wave, 0.0, 0.0
+    width = tau * rule / points
+    t, weight = (i // rule + 0.5 + 0.5 * _NODES[i % rule]) * width, 0.5 * width * _WEIGHTS[i % rule]
+    for j in range(count):
+        value[j] = st.amplitude[j] * (1.0 + exp_minus_one(flows.eigenvalue[s, j] * t))
+    for h in range(flows.driven.shape[1] - 1):
+        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
+            growth, _ = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
+            value[j] += flows.load[s, j] * st.amplitude[h] * growth
+    for j in range(count):
+        part = (flows.response[s, j] * value[j]).real
+        x += part
+        # add_segment has the square of calm modes
+        calm += part if 2.0 * abs(flows.eigenvalue[s, j]) * system.period < SLOW else 0.0
+    rec.square[st.counters[PERIOD]] += weight * (x * x - calm * calm)
+    return weight

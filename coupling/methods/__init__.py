@@ -46,7 +46,8 @@ class Method(Protocol):
 
     A method that takes bodies in the plane has PLANAR_LAWS: what it accepts there apart from rigid contacts of one
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
-    sentence that every run of such bodies with friction carries.
+    sentence that every run of such bodies with friction carries, and run_warnings, which yields sentences that every
+    run of a scene without open choices carries.
     """
 
     Options: type[SolverOptions]

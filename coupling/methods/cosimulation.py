@@ -9,6 +9,8 @@ Gomes and others, Co-simulation: a survey (2018).
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -17,7 +19,13 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, penalty_laws, set_forces
+from vanedamp.coupling.methods.penalty_forces import (
+    PenaltyLaws,
+    PenaltyOptions,
+    first_forces,
+    penalty_laws,
+    set_forces,
+)
 from vanedamp.coupling.methods.step_records import close_step, copy, open_step, set_gaps
 from vanedamp.coupling.methods.time_stepping import SteppedRun, TimeGrid, loads_at, start, time_grid
 from vanedamp.coupling.numerics.codes import DONE, STEPS
@@ -26,15 +34,18 @@ from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import LEFT, RIGHT, System, on_structure
 from vanedamp.coupling.system.unit_kinematics import row_speed
-from vanedamp.files.toml_input import Whole
+from vanedamp.files.toml_input import InputError, Whole
 
 VARIANTS = (
     Variant("co-simulation, Jacobi, hold 0", "#7e22ce", "v", {"exchange": "jacobi", "hold": 0}),
     Variant("co-simulation, Gauss-Seidel, hold 1", "#be185d", "<", {"exchange": "gauss_seidel", "hold": 1}),
 )
 WAVEFORMS = True
+#: by how much the spectral radius of a stable macro-step may exceed 1, as that of a body without a force does
+_UNSTABLE = 1e-9
 
 
 class Options(PenaltyOptions):
@@ -70,6 +81,69 @@ def begin(scene: Scene, system: System, records: Records, events: bool, begun: R
         options.exchange == "gauss_seidel", options.hold, options.substeps,
     )  # fmt: skip
     return SteppedRun(system, march, motion, records, events, options)
+
+
+def run_warnings(scene: Scene) -> Iterator[str]:
+    """Yield a warning if the macro-step is unstable while contacts are closed; of a scene that cannot run none."""
+    largest = ("", 0.0)
+    with contextlib.suppress(InputError):
+        largest = max(macro_step_radii(scene), key=lambda found: found[1], default=largest)
+    if largest[1] > 1.0 + _UNSTABLE:
+        yield (
+            f"solver.steps_per_period: the macro-step is unstable while {largest[0]} are closed: it multiplies errors "
+            f"by {largest[1]:.6g}; take more steps per period, or a smaller contact_stiffness"
+        )
+
+
+def macro_step_radii(scene: Scene) -> list[tuple[str, float]]:
+    """Return sets of closed contacts and the spectral radius of the linear macro-step with each, without friction.
+
+    inf: beyond doubles. Raises InputError as `begin`.
+    """
+    options: Any = scene.solver
+    system = on_structure(assemble(scene))
+    times = time_grid(scene, system, options.steps_per_period)
+    laws, sides = penalty_laws(system, times.step, options), system.surface[: system.contacts]
+    matrix, found = cosimulation_matrices(scene, system, times)[0], []
+    for name, left_out in (("all contacts but those at right walls", RIGHT), ("all but those at left walls", LEFT)):
+        closed = np.flatnonzero(sides != left_out)
+        if len(closed):
+            with np.errstate(over="ignore", invalid="ignore"):
+                step = linear_macro_step(system, laws, times.step, matrix, closed, options)
+            finite = bool(np.isfinite(step).all())
+            found.append((name, float(np.abs(np.linalg.eigvals(step)).max()) if finite else np.inf))
+    return found
+
+
+def linear_macro_step(
+    system: System, laws: PenaltyLaws, h: float, matrix: np.ndarray, closed: np.ndarray, options: Any
+) -> np.ndarray:
+    """Return the matrix of a macro-step (s, s) with some contacts (c,) closed and no others; s = 3 n + 2 b + 3 c.
+
+    State: p, p' and p' a macro-step ago, the bodies' x and its rate half a step later, forces now and mean forces of
+    the last two macro-steps.
+    """
+    n, b, c = system.modes, system.bodies, len(closed)
+    on_structure, on_bodies = system.J[closed, :n], system.J[np.ix_(closed, system.along)]
+    state = np.eye(3 * n + 2 * b + 3 * c)
+    p, rate, before, x, half, force, mean, older = np.split(state, np.cumsum([n, n, n, b, b, c, c]))
+    slope, small = options.hold * (mean - older) / h, h / options.substeps
+    loads = on_structure.T @ np.vstack([mean + 0.5 * h * slope, slope]).reshape(2, c, -1)
+    moved, rate_then = np.split(matrix @ np.vstack([p, rate, *loads]), 2)
+    ahead, impulse = options.exchange == "gauss_seidel", np.zeros_like(force)
+    speed = (moved - p) / h if ahead and not options.hold else rate
+    bend = options.hold * (rate_then - rate if ahead else rate - before) / h
+    wall, speed, bend = (on_structure @ part for part in (p, speed, bend))
+    for k in range(1, options.substeps + 1):
+        x = x + small * half
+        place, pace = wall + k * small * (speed + 0.5 * k * small * bend), speed + k * small * bend
+        last = force
+        force = -laws.spring[closed, None] * (place + on_bodies @ x) - laws.dashpot[closed, None] * (
+            pace + on_bodies @ half
+        )
+        impulse += 0.5 * small * (last + force)
+        half = half + small * (on_bodies.T @ force) / system.mass[system.along, None]
+    return np.vstack([moved, rate_then, rate, x, half, force, impulse / h, mean])
 
 
 def cosimulation_matrices(scene: Scene, system: System, times: TimeGrid) -> tuple[np.ndarray, np.ndarray]:

@@ -90,7 +90,7 @@ def _impact_exponent(scene: Scene) -> float | None:
 
 
 def _check_bodies(scene: Scene, system: System) -> None:
-    """Raise InputError for bodies in the plane, or a contact law of theirs, that a method does not take."""
+    """Raise InputError for planar bodies, or a contact law, that a method does not take."""
     if scene.repeats:
         raise InputError("structure: sectors of the ring are still to be written out; model_order.choices.choose does")
     for number, damper in enumerate(scene.damper):
@@ -100,21 +100,21 @@ def _check_bodies(scene: Scene, system: System) -> None:
         return
     taken = {name: set(part.PLANAR_LAWS) for name, part in METHODS.all().items() if hasattr(part, "PLANAR_LAWS")}
     law, name = scene.contact, scene.solver.method
-    if name not in taken:
-        raise InputError(
-            f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
-            f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(taken)}'
-        )
     asked = {"yields": scene.yields, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
-    if not wanted <= taken[name]:
-        able = [other for other, known in taken.items() if wanted <= known]
-        tables = [table for table, _, element in scene.elements if element.yields and law.rigid]
-        source = f"{tables[0]}: springs" if tables else f'contact.law: "{law.law}"'
+    able = [other for other, known in taken.items() if wanted <= known]
+    if name in able:
+        return
+    methods = f"for solver.method {' or '.join(able)}, not {name}"
+    if law.two_phases:
+        raise InputError(f'contact.law: impacts of two phases, of "{law.law}", are {methods}, for any bodies')
+    if name not in taken:
         raise InputError(
-            f"{source} of bodies with extent, stiffness or dashpot, and of impacts in two phases, is "
-            f"for solver.method {' or '.join(able)}, not {name}"
+            f"solver.method: {name} takes sliders only; planar bodies and those with stiffness or dashpot are {methods}"
         )
+    tables = [table for table, _, element in scene.elements if element.yields and law.rigid]
+    source = f"{tables[0]}: springs" if tables else f'contact.law: "{law.law}"'
+    raise InputError(f"{source} of planar bodies, and of those with stiffness or dashpot, is {methods}")
 
 
 def why_no_restart(scene: Scene) -> str | None:

@@ -181,16 +181,19 @@ def _record_response(system, times, motion, records, k):
 def _account_forces(system, motion, h, hit):
     """Enter what the forces of the rows take. hit: whether rigid contacts that approached have pushed in this step.
 
-    What contacts take is then an impact's loss.
+    What contacts take is then an impact's loss. Impulses of rigid contacts work at the mean of the speeds before and
+    after, springs and friction elements along the step's displacement: both differ for theta above 1/2.
     """
     u = len(system.rest)
     for a in range(len(motion.live)):
         row = motion.live[a]
         if motion.impulse[row] != 0.0:
-            moved, unit = 0.0, row - u if row >= u else row
+            mean, unit = 0.0, row - u if row >= u else row
+            rigid = unit < system.contacts and motion.spring[unit] == 0.0
             for i in range(len(motion.q)):
-                moved += system.J[row, i] * (motion.q[i] - motion.start[0, i])
-            loss = -motion.impulse[row] / h * moved
+                moved = (motion.q[i] - motion.start[0, i]) / h
+                mean += system.J[row, i] * (0.5 * (motion.start[1, i] + motion.v[i]) if rigid else moved)
+            loss = -motion.impulse[row] * mean
             if row == unit:
                 entry = CONTACT if motion.spring[unit] > 0.0 else IMPACT_LOSS
             else:

@@ -139,10 +139,12 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """Return the warnings of a scene without open choices: of method, impact laws on several modes, loads, ranges."""
     rubs = any(damper.form.planar and damper.friction > 0.0 for damper in scene.damper)
-    warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
+    method = METHODS.part(scene.solver.method)
+    warning = getattr(method, "RUBBING_WARNING", None) if rubs else None
     ranges = ", ".join(scene.ranges)
     return (
         *([] if warning is None else [f"solver.method: {warning}"]),
+        *getattr(method, "run_warnings", lambda _: ())(scene),
         *([f"ranges: {ranges}: the scene's own numbers are taken; vanedamp.ensemble samples ranges"] if ranges else []),
         *_of_rotation(scene),
         *_of_impact_laws(scene),

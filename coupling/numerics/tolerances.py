@@ -34,6 +34,9 @@ COLLAPSE = 1e-13
 #: largest condition number of complex modes, whose vectors are scaled to their energy: beyond, two of them are equal
 #: within round-off, and the linear problem is rejected
 DEFECTIVE = 1e7
+#: condition number of such modes, or of one eigenvalue, beyond which some nearly coalesce: forms of amplitudes lose its
+#: square in digits, states itself
+NEARLY_EQUAL = 1e2
 #: largest relative residual of an eigenpair, and largest relative error of a state that is split into modes and summed
 LOST = 1e-9
 

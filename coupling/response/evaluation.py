@@ -39,6 +39,8 @@ from vanedamp.coupling.system.transient import Transient
 
 #: periods between two checks of whether the response is steady
 _CHUNK = 100
+#: energy that impacts or contacts may have made by round-off, relative to the energy that flowed (figures.contact_gain)
+_MADE = 1e-9
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -183,11 +185,13 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
     row = np.empty(len(FIGURES))
     confidence = np.nan if ended.confidence is None else ended.confidence
     kind = measure(measured_of(scene, system), records, first, done, confidence, row)
+    if status is Status.DIVERGED:  # numbers up to the largest double, of no meaning
+        row[[name != "impacts_per_period" for name in FIGURES]] = np.nan
     figures: dict[str, Any] = dict(zip(FIGURES, row.tolist(), strict=True))
     energy = {name: figures.pop(name) for name in ENERGIES}
     for name in ("amplitude_mean_confidence", "attached_mass_fraction"):
         figures[name] = None if np.isnan(figures[name]) else figures[name]
-    status = closed_status(status, figures["energy_residual"], run.open_ledger)
+    status = closed_status(status, figures["energy_residual"], figures.pop("contact_gain"), run.open_ledger)
     extent: dict[str, Any] = {}
     if run.plane is not None:
         extent, tilted = _in_plane(run.plane, slice(first, done), max(done - first, 1) * system.period)
@@ -243,9 +247,10 @@ def _friction(scene: Scene, run: Outcome, row: int) -> float:
     return scene.damper[number].friction if side == "floor" else 0.0
 
 
-def closed_status(status: Status, imbalance: float, bound: float) -> Status:
-    """Return the status of a run by the imbalance of its energies, too."""
-    return Status.ENERGY if not imbalance <= bound and status in _USABLE else status
+def closed_status(status: Status, imbalance: float, gain: float, bound: float) -> Status:
+    """Return the status of a run by its energies, too: their imbalance, and what impacts and contacts have made."""
+    closed = imbalance <= bound and gain <= _MADE
+    return Status.ENERGY if not closed and status in _USABLE else status
 
 
 def _series(system: System, records: Records, done: int) -> dict[str, Any]:

@@ -11,21 +11,22 @@ from vanedamp.coupling.numerics.compiler.function_address import quantile_addres
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.response.at_rest import at_rest
-from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, STORED, VISCOUS
+from vanedamp.coupling.response.records import CONTACT, ENERGIES, EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS
 from vanedamp.coupling.response.static_deflection import distance, static_deflection
 from vanedamp.coupling.response.steady_state import confidence_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
-#: the row of figures of a run: fields of a Response (nan: not known), its energies behind them
+#: the row of figures of a run: fields of a Response (nan: not known), contact_gain and its energies behind them
 FIGURES = (
     "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "static_deflection", "amplitude_max_dynamic",
     "amplitude_mean_dynamic", "amplitude_rms", "amplitude_harmonic", "phase", "impacts_per_period", "energy_residual",
-    "attached_mass_fraction", *ENERGIES,
+    "attached_mass_fraction", "contact_gain", *ENERGIES,
 )  # fmt: skip
 (
-    MAX, MEAN, CONFIDENCE, STATIC, MAX_DYNAMIC, MEAN_DYNAMIC, RMS, HARMONIC, PHASE, IMPACTS, RESIDUAL, ATTACHED, ENERGY,
-) = range(13)  # fmt: skip
+    MAX, MEAN, CONFIDENCE, STATIC, MAX_DYNAMIC, MEAN_DYNAMIC, RMS, HARMONIC, PHASE, IMPACTS, RESIDUAL, ATTACHED, GAIN,
+    ENERGY,
+) = range(14)  # fmt: skip
 #: classes of motion: the number of excitation periods after which it repeats, or
 NON_PERIODIC, NO_CONTACT, STUCK = 0, -1, -2
 
@@ -119,6 +120,7 @@ def measure(measured, records, first, done, confidence, figures):
     for i in range(done + 1):
         exchanged = max(exchanged, records.collided[i])
     figures[RESIDUAL] = imbalance(records.ledger, records.parts, done, exchanged)
+    figures[GAIN] = contact_gain(records.ledger, records.parts, first, done, exchanged)
     change = records.section[done, 2] - records.section[first, 2]
     figures[ATTACHED] = _attached(measured, change, momentum, harmonic, count, span)
     _set_scale(measured, records.section, first, done)
@@ -152,16 +154,36 @@ def repetition(section, first, done, scale):
 
 @strict_entry
 def imbalance(ledger, parts, done, exchanged):
-    """Return the imbalance of the energies of the periods up to `done`, relative to the energy that flowed.
-
-    That flow is the largest term, with stored energy by its parts (periods + 1, 1 + b): energy that moves with a heavy
-    body, and no further, is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy
-    always counts: below it the imbalance would measure the round-off of energy that only moves with a body.
-    """
-    flowed, swing, most = exchanged, 0.0, 0.0
+    """Return the imbalance of the energies of the periods up to `done`, relative to the energy that flowed (_flow)."""
+    flowed = _flow(ledger, parts, done, exchanged)
     open_by = ledger[done, EXCITATION] - ledger[0, EXCITATION]
     for entry in range(VISCOUS, ledger.shape[1]):
         open_by -= ledger[done, entry] - ledger[0, entry]
+    return 0.0 if flowed == 0.0 else abs(open_by) / flowed
+
+
+@strict_entry
+def contact_gain(ledger, parts, first, done, exchanged):
+    """Return the energy that impacts or contacts have made, relative to the energy that flowed (_flow).
+
+    The larger of the two, up to period `done`, from the start of the run or from `first` on; 0: they only took some.
+    """
+    made = 0.0
+    for entry in (IMPACT_LOSS, CONTACT):
+        made = max(made, max(ledger[0, entry], ledger[first, entry]) - ledger[done, entry])
+    flowed = _flow(ledger, parts, done, exchanged)
+    return 0.0 if flowed == 0.0 else made / flowed
+
+
+@strict
+def _flow(ledger, parts, done, exchanged):
+    """Return the energy that flowed up to `done`, J.
+
+    The largest term, with stored energy by its parts (periods + 1, 1 + b): energy that moves with a heavy body, and no
+    further, is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy always
+    counts: below it the imbalance would measure the round-off of energy that only moves with a body.
+    """
+    flowed, swing, most = exchanged, 0.0, 0.0
     for part in range(parts.shape[1]):
         low, high = parts[0, part], parts[0, part]
         for i in range(1, done + 1):
@@ -174,8 +196,7 @@ def imbalance(ledger, parts, done, exchanged):
         most = max(most, stored)
         for entry in range(STORED):
             flowed = max(flowed, abs(ledger[i, entry] - ledger[0, entry]))
-    flowed = max(flowed, swing, _CARRIED * most)
-    return 0.0 if flowed == 0.0 else abs(open_by) / flowed
+    return max(flowed, swing, _CARRIED * most)
 
 
 @strict_entry

@@ -42,11 +42,12 @@ class Status(StrEnum):
     PENETRATION = "penetration"
     """a body is deeper in a wall than `solver.penetration` allows: an impact was missed, or the steps are too long"""
     DIVERGED = "diverged"
-    """the motion grew beyond all bounds"""
+    """the motion grew beyond all bounds; amplitudes and energies are nan"""
     TILTED = "tilt_too_large"
     """bodies tilt so far that what small tilts neglect exceeds `solver.linearisation`"""
     ENERGY = "energy_not_balanced"
-    """the ledger of energy is open by more than the method's bound: the figures are not to be used"""
+    """the ledger of energy is open by more than the method's bound, or impacts or contacts have made energy: the
+    figures are not to be used"""
     NOT_STEADY = "not_steady"
     """no end of the transient in sight, or `time.transient` is too short for it; the figures are those of the periods
     evaluated"""

@@ -135,7 +135,8 @@ def _rows(figures: np.ndarray, linear: np.ndarray) -> np.ndarray:
 
 
 def _status(code: int, figures: np.ndarray) -> Status:
-    return closed_status(STATUS_OF[code], figures[FIGURES.index("energy_residual")], OPEN_LEDGER)
+    residual, gain = (figures[FIGURES.index(name)] for name in ("energy_residual", "contact_gain"))
+    return closed_status(STATUS_OF[code], residual, gain, OPEN_LEDGER)
 
 
 def parts_of(base: Scene) -> dict[str, slice]:

@@ -19,8 +19,9 @@ from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
-from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
+from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual
 from vanedamp.coupling.response.event_log import named_bodies
+from vanedamp.coupling.response.figures import contact_gain
 from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import at_speed_of, start_of
@@ -244,9 +245,9 @@ class _Run:
         p, course, status = self.done, self.course, self.status
         exchanged = exchanged_energy(self.system, self.collided)
         balance = residual(self.ledger[: p + 1], self.parts[: p + 1], exchanged)
-        if status is Status.OK and not balance <= self.open_ledger:
-            status = Status.ENERGY
-        elif status is Status.OK and self.tilted:
+        gain = contact_gain(self.ledger, self.parts, 0, p, exchanged)
+        status = closed_status(status, balance, gain, self.open_ledger)
+        if status is Status.OK and self.tilted:
             status = Status.TILTED
         change = self.ledger[p] - self.ledger[0]
         works = *change[:STORED], self.rotation, change[STORED] + self.rotation

@@ -23,13 +23,12 @@ from vanedamp.coupling.engine.line.tolerances import (
     LIGHT,
     MANY,
     MIXED,
-    NEARLY_EQUAL,
     SETTLED,
     SHIFTS,
     STEPS,
 )
 from vanedamp.coupling.engine.run import IllConditioned
-from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST
+from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST, NEARLY_EQUAL
 
 _EPS = float(np.finfo(float).eps)
 #: complex numbers in a batch of eigenpairs that are polished at once
@@ -162,8 +161,9 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     """Return the modes that damping does not couple: oscillators of one degree of freedom."""
     half = np.diag(damping) / 2
     root = np.sqrt(((half - w) * (half + w)).astype(complex))
-    if np.any(np.abs(root) * DEFECTIVE < w):
-        raise IllConditioned("a mode is critically damped to round-off")
+    critical = np.abs(root) * DEFECTIVE < w
+    if np.any(critical):
+        raise _critical(w[critical][0])
     first = -half - root
     # the slow one of two real eigenvalues would cancel
     second, eye = np.where(root.imag == 0, w**2 / first, first.conj()), np.eye(len(w))
@@ -171,6 +171,11 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     part = np.diag(1 / (first - second))
     left = np.block([[-second * part, part], [first * part, -part]])
     return np.r_[first, second], np.vstack([eye, eye]), left
+
+
+def _critical(rate: float) -> IllConditioned:
+    """Return the error of a mode with this modulus of its eigenvalue, 1/s."""
+    return IllConditioned(f"the mode of {rate / (2 * np.pi):.6g} Hz is critically damped to round-off")
 
 
 def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -226,18 +231,20 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     if not np.all(values):
         raise IllConditioned("a slow mode is lost")
     shapes = np.where(np.abs(values) > w[:, None], vectors[1::2] / values, vectors[::2] / w[:, None]).T
+    complex_before = values.imag > 0
     batches = np.array_split(np.arange(len(values)), 1 + len(values) * k * k // _BATCH)
     polished = [_polish(values[batch], shapes[batch], w, damping) for batch in batches]
     values, shapes = (np.concatenate(part) for part in zip(*polished, strict=True))
     pairs = values.imag > 0
     if len(values) + np.count_nonzero(pairs) != 2 * k:  # a pair has become one real value
-        raise IllConditioned("a mode is critically damped to round-off")
+        raise _critical(np.abs(values[~pairs & complex_before])[0])
     values, shapes = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
     right = np.hstack([shapes, shapes * values[:, None]])
     length = np.linalg.norm(right * np.r_[w, np.ones(k)], axis=1)  # energy
     condition = np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None])
     if not condition < DEFECTIVE:
-        raise IllConditioned("a mode is critically damped to round-off")
+        apart = np.abs(values[:, None] - values) / np.abs(values) + np.diag(np.full(2 * k, np.inf))
+        raise _critical(np.abs(values)[apart.min(axis=0).argmin()])
     # left vectors follow from symmetry, up to combinations of those with the same eigenvalue
     left, norm = _left(values, shapes, w)
     length *= np.linalg.norm(left / np.r_[w, np.ones(k)], axis=1)

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.energy_forms import add_forms, add_segment, free_momentum, turning_back
+from vanedamp.coupling.engine.energy_forms import (
+    add_forms,
+    add_segment,
+    at_point,
+    free_momentum,
+    points_of,
+    turning_back,
+)
 from vanedamp.coupling.engine.line.tolerances import SAMPLE
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, HARMONIC_MAP, MEAN_MAP, MOMENTUM_MAP, PERIOD, WORK_MAP
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
@@ -19,6 +26,8 @@ def account(system, flows, st, rec, scratch, tau):
     if system.bodies > 0:
         _free_bodies(system, flows, st, rec, scratch, s, period, tau)
     add_segment(system, flows, st, rec, scratch, s, period, tau, constant, 1.0)
+    if flows.coalescing[s]:
+        _add_losses(system, flows, st, rec, scratch, s, tau)
     if rec.samples.shape[0] > 0:
         _sample(system, flows, st, rec, s, tau, constant)
 
@@ -107,6 +116,28 @@ def _work_on_bodies(system, flows, st, scratch, s, h, tau):
                 own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
             speed += load * own
     return turning_back(speed, drift, rate, scratch.gain[h], scratch.bend[h], tau).real
+
+
+@kernel
+def _add_losses(system, flows, st, rec, scratch, s, tau):
+    """Add losses and mean square of modes that nearly coalesce, which have no forms (energy_forms.at_point)."""
+    n, count, speed = system.modes, st.counters[ACTIVE], scratch.coordinates
+    points = points_of(flows, st, s, tau)
+    for i in range(points):
+        weight = at_point(system, flows, st, rec, scratch, s, tau, i, points)
+        for k in range(n):
+            speed[k] = 0.0
+            for j in range(count):
+                speed[k] += (flows.shape[s, j, n + k] * scratch.wave[j]).real
+        for k in range(n):
+            for l in range(n):
+                st.ledger[VISCOUS] += weight * system.damping[k, l] * speed[k] * speed[l]
+        for r in range(len(system.dashpot)):
+            if flows.active_set[s, r] and system.dashpot[r] > 0.0:
+                rate = 0.0
+                for j in range(count):
+                    rate += (flows.velocity[s, r, j] * scratch.wave[j]).real
+                st.ledger[CONTACT] += weight * system.dashpot[r] * rate * rate
 
 
 @kernel

@@ -393,7 +393,7 @@ def _set_forces(system, subsystems, k, flows, s, h, scratch):
 @kernel
 def _take_constants(system, subsystems, k, flows, s):
     """Set what the excitation does not change."""
-    n, b = system.modes, system.bodies
+    n, b, flows.coalescing[s] = system.modes, system.bodies, subsystems.coalescing[k]
     flows.sprung[s], flows.damped[s], flows.uncoupled[s], flows.tied[s] = (
         subsystems.sprung[k], subsystems.damped[k], subsystems.uncoupled[k], subsystems.tied[k]
     )  # fmt: skip

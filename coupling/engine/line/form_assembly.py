@@ -49,6 +49,8 @@ def set_energies(system, flows, s, m, scratch):
                     _take_factor(flows.velocity[s, r], system.dashpot[r], width, m, scratch)
                     width += 1
         _set_form(flows, s, m, scratch, form, slow, pairs)
+        if flows.coalescing[s]:  # line.energy_balance integrates by quadrature
+            form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
         for r in range(rows if jumps else 0):
             _kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
     flows.slow_count[s] = _list_single(flows, s, m, system.period, pairs)

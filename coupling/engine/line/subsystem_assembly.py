@@ -92,6 +92,7 @@ class Flows(NamedTuple):
     kick_maps: Annotated[np.ndarray, "s r kicks"]  # linear maps of that change
     damped: Annotated[np.ndarray, "s", bool]  # whether contacts with dashpots are closed
     uncoupled: Annotated[np.ndarray, "s", bool]  # whether damping couples no two free modes
+    coalescing: Annotated[np.ndarray, "s", bool]  # whether modes nearly coalesce: their quadratic forms are zero
     slow_count: Annotated[np.ndarray, "s", int]  # number of entries in these lists
     # pairs left out (j, k, SUM or DIFFERENCE, harmonic that both turn with or -1), modes left out of means
     # (j, 0, SINGLE, -1), modes whose square is integrated at once (j, 0, CALM, -1)

@@ -16,6 +16,7 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.engine.antiderivatives import coalesce
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
 from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
 from vanedamp.coupling.engine.run import ROOM, places, with_free_place
@@ -39,6 +40,7 @@ class Subsystems(NamedTuple):
     sprung: Annotated[np.ndarray, "k", bool]  # whether springs are closed
     damped: Annotated[np.ndarray, "k", bool]  # whether some of them move and have dashpots
     uncoupled: Annotated[np.ndarray, "k", bool]  # whether damping couples no two complex modes
+    coalescing: Annotated[np.ndarray, "k", bool]  # whether some of these nearly coalesce
     carrier: Annotated[np.ndarray, "k b n"]  # functional of each body that moves with the structure
     functional: Annotated[np.ndarray, "k r n"]  # of p in each row
     pull: Annotated[np.ndarray, "k r 2n"]  # acceleration of each row by (p, p'), no row closed
@@ -164,7 +166,7 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
-    push = _times(loads.T, project[:, q:].T).T
+    push, coalescing = _times(loads.T, project[:, q:].T).T, coalesce(eigenvalue, shape, project)
     shape = np.stack([_times(lift, part) for part in shape.reshape(2, q, m)])
     project = np.stack([_times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
     free = (cluster >= 0) & ~springs.anchored
@@ -175,7 +177,8 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     values |= _round_off(system, carrier, functional, law, sprung, shape, project)
     values |= {
         "closed": key, "held": cluster < 0, "free": free, "sprung": len(sprung) > 0,
-        "uncoupled": system.proportional and not len(closed) and m == n, "carrier": carrier, "functional": functional,
+        "uncoupled": system.proportional and not len(closed) and m == n, "coalescing": coalescing,
+        "carrier": carrier, "functional": functional,
         "static": lift / real.frequency**2 @ loads, "constrained": kept, "body_acceleration": acceleration,
         "coordinates": q, "frequency": real.frequency, "damping": real.damping,
         "mixed": np.count_nonzero(real.damping) > np.count_nonzero(np.diagonal(real.damping)), "lift": lift,

@@ -44,8 +44,6 @@ UNFELT = 1e-8
 SURE = 1e-3
 #: product of a left and a right vector, times their lengths, below which they are combinations of equal modes
 MIXED = 1e-3
-#: condition number of modes beyond which some nearly coalesce
-NEARLY_EQUAL = 1e2
 #: distances from an eigenvalue, times its size, at which an inverse step is tried: the matrix must not be singular to
 #: the last bit, as it can be close to two eigenvalues that nearly coalesce
 SHIFTS = (4 * float(np.finfo(float).eps), 1e-10, 1e-6)

@@ -12,7 +12,9 @@ from vanedamp.coupling.engine.amplitudes import amplitude_changes, row_change
 from vanedamp.coupling.engine.energy_forms import (
     add_forms,
     add_segment,
+    at_point,
     free_momentum,
+    points_of,
     quadratic_form,
     slow_product,
     turning_back,
@@ -20,7 +22,7 @@ from vanedamp.coupling.engine.energy_forms import (
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, OPEN, PERIOD, SINGLE
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import cubic_extremum
-from vanedamp.coupling.response.records import EXCITATION, FRICTION
+from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant, is_slip, row_speed
 
 #: pieces of a period on which a tilt is interpolated
@@ -49,6 +51,8 @@ def account(system, flows, st, rec, scratch, tau, q, v):
     _add_bodies(system, flows, st, rec, scratch, s, period, tau, count)
     if flows.rubs[s]:
         _add_friction(system, flows, st, scratch, s, tau, count)
+    if flows.coalescing[s]:
+        _add_losses(system, flows, st, rec, scratch, s, tau, count)
     grows = math.exp(flows.growth[s] * tau) if flows.growth[s] > 0.0 else 1.0
     add_segment(system, flows, st, rec, scratch, s, period, tau, st.offset[0], grows)
     for b in range(len(system.along)):
@@ -112,6 +116,40 @@ def _add_friction(system, flows, st, scratch, s, tau, count):
                 for j in range(count):
                     st.pushed[row] += (flows.force[s, row, j] * flows.inverse[s, j] * scratch.gain[j]).real
         place += 1 if compliant else 0
+
+
+@kernel
+def _add_losses(system, flows, st, rec, scratch, s, tau, count):
+    """Add losses and mean square of modes that nearly coalesce, which have no forms (energy_forms.at_point)."""
+    u, speed, value, points = len(system.rest), scratch.free, scratch.wave, points_of(flows, st, s, tau)
+    for i in range(points):
+        weight = at_point(system, flows, st, rec, scratch, s, tau, i, points)
+        for k in range(len(speed)):
+            speed[k] = _real_part(flows.velocity[s, k], value, count)
+        for k in range(len(speed)):
+            for l in range(len(speed)):
+                st.ledger[VISCOUS] += weight * system.damping[k, l] * speed[k] * speed[l]
+        for j in range(count):
+            scratch.ahead[j] = flows.eigenvalue[s, j] * value[j]
+        for r in range(u if flows.rubs[s] else 0):
+            pressed, taken = is_compliant(system, r) and st.state[r] < OPEN, 0.0
+            if is_slip(st.state[r]) and has_friction(system, r) and not flows.held[s, r]:
+                slip, row = _real_part(flows.rows[s, u + r], scratch.ahead, count), u + r
+                taken = -weight * slip * _real_part(flows.force[s, row], value, count)
+                st.ledger[FRICTION] += taken
+            if pressed:
+                push = _real_part(flows.rows[s, r], scratch.ahead, count)
+                st.ledger[CONTACT] += weight * system.dashpot[r] * push * push
+                st.lost[r] += taken + weight * system.dashpot[r] * push * push
+
+
+@inlined
+def _real_part(functional, amplitude, count):
+    """Return the real part of a functional of the active modes' amplitudes."""
+    total = 0.0
+    for j in range(count):
+        total += (functional[j] * amplitude[j]).real
+    return total
 
 
 @inlined

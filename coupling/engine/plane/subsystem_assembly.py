@@ -17,7 +17,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from scipy.linalg import eig, null_space, orth
 
-from vanedamp.coupling.engine.antiderivatives import fill_forms, products
+from vanedamp.coupling.engine.antiderivatives import coalesce, fill_forms, products
 from vanedamp.coupling.engine.peaks import GRIDS, grid_factors
 from vanedamp.coupling.engine.plane.tolerances import (
     APART,
@@ -71,6 +71,7 @@ class Flows(NamedTuple):
     airborne: Annotated[np.ndarray, "s b", bool]  # whether a body touches no floor
     rocks: Annotated[np.ndarray, "s b", bool]  # whether the rate of a body's tilt in its cavity changes
     rubs: Annotated[np.ndarray, "s", bool]  # whether friction or compliant contacts take energy
+    coalescing: Annotated[np.ndarray, "s", bool]  # whether modes nearly coalesce: their quadratic forms are zero
 
     response: Annotated[np.ndarray, "s m", complex]
     momentum: Annotated[np.ndarray, "s m", complex]
@@ -143,6 +144,8 @@ def _fill_energy(flows: Flows, system: System, s: int) -> None:
         forms |= {
             "dashpot": products(push, damping), "friction": products(slip, drag), "lost": products(losing, taking),
         }  # fmt: skip
+    if flows.coalescing[s]:  # plane.energy_balance integrates by quadrature
+        forms = {name: (0 * both, 0 * mixed) for name, (both, mixed) in forms.items()}
     momentum = system.mass[system.along] @ velocity[system.along]
     fill_forms(flows, s, system, momentum, momentum, velocity, forms)
     flows.airborne[s] = True
@@ -304,7 +307,8 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
     force_constant[len(state) + contacts.slides] = contacts.known
     return {
-        "key": state, "modes": len(rate), "eigenvalue": rate, "inverse": 1 / rate, "size": np.abs(rate),
+        "key": state, "modes": len(rate), "coalescing": coalesce(eigenvalue, shape, project),
+        "eigenvalue": rate, "inverse": 1 / rate, "size": np.abs(rate),
         "project": after_harmonics(free),
         "offset": after_harmonics(project[:, :k] @ rest), "in_phase": after_harmonics(project @ full.real),
         "in_quadrature": after_harmonics(-(project @ full.imag)),

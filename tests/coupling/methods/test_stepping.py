@@ -10,6 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.methods.scenes import double
+from benchmarks.stability.macro_step import macro_step
+from benchmarks.stability.scenes import DAMPING, contact_stiffness, coupled_pair
+from benchmarks.stability.scenes import pressed as pressed_body
+from vanedamp.coupling.methods.cosimulation import macro_step_radii
+from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -190,6 +195,62 @@ def test_ledgers_of_energy_keeping_schemes_close(periodic, name):
     assert simulate(by(periodic, **METHODS[name], steps_per_period=500)).energy_residual < 1e-12
 
 
+@pytest.mark.parametrize("theta", [0.5, 0.6, 1.0])
+def test_moreau_impacts_lose_what_newtons_law_does(theta):
+    """One collision of two free masses: (1 - e^2) m* v^2 / 2, to the round-off of a hardly moved spring."""
+    scene = made(
+        {"structure": STRUCTURE | {"stiffness": 1e-12, "damping_ratio": 0.0}, "excitation": {"frequency": 1.0},
+         "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 1.0}],
+         "damper": [{"cavity": "c", "mass": 0.25, "restitution": 0.6, "velocity": 0.7}],
+         "solver": {"method": "moreau", "theta": theta}, "time": {"periods": 1, "transient": 0}}
+    )  # fmt: skip
+    response = simulate(scene, events=True)
+    assert response.status is Status.OK and len(response.event_list) == 1
+    assert response.energy["impact"] == pytest.approx(0.5 * (1 - 0.6**2) * 0.2 * 0.7**2, rel=1e-9)
+
+
+def test_moreau_ledgers_close_with_the_step(periodic):
+    """For theta above 1/2 the energy missing is of the size of a step, over impacts too."""
+    exact, steps = simulate(periodic), np.array([500, 2000, 8000])
+    for theta in (0.6, 1.0):
+        found = [simulate(by(periodic, method="moreau", theta=theta, steps_per_period=int(n))) for n in steps]
+        order = np.polyfit(np.log(steps), np.log([response.energy_residual for response in found]), 1)[0]
+        assert order == pytest.approx(-1, abs=0.1)
+        assert found[-1].energy["impact"] == pytest.approx(exact.energy["impact"], rel=0.02)
+
+
+@pytest.mark.parametrize("exchange", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize("hold", [0, 1])
+def test_the_radius_of_a_macro_step(exchange, hold):
+    """That of the matrix with an exact body, up to the error of the substeps."""
+    for steps in (20, 60, 200):
+        tables, stiffness, dashpot = coupled_pair(1.0)
+        solver = {"method": "cosim", "exchange": exchange, "hold": hold, "substeps": 400, "steps_per_period": steps}
+        pressed = made(tables | {"solver": solver})
+        expected = np.abs(np.linalg.eigvals(macro_step(1 / steps, 1.0, stiffness, dashpot, exchange, hold))).max()
+        (_, left), (_, right) = macro_step_radii(pressed)
+        assert left == pytest.approx(expected, rel=2e-3) and right == pytest.approx(left, rel=1e-9)
+        assert bool(warnings_of(pressed)) == (left > 1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(("exchange", "hold"), [("jacobi", 0), ("gauss_seidel", 0), ("gauss_seidel", 1)])
+def test_a_contact_that_makes_energy_is_not_ok(exchange, hold):
+    """Whatever the residual: an elastic contact by a co-simulation beyond its limit, of which its warning tells."""
+    data = pressed_body(0.4, contact_stiffness(0.4) / 4, restitution=1.0)
+    solver = {"method": "cosim", "exchange": exchange, "hold": hold, "steps_per_period": 250}
+    structure, span = data["structure"] | {"damping": DAMPING}, {"periods": 2, "transient": 0}
+    response = simulate(made(data | {"structure": structure, "solver": solver, "time": span}))
+    assert response.energy["contact"] < 0.0 and response.energy_residual < 0.1
+    assert response.status is Status.ENERGY
+    assert any("the macro-step is unstable" in warning for warning in response.warnings)
+
+
+@pytest.mark.parametrize("method", ["penalty", "cosim", "solve_ivp"])
+def test_a_law_of_two_phases_is_named(periodic, method):
+    with pytest.raises(InputError, match=f'contact.law: .* "poisson", are for .* exact or moreau, not {method}'):
+        simulate(periodic.replace({"contact.law": "poisson", "solver": {"method": method}}))
+
+
 @pytest.mark.parametrize("name", ["moreau", "newmark", "explicit"])
 def test_bodies_in_one_cavity_share_their_losses(periodic, name):
     """Two bodies in a row, whose motion is soon chaotic: mean amplitude and attached mass within their spread."""
@@ -259,7 +320,8 @@ def test_beyond_its_limit_the_explicit_method_says_so():
     assert simulate(by(stiff, method="penalty", steps_per_period=34)).status is Status.OK
     response = simulate(by(stiff, method="penalty", steps_per_period=30))
     assert response.status is Status.DIVERGED
-    assert all(np.isfinite(value) for value in (response.amplitude_max, *response.energy.values()))
+    assert all(np.isnan(value) for value in (response.amplitude_max, response.phase, *response.energy.values()))
+    assert response.attached_mass_fraction is None
 
 
 def test_a_missed_impact_is_flagged():

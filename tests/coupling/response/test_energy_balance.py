@@ -8,9 +8,12 @@ import pytest
 
 from tests.coupling.engine.line.test_traps import cluster
 from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Ended, evaluate, residual
+from vanedamp.coupling.response.figures import FIGURES, contact_gain
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.sweep import worker
 
 
 def test_what_is_only_carried_along_is_no_flow():
@@ -28,6 +31,33 @@ def test_terms_that_cancel_are_no_flow():
     ledger[1, [recs.EXCITATION, recs.VISCOUS]] = 2.0, 1.5
     assert residual(ledger, np.zeros((2, 1))) == pytest.approx(0.25)
     assert residual(np.zeros((2, len(recs.ENERGIES))), np.zeros((2, 1))) == 0.0
+
+
+def test_energy_that_contacts_make_counts_from_the_start_and_over_the_evaluated_periods():
+    ledger, parts = np.zeros((4, len(recs.ENERGIES))), np.zeros((4, 1))
+    ledger[:, recs.EXCITATION] = [0.0, 2.0, 4.0, 4.0]
+    ledger[:, recs.IMPACT_LOSS] = [0.0, 1.0, 0.9, 0.8]
+    assert contact_gain(ledger, parts, 0, 3, 0.0) == 0.0
+    assert contact_gain(ledger, parts, 1, 3, 0.0) == pytest.approx(0.2 / 4.0)
+    ledger[3, recs.CONTACT] = -0.4
+    assert contact_gain(ledger, parts, 2, 3, 8.0) == pytest.approx(0.4 / 8.0)
+
+
+@pytest.mark.parametrize("entry", [recs.IMPACT_LOSS, recs.CONTACT])
+def test_contacts_that_make_energy_end_a_run_and_a_point_of_a_sweep(entry):
+    """The ledger closes: what an impact is short of is in another term."""
+    scene = cluster(15e-6).replace({"time.periods": 20})
+    for made, status in ((1e-11, Status.OK), (1e-6, Status.ENERGY)):
+        run = run_of(scene)
+        run.advance_to(20)
+        ledger = run.records.ledger
+        taken = ledger[-1, entry] + made * np.abs(ledger).max()
+        ledger[-1, entry] -= taken
+        ledger[-1, recs.VISCOUS] += taken
+        assert evaluate(scene, run.outcome(), Ended(Status.OK, 0), time.perf_counter()).status == status
+        figures = np.zeros(len(FIGURES))
+        figures[FIGURES.index("contact_gain")] = made
+        assert worker._status(codes.DONE, figures) == status
 
 
 @pytest.mark.parametrize("missing", [0.0, 1e-4, np.nan])

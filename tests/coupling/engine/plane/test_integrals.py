@@ -99,3 +99,22 @@ def test_a_structure_of_many_modes(tmp_path):
     assert response.amplitude_harmonic == pytest.approx(abs(2 * (x * phase).mean()), rel=1e-3)
     assert response.peak.max() == pytest.approx(np.abs(x).max(), rel=1e-5)
     assert np.all(response.peak >= np.abs(x).reshape(4, many).max(axis=1) * (1 - 1e-12))
+
+
+@pytest.mark.parametrize("excess", [1e-7, 1e-9])
+def test_energies_near_critical_damping(excess):
+    """Amplitudes cancel, energies do not: ledgers close, and a light block in another cavity changes little."""
+    data = {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 1.0 + excess},
+        "excitation": {"frequency": 0.7 / (2 * np.pi), "force": 1.0},
+        "cavity": [{"name": "c", "gap": 1.0}, {"name": "d", "gap": 1.0, "play": 0.1}],
+        "damper": [{"cavity": "c", "mass": 0.05, "friction": 0.01, "restitution": 0.8, "velocity": 0.5}],
+        "time": {"periods": 3, "transient": 0},
+    }  # fmt: skip
+    slider = simulate(validate(Scene, data, "scene"))
+    far = {"cavity": "d", "shape": "block", "length": 0.1, "height": 0.1, "mass": 1e-9, "restitution": 0.5}
+    planar = simulate(validate(Scene, data | {"damper": [*data["damper"], far]}, "scene"))
+    assert slider.energy_residual < 1e-12 and planar.energy_residual < 1e-10
+    assert slider.impacts_per_period > 0 and slider.energy["friction"] > 0
+    for name, value in slider.energy.items():
+        assert planar.energy[name] == pytest.approx(value, rel=1e-7, abs=1e-7)
