@@ -87,4 +87,5 @@ def _warning(found: Sequence[int], what: str, effect: str) -> tuple[str, ...]:
     if not found:
         return ()
     named = ", ".join(f"damper[{number}]" for number in found[:4]) + (", ..." if found[4:] else "")
-    return (f"{named}: {what}: under rigid impacts a closed contact has no restitution, and they {effect}",)
+    why = 'a contact that is closed has no restitution under rigid impacts (law = "compliant" gives it one)'
+    return (f"{named}: {what}: {why}, and they {effect}",)

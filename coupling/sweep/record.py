@@ -116,7 +116,7 @@ class Sweep(SceneRecord, Plotted):
     @property
     def moved_starts(self) -> list[dict[str, Any]]:
         """Of the peak of each curve that has impacts: where it is, what a run from bodies about 1e-9 of their gap aside
-        comes to, and whether it `agrees` (response.moved_start); empty for linked runs."""
+        comes to, and whether it `agrees` (response.moved_start); empty if not asked for, and for linked runs."""
         return list(self.provenance.get("moved_starts", ()))
 
     @property

@@ -51,7 +51,7 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     checkpoint: str | Path | None = None,
     provenance: Mapping[str, Any] | None = None,
-    moved_starts: bool = True,
+    moved_starts: bool = False,
 ) -> Sweep:
     """Run every point of the scene's [sweep] table, in this process or on an executor.
 

@@ -163,7 +163,7 @@ def test_a_sweep_checks_the_peak_of_each_curve(tmp_path):
     """Bit for bit as runs by themselves; linked runs, which begin with states, are left out."""
     places, frequencies = [0.0, 1e-4], [15.9, 17.5]
     axes = {"damper.1.position": places, "excitation.frequency": frequencies}
-    found = sweep(scene(0.0, 0.0, sweep=axes))
+    found = sweep(scene(0.0, 0.0, sweep=axes), moved_starts=True)
     told = found.moved_starts
     assert [peak["at"] for peak in told] == [{"damper.1.position": x, "excitation.frequency": 15.9} for x in places]
     for peak, place in zip(told, places, strict=True):
@@ -175,6 +175,5 @@ def test_a_sweep_checks_the_peak_of_each_curve(tmp_path):
         assert any(f"at damper.1.position = 0, excitation.frequency = 15.9: {text}" in each for each in warnings)
     found.save(tmp_path / "sweep.h5")
     assert Sweep.load(tmp_path / "sweep.h5").moved_starts == told == found.to_json()["moved_starts"]
-    linked = {"excitation.frequency": frequencies}
-    assert sweep(scene(0.0, 1e-4, sweep=linked, continuation={"direction": "up"})).moved_starts == []
-    assert sweep(scene(0.0, 0.0, sweep=axes), moved_starts=False).moved_starts == []
+    linked = scene(0.0, 1e-4, sweep={"excitation.frequency": frequencies}, continuation={"direction": "up"})
+    assert sweep(linked, moved_starts=True).moved_starts == sweep(scene(0.0, 0.0, sweep=axes)).moved_starts == []
