@@ -80,4 +80,4 @@ def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
     values = {"cavity.0.gap": gap, "damper.0.mass": damper.mass * (1 + longer)}
     if damper.length is not None:
         values["damper.0.length"] = damper.length * (1 + longer)
-    return scene.replace(values | {"damper.0.position": damper.position * gap / cavity.gap})
+    return scene.replace(values | {"damper.0.position": scene.positions[0] * gap / cavity.gap})

@@ -62,15 +62,26 @@ def prepare(scene: Scene, checkpoint: Path | None, peak: bool = False) -> Prepar
     return Prepared(points, provenance, checkpoint, resumed)
 
 
-def run_points(prepared: Prepared, output: str | Path | None, pool: Executor | None, title: str = "sweep") -> Sweep:
+def run_points(
+    prepared: Prepared,
+    output: str | Path | None,
+    pool: Executor | None,
+    title: str = "sweep",
+    moved_starts: bool = True,
+) -> Sweep:
     """Run every point that is not done, and write the result. The checkpoint stays until `finish`."""
     if prepared.resumed < prepared.points.size:
         compile_engine(ends_of(prepared.points), pool)
     with progress(title) as report:
-        result = sweep(prepared.points, pool, report, prepared.checkpoint, prepared.provenance)
+        result = sweep(prepared.points, pool, report, prepared.checkpoint, prepared.provenance, moved_starts)
     if output:
         result.save(output)
     return result
+
+
+def doubts(prepared: Prepared, result: Sweep) -> list[str]:
+    """Return the warnings of a result that its points did not have before they ran."""
+    return [text for text in result.provenance.get("warnings", ()) if text not in prepared.points.warnings]
 
 
 def ends_of(points: Grid | Members) -> list[Scene]:

@@ -50,7 +50,7 @@ class ImpactOscillator(NamedTuple):
         return cls(
             structure.mass, structure.viscous, structure.stiffness, excitation_force(scene),
             2 * math.pi * scene.frequency, damper.mass, cavity.gap, damper.restitution,
-            scene.initial.displacement, scene.initial.velocity, damper.position, damper.velocity,
+            scene.initial.displacement, scene.initial.velocity, scene.positions[0], damper.velocity,
         )  # fmt: skip
 
 

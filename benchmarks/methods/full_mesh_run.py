@@ -75,7 +75,7 @@ def explicit_run(
     omega, damping = system.omega, 2 * matrices.damping_ratio * first
     steps = math.ceil(2 * math.pi / omega * highest / (2 * share))
     h, load, half = 2 * math.pi / omega / steps, excitation_force(scene), scene.cavity[0].gap / 2
-    start, peak = np.array([scene.damper[0].position, scene.damper[0].velocity]), np.zeros(periods)
+    start, peak = np.array([scene.positions[0], scene.damper[0].velocity]), np.zeros(periods)
     contact = np.array([half, system.spring[0], system.dashpot[0], scene.damper[0].mass])
     rows = np.zeros((0, len(free))) if outputs is None else np.ascontiguousarray(outputs[:, free])
     reach = np.flatnonzero(rows.any(axis=0))

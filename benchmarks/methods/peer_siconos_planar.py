@@ -37,7 +37,7 @@ def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
     scale = whole.scale
     q[:n], v[:n] = scene.initial.displacement / scale, scene.initial.velocity / scale
     floor = whole.floor[0, :n]
-    q[n:] = body.position + floor @ q[:n], body.lift + a * abs(body.tilt), body.tilt
+    q[n:] = scene.positions[0] + floor @ q[:n], body.lift + a * abs(body.tilt), body.tilt
     v[n:] = body.velocity + floor @ v[:n], body.lift_velocity, body.tilt_rate
     gaps = _gaps(floor, a, b, cavity.gap, cavity.play or 0.0)
     phases = whole.phases(whole.omega * times.step * (np.arange(steps) + 0.5))

@@ -89,7 +89,7 @@ def double() -> Scene:
     """Return a scene of two bodies in a row that share the cavity of the single one."""
     data = single().to_dict()
     body = data["damper"][0] | {"mass": data["damper"][0]["mass"] / 2}
-    data["damper"] = [body | {"position": -data["cavity"][0]["gap"] / 4}, body]
+    data["damper"] = [body | {"position": -data["cavity"][0]["gap"] / 4}, body | {"position": 0.0}]
     return validate(Scene, data, "scene")
 
 

@@ -121,7 +121,7 @@ class Frame:
         parts = {
             "displacement": system.scale * (amplitude.sum(axis=0).real + sag),
             "velocity": system.scale * ((1j * system.frequency) @ amplitude).real,
-            "slip": [damper.position for damper in self.scene.damper],
+            "slip": self.scene.positions,
         }
         still = self.restart_of(np.zeros(len(self.to_state)))
         return self.state_of(replace(still, **{name: frozen(part) for name, part in parts.items()}))

@@ -16,7 +16,6 @@ from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
-from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
@@ -166,7 +165,7 @@ def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = 
     if path.split(".")[0] in (*_NO_NUMBERS, *others):
         raise InputError(f"{key}: {path} is no number of the motion's equations; take one such as {FREQUENCY}")
     try:
-        return number_at(scene.to_dict(), path)
+        return scene.number(path)
     except InputError as error:
         raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
 

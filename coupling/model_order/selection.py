@@ -23,6 +23,7 @@ import numpy as np
 
 from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
 from vanedamp.coupling.model_order.confirmation import confirmed
+from vanedamp.coupling.response.moved_start import touching
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
@@ -137,7 +138,8 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene without open choices: of method, impact laws on several modes, loads, ranges."""
+    """Return the warnings of a scene without open choices: of method, impact laws on several modes, loads,
+    ranges, bodies that begin as one."""
     rubs = any(damper.form.planar and damper.friction > 0.0 for damper in scene.damper)
     method = METHODS.part(scene.solver.method)
     warning = getattr(method, "RUBBING_WARNING", None) if rubs else None
@@ -149,6 +151,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
         *_of_rotation(scene),
         *_of_impact_laws(scene),
         *load_warnings(scene),
+        *touching(scene),
     )
 
 

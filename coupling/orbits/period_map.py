@@ -195,5 +195,5 @@ def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: i
 
 
 def centred(scene: Scene) -> Scene:
-    """Return a scene whose bodies begin in the middle: where they begin may lie outside of another gap."""
-    return scene.replace({f"damper.{number}.position": 0.0 for number in range(len(scene.damper))})
+    """Return a scene whose bodies begin spread: where they are given to begin may lie outside of another gap."""
+    return replace(scene, damper=tuple(replace(body, position=None) for body in scene.damper))

@@ -208,6 +208,9 @@ class Response(Plotted):
     method leaves none"""
     warnings: tuple[str, ...] = ()
     """to be read before the figures are used"""
+    moved_start: dict[str, Any] | None = None
+    """of a second run, whose bodies begin about 1e-9 of their gap aside: status, mean amplitude and its confidence, as
+    `amplitude_mean_dynamic`, and whether it `agrees`; None if it was not asked for, and without impacts of bodies"""
     tilt_max: tuple[float | None, ...] | None = None
     """largest tilt of each body in its cavity; None for sliders, and without bodies in the plane [rad]"""
     lift_share: tuple[float | None, ...] | None = None
@@ -254,6 +257,8 @@ class Response(Plotted):
         for name in _OF_BODIES:
             if (values := getattr(self, name)) is not None:
                 data[name] = list(values)
+        if self.moved_start is not None:
+            data["moved_start"] = self.moved_start
         if self.estimate is not None:
             data["estimate"] = self.estimate
         if self.advice is not None:

@@ -90,7 +90,7 @@ def _of_scene(scene: Scene, system: System) -> RestartState:
     parts = (
         # an initial state belongs to a rigid structure: others have none
         np.full(n, scene.initial.displacement), np.full(n, scene.initial.velocity),
-        [damper.position for damper in bodies], [damper.velocity for damper in bodies],
+        scene.positions, [damper.velocity for damper in bodies],
         np.zeros(system.dampers), system.travels,
     )  # fmt: skip
     across = (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, GetJsonSchemaHandler
@@ -98,8 +99,10 @@ class Damper(OpenRecord):
     """Coulomb coefficient of friction on the floor [-]"""
     restitution: Fraction = 1.0
     """coefficient of restitution at a wall; of two bodies the geometric mean of theirs [-]"""
-    position: Real = 0.0
-    """position at time zero relative to the cavity, from mid-travel, positive to the right [m]"""
+    position: Real | None = None
+    """position at time zero relative to the cavity, from mid-travel, positive to the right (default: bodies begin with
+    equal gaps between each other and the walls, or the neighbours whose position is given; a single one at mid-travel)
+    [m]"""
     velocity: Real = 0.0
     """velocity at time zero relative to the cavity, positive to the right [m/s]"""
     normal_load: NonNegative | None = None
@@ -194,6 +197,19 @@ class Damper(OpenRecord):
     def moment_of_inertia(self) -> float:
         """Moment of inertia about the centre, kg m^2."""
         return self.form.inertia(self) if self.inertia is None else self.inertia
+
+
+def spread(given: Sequence[Any], gap: Any) -> list[Any]:
+    """Return the positions at time zero of the bodies of a cavity, m: numbers, or (k,) for k cavities.
+
+    given: from left to right, None for a body with equal gaps to its neighbours; gap: free travel, m.
+    """
+    marks = [(-1, -0.5), *((n, place / gap) for n, place in enumerate(given) if place is not None), (len(given), 0.5)]
+    places = list(given)
+    for (first, low), (last, high) in itertools.pairwise(marks):
+        for n in range(first + 1, last):
+            places[n] = gap * (low + (high - low) * ((n - first) / (last - first)))
+    return places
 
 
 @dataclass(frozen=True, config=STRICT)

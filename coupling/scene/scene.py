@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 from pydantic.json_schema import SkipJsonSchema
 
-from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
+from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, spread
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.elements.element import SceneElement
 from vanedamp.coupling.scene.elements.stop import Stop
@@ -299,6 +299,16 @@ class Scene(OpenRecord, Displayed):
         return [number for number, damper in enumerate(self.damper) if damper.cavity == cavity.name]
 
     @property
+    def positions(self) -> list[float]:
+        """Positions of the bodies at time zero relative to their cavities, m: those given, the others spread."""
+        found = [0.0] * len(self.damper)
+        for cavity in self.cavity:
+            row = self.bodies_in(cavity)
+            for number, place in zip(row, spread([self.damper[n].position for n in row], cavity.gap), strict=True):
+                found[number] = place
+        return found
+
+    @property
     def yields(self) -> bool:
         """Whether contacts are springs: by the contact law, or by elements."""
         return not self.contact.rigid or any(element.yields for _, _, element in self.elements)
@@ -377,7 +387,8 @@ class Scene(OpenRecord, Displayed):
                 )
 
     def _check_row(self, cavity: Cavity) -> None:
-        row = [(number, self.damper[number].position) for number in self.bodies_in(cavity)]
+        given = ((number, self.damper[number].position) for number in self.bodies_in(cavity))
+        row = [(number, position) for number, position in given if position is not None]
         for index, position in row:
             if abs(position) > cavity.gap / 2:
                 raise ValueError(
@@ -456,7 +467,6 @@ class Scene(OpenRecord, Displayed):
 
     def _check_ranges(self) -> None:
         """Raise ValueError for a range that is none, or of no number of the scene."""
-        data = self.to_dict()
         for path, (low, high) in self.ranges.items():
             if not low < high:
                 raise ValueError(f"ranges.{path}: expected [lowest, highest], not [{low:g}, {high:g}]")
@@ -467,7 +477,7 @@ class Scene(OpenRecord, Displayed):
             if path in self.axes:
                 raise ValueError(f"sweep.{path}: is a range as well; it can be one of them")
             try:
-                number_at(data, path)
+                self.number(path)
             except InputError as error:
                 raise ValueError(f"ranges.{str(error).removeprefix('scene: ')}") from None
 
@@ -553,7 +563,7 @@ class Scene(OpenRecord, Displayed):
             or any(value is not None for value in given)
             or self.excitation.distributed
             or self.initial != Initial()
-            or any(damper.velocity or (damper.sprung and damper.position) for damper in self.damper)
+            or any(body.velocity or (body.sprung and at) for body, at in zip(self.damper, self.positions, strict=True))
             or (bool(self.speed) and any(cavity.centrifugal_deg for cavity in self.cavity))
             or (bool(self.speed) and isinstance(self.structure, Rom))
             or self.gravity.orientation_deg != 0.0
@@ -564,6 +574,13 @@ class Scene(OpenRecord, Displayed):
     def to_dict(self) -> dict[str, Any]:
         """Return plain nested data as in the file, without values that are None."""
         return tables(self)
+
+    def number(self, path: str) -> float:
+        """Return the number at a dotted path, of positions where the bodies begin. Raises InputError for none."""
+        data = self.to_dict()
+        for body, place in zip(data.get("damper", ()), self.positions, strict=True):
+            body["position"] = place
+        return number_at(data, path)
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
         """Return another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").

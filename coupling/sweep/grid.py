@@ -178,11 +178,11 @@ class Grid:
 
 
 class PointList:
-    """Points in any places, to be run like those of a grid; `base` leaves nothing open."""
+    """Points in any places, to be run like those of a grid; `choices` are for what `base` leaves open."""
 
-    def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]], choices: Choices = NOTHING) -> None:
         self.base, self.size, self._points = base, len(points), points
-        self.choices = NOTHING
+        self.choices = choices
 
     def table(self, points: Sequence[int]) -> PointTable:
         """Return the values that some points change in the base."""

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, SECTORS, STRESSES, WEARS, WORDS
@@ -106,6 +107,19 @@ class Sweep(SceneRecord, Plotted):
         return self.status.shape
 
     @property
+    def along(self) -> str:
+        """Axis of its curves: the excitation frequency, or the speed of rotation, or the longest one of numbers."""
+        usual = [path for path in (FREQUENCY, *SPEEDS) if path in self.axes]
+        lengths = {path: len(values) * (values.dtype.kind in "if") for path, values in self.axes.items()}
+        return usual[0] if usual else max(lengths, key=lengths.__getitem__)
+
+    @property
+    def moved_starts(self) -> list[dict[str, Any]]:
+        """Of the peak of each curve that has impacts: where it is, what a run from bodies about 1e-9 of their gap aside
+        comes to, and whether it `agrees` (response.moved_start); empty if not asked for, and for linked runs."""
+        return list(self.provenance.get("moved_starts", ()))
+
+    @property
     def hot_spots(self) -> dict[str, dict[str, Any]]:
         """What is known of the hot spots of `stress`, by name in their order (rom.recovery.hot_spots)."""
         return dict(self.provenance.get("hot_spots", {}))
@@ -131,7 +145,8 @@ class Sweep(SceneRecord, Plotted):
         """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
-        notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
+        kept = ("estimate", "advice", "moved_starts")
+        notes |= {name: self.provenance[name] for name in kept if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
         further = {**self.in_plane, **self.exponents, **self.stress, **self.wear, **self.sectors, **self.peaks}
         units = self.units() | MEASURES | {name: _FURTHER[name] for name in further}

@@ -21,6 +21,7 @@ from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.further import bodies_of, exponents_of, sections_of, sectors_of, stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
+from vanedamp.coupling.sweep.moved_starts import with_moved_starts
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import run_tasks
 from vanedamp.coupling.sweep.worker import (
@@ -50,19 +51,22 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     checkpoint: str | Path | None = None,
     provenance: Mapping[str, Any] | None = None,
+    moved_starts: bool = False,
 ) -> Sweep:
     """Run every point of the scene's [sweep] table, in this process or on an executor.
 
     scene: or its TOML file, or its grid; progress: called with the number of points done and their total, at
     the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
-    resumes; the caller removes it once the result is safe (files.checkpoint_file.clear).
+    resumes; the caller removes it once the result is safe (files.checkpoint_file.clear); moved_starts: run the peak of
+    each curve again, from bodies a little aside (Sweep.moved_starts).
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the executor has lost its workers for good.
     """
     grid = scene if isinstance(scene, Grid) else grid_of(loaded(scene))
     provenance = dict(provenance or {})
-    return result_of(grid, run_all(grid.scene, grid, executor, progress, checkpoint, provenance), provenance)
+    found = result_of(grid, run_all(grid.scene, grid, executor, progress, checkpoint, provenance), provenance)
+    return with_moved_starts(grid, found, executor) if moved_starts else found
 
 
 def run_all(

@@ -88,7 +88,7 @@ def start_of_modes(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray
     """Return modal coordinates and positions of the bodies (n + b,) with which a scene begins, and their rates."""
     p, rate = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
     floor = system.floor[:, : system.modes].sum(axis=1)
-    position, speed = (np.array([getattr(body, name) for body in scene.damper]) for name in ("position", "velocity"))
+    position, speed = np.array(scene.positions), np.array([body.velocity for body in scene.damper])
     modes = np.ones(system.modes)
     return np.r_[p * modes, floor * p + position], np.r_[rate * modes, floor * rate + speed]
 

@@ -79,6 +79,7 @@ def onsets(scene: Scene) -> list[Onset | None]:
     response = abs(wave @ free.response + free.table[0])
     # a body that nothing holds stays where it is in space, which moves against the base
     reach = np.abs(system.floor[:, : system.modes] @ wave + bodies.load[0] / (bodies.mass * omega**2))
+    positions = scene.positions
     friction, pull = system.holds / bodies.mass, bodies.weight / bodies.mass
     found: list[Onset | None] = []
     for index, damper in enumerate(scene.damper):
@@ -89,7 +90,7 @@ def onsets(scene: Scene) -> list[Onset | None]:
         if damper.sprung or not alike or not lies or not reach[index] or not response:
             found.append(None)
             continue
-        room = cavity.gap / 2 - max(abs(scene.damper[other].position) for other in row)
+        room = cavity.gap / 2 - max(abs(positions[other]) for other in row)
         own, ratio = onset(room, friction[index], pull[index], omega), response / reach[index]
         found.append(Onset(own.slip * ratio, own.impact * ratio))
     return found

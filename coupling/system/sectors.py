@@ -85,6 +85,7 @@ def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[t
     """Return the cavities, and the bodies from cavity to cavity, each with its number in the scene."""
     cavities: list[Cavity] = []
     bodies: list[tuple[int, Damper]] = []
+    positions = scene.positions
     for index, cavity in enumerate(scene.cavity):
         row = [(number, scene.damper[number]) for number in scene.bodies_in(cavity)]
         if cavity.sectors is None:
@@ -100,7 +101,7 @@ def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[t
             }
             name, gap = f"{cavity.name}@{sector}", draws.gap(sector)
             cavities.append(replace(cavity, name=name, gap=gap, sectors=None, scatter=None, **own))
-            places = draws.positions([body.position for _, body in row], sector)
+            places = draws.positions([positions[number] for number, _ in row], sector)
             bodies += [
                 (number, replace(body, cavity=name, position=place))
                 for (number, body), place in zip(row, places, strict=True)

@@ -18,6 +18,9 @@ def run(arguments: Namespace) -> None:
     kind = kind_of(tables, arguments.input)
     found = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)
     left = facts.defaults(kind, tables)
+    places = next((fact.value for fact in found if fact.key == "positions"), ())
+    bodies = zip(tables.get("damper", ()), places, strict=False)
+    left |= {f"damper.{number}.position": at for number, (body, at) in enumerate(bodies) if "position" not in body}
     result = {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left}
     commands = ", ".join(found[0].value) or "nothing as it is"
     lines = list(fact_lines(f"{arguments.input}: {a(kind)}, for vanedamp {commands}", found[1:]))

@@ -32,7 +32,9 @@ def run(arguments: Namespace, scene: Scene) -> None:
 
     compile_engine([scene])
     with progress("run") as report:
-        response = simulate(scene, arguments.events, arguments.samples, progress=report)
+        response = simulate(
+            scene, arguments.events, arguments.samples, progress=report, moved_start=not arguments.no_moved_start
+        )
     if arguments.exponents is not None:
         response = replace(response, lyapunov=_exponents(scene, arguments.exponents, response))
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)

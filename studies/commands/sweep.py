@@ -11,11 +11,11 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.studies.commands.support.budget import check_run, check_sweep
 from vanedamp.studies.commands.support.ensembles import run_ensemble
-from vanedamp.studies.commands.support.messages import print_note, write_result
+from vanedamp.studies.commands.support.messages import print_note, print_warnings, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
 from vanedamp.studies.report.sector_charts import ring_sentence
-from vanedamp.studies.sweep_steps import PEAK_SAMPLES, finish, prepare, run_peak, run_points
+from vanedamp.studies.sweep_steps import PEAK_SAMPLES, doubts, finish, prepare, run_peak, run_points
 from vanedamp.studies.workers import available_cores, workers
 
 #: curves whose headlines are printed
@@ -36,8 +36,9 @@ def run(arguments: Namespace, scene: Scene) -> None:
     resonance = print_resonance(arguments.input, points.base)
     with workers(arguments.workers) as pool:
         started = time.perf_counter()
-        result = run_points(prepared, arguments.output, pool)
+        result = run_points(prepared, arguments.output, pool, moved_starts=not arguments.no_moved_start)
     seconds = time.perf_counter() - started
+    print_warnings(arguments.input, doubts(prepared, result))
     if arguments.peak is not None:
         run_peak(prepared, result, arguments.peak, partial(print_note, arguments.input))
     # times are not kept in the result, which is the same however it came about

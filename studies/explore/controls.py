@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -186,7 +186,8 @@ def _starts(scene: Scene, planar: bool) -> Iterator[Control]:
         _Measure("tilt", "tilt at the start", "mrad", 1e-3, low=-most, high=most),
         _Measure("tilt_rate", "tilt rate at the start", "rad/s", 1.0, low=-100.0, high=100.0),
     )
-    yield from _listed("damper", scene.damper, begins if planar else begins[:2], _changes)
+    bodies = [replace(body, position=at) for body, at in zip(scene.damper, scene.positions, strict=True)]
+    yield from _listed("damper", bodies, begins if planar else begins[:2], _changes)
 
 
 def _changes(path: str, scene: Scene, number: float) -> dict[str, Any]:
@@ -194,7 +195,7 @@ def _changes(path: str, scene: Scene, number: float) -> dict[str, Any]:
 
 
 def _gap_changes(path: str, scene: Scene, number: float) -> dict[str, Any]:
-    """Return the changes of a gap: bodies keep their position as a fraction of the free travel."""
+    """Return the changes of a gap: bodies keep a given position as a fraction of the free travel."""
     values = {path: number}
     step = path.split(".")[1]
     gaps = {cavity.name: cavity.gap for k, cavity in enumerate(scene.cavity) if step in ("gap", str(k))}
@@ -223,17 +224,12 @@ def _bodies(scene: Scene) -> Iterator[Control]:
 
 
 def _body_changes(scene: Scene, number: float) -> dict[str, Any]:
-    """Return the changes to `number` equal bodies in each cavity, spread evenly over its free travel."""
+    """Return the changes to `number` equal bodies in each cavity, which begin spread over it."""
     count = int(number)
     if not 1 <= count <= MOST_BODIES:
         raise InputError(f"expected 1 to {MOST_BODIES}, not {number:g}")
-    body = scene.to_dict()["damper"][0] | {"velocity": 0.0}
-    rows = [
-        body | {"cavity": cavity.name, "position": ((place + 0.5) / count - 0.5) * cavity.gap}
-        for cavity in scene.cavity
-        for place in range(count)
-    ]
-    return {"damper": rows}
+    body = {key: value for key, value in scene.to_dict()["damper"][0].items() if key not in _OWN}
+    return {"damper": [body | {"cavity": cavity.name} for cavity in scene.cavity for _ in range(count)]}
 
 
 def _given(table: str, record: Any, measures: Sequence[_Measure]) -> Iterator[Control]:

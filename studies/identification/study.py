@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.model_order.choices import leaves_open
-from vanedamp.coupling.scene.paths import axis_values, number_at
+from vanedamp.coupling.scene.paths import axis_values
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -67,7 +67,7 @@ class IdentificationStudy:
         if path.split(".")[0] in _NO_NUMBERS or path == FREQUENCY:
             raise InputError(f"numbers: {path} is no number of structure, bodies or level; take one such as cavity.gap")
         try:
-            given = number_at(self.scene.to_dict(), path)
+            given = self.scene.number(path)
             for value in (number.min, number.max):
                 assemble(self.base.replace({path: value}))
         except InputError as error:
@@ -125,8 +125,7 @@ class IdentificationStudy:
     @cached_property
     def start(self) -> np.ndarray:
         """Values (P,) that are tried first."""
-        data = self.scene.to_dict()
-        starts = [n.start if n.start is not None else number_at(data, path) for path, n in self.numbers.items()]
+        starts = [self.scene.number(path) if n.start is None else n.start for path, n in self.numbers.items()]
         return np.array(starts, float)
 
     @cached_property

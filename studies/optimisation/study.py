@@ -220,7 +220,7 @@ class Study(NamedTuple):
         first, names = self.scene.damper[0], [cavity.name for cavity in self.scene.cavity]
         cavities = sorted(index % len(names) for index in range(count))
         bodies = tuple(
-            Damper(names[place], first.mass, first.friction, first.restitution, 0.0, 0.0, first.normal_load)
+            Damper(names[place], first.mass, first.friction, first.restitution, normal_load=first.normal_load)
             for place in cavities
         )
         return replace(self.scene, damper=bodies)
@@ -252,11 +252,6 @@ class Study(NamedTuple):
         scene, first = self.scene, self.scene.damper[0]
         gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
         level = scene.excitation.resonance_amplitude or scene.excitation.level
-        cavities = [damper.cavity for damper in self.with_bodies(design.bodies).damper]
-        places = {
-            f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)
-            for index, name in enumerate(cavities)
-        }
         values = {
             "excitation": level * (1 + deviation["excitation"]),
             "gap": gap,
@@ -265,7 +260,7 @@ class Study(NamedTuple):
             "friction": max(first.friction + deviation["friction"], 0.0),
             "orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
         }
-        return places | drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
+        return drive(scene, frequency) | {self.paths[name]: value for name, value in values.items()}
 
 
 def _reference(scene: Scene, band: np.ndarray, table: Optimise, resonance: Resonance, amplitude: float) -> float:

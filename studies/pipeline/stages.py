@@ -282,7 +282,7 @@ class Sweep(Stage):
         """Run the points that are not done."""
         from vanedamp.files.checkpoint_file import clear
         from vanedamp.studies.report.forced_response import best_first, forced_responses
-        from vanedamp.studies.sweep_steps import finish, prepare, run_peak, run_points
+        from vanedamp.studies.sweep_steps import doubts, finish, prepare, run_peak, run_points
 
         scene = self._scene()
         assert scene is not None
@@ -296,6 +296,7 @@ class Sweep(Stage):
         if prepared.resumed:
             tools.note(f"{prepared.resumed} of {prepared.points.size} points are done, the rest follows")
         result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
+        tools.warn(doubts(prepared, result))
         if self.table.peak:
             peak = self.outputs[1]
             run_peak(prepared, result, peak, lambda text: tools.note(text.replace(str(peak), peak.name)))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
@@ -108,9 +107,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
     axis of numbers.
     """
     paths = list(sweep.axes)
-    lengths = [len(values) * (values.dtype.kind in "if") for values in sweep.axes.values()]
-    usual = [paths.index(path) for path in (FREQUENCY, *SPEEDS) if path in paths]
-    along = usual[0] if usual else int(np.argmax(lengths))
+    along = paths.index(sweep.along)
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
     others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]

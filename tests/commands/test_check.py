@@ -73,6 +73,7 @@ def test_numbers_of_a_rigid_structure(tmp_path, capfd):
     assert found["kind"] == "scene" and found["commands"] == ["run", "sweep"] and found["sweep_points"] == 2
     assert found["sweep_seconds"] > 0 and found["run_seconds"] > 0
     assert found["defaults"]["damper.0.position"] == 0.0 and "damper.0.friction" not in found["defaults"]
+    assert found["positions"] == [0.0]
 
 
 def shaker(amplitude, frequency=50.0, orientation_deg=0.0, **body):

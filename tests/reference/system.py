@@ -83,7 +83,7 @@ class System:
             [damper.friction * max(load, 0.0) / unit for damper, load in zip(scene.damper, loads, strict=True)]
         )
         self.weight = np.full(len(self.m), gravity.components(np.zeros(3))[0] / unit)
-        self.r0 = np.array([damper.position for damper in scene.damper]) / self.length
+        self.r0 = np.array(scene.positions) / self.length
         self.rd0 = np.array([damper.velocity for damper in scene.damper]) / (self.length * self.omega)
 
     def _contacts(self, scene: Scene) -> None:

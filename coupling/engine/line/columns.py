@@ -15,6 +15,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.bodies import spread
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
@@ -110,6 +111,8 @@ def columns(
     whole, system, start: of the scene itself.
     """
     found = repeated(system, start, len(next(iter(values.values()))))
+    gaps: dict[int, np.ndarray] = {}
+    places: dict[int, np.ndarray] = {}
     restitution = np.tile([damper.restitution for damper in scene.damper], (len(found.omega), 1))
     for path, numbers in values.items():
         place = entries_of(scene, path)
@@ -127,16 +130,21 @@ def columns(
             rows = _rows(whole, system, np.isin(whole.cavity, entries))
             walls = rows[np.isin(whole.surface[rows - system.friction_rows], (LEFT, RIGHT))]
             found.free_travel[:, rows], found.rest[:, walls] = numbers[:, None], (numbers / 2)[:, None]
+            gaps |= dict.fromkeys(entries, numbers)
         elif key == "friction":
             pressed = pressing(scene)
             for body in entries:
                 found.limit[:, body] = [coefficient(number) * max(pressed[body], 0.0) for number in numbers]
         elif key == "restitution":
             restitution[:, entries] = numbers[:, None]
+        elif key == "position":
+            places |= dict.fromkeys(entries, numbers)
         else:
-            (found.slip if key == "position" else found.slip_velocity)[:, entries] = numbers[:, None]
+            found.slip_velocity[:, entries] = numbers[:, None]
     if any(path.endswith(".restitution") for path in values):
         _set_restitution(scene, whole, system, found, restitution)
+    if gaps or places:
+        _set_positions(scene, found, gaps, places)
     return found
 
 
@@ -172,6 +180,18 @@ def _set_restitution(scene: Scene, whole: System, system: LineSystem, found: Col
             pairs = zip(own.tolist(), restitution[:, other].tolist(), strict=True)
             own = np.array([scene.contact.pair_restitution(*pair) for pair in pairs])
         found.restitution[:, row] = own
+
+
+def _set_positions(
+    scene: Scene, found: Columns, gaps: Mapping[int, np.ndarray], places: Mapping[int, np.ndarray]
+) -> None:
+    """Set where bodies begin: at positions (k,) m, by body, or spread in gaps (k,) m, by cavity."""
+    for index, cavity in enumerate(scene.cavity):
+        row = scene.bodies_in(cavity)
+        if index in gaps or not places.keys().isdisjoint(row):
+            given = [places.get(number, scene.damper[number].position) for number in row]
+            for number, own in zip(row, spread(given, gaps.get(index, cavity.gap)), strict=True):
+                found.slip[:, number] = own
 
 
 def columned(scene: Scene, paths: Iterable[str]) -> list[str]:

@@ -94,3 +94,8 @@ resume = argument(
 workers = argument(
     "--workers", type=partial(count, least=1, most=1024), metavar="N", help="processes (default: one for every core)"
 )
+#: leaves out the second runs that say whether results hang on the last bits of a start
+moved_start = argument(
+    "--no-moved-start", action="store_true",
+    help="no second run, or of a curve's peak, from bodies about 1e-9 of their gap aside, which should end alike",
+)  # fmt: skip

@@ -83,7 +83,7 @@ def passed(tables, periods) -> tuple[PeriodMap, np.ndarray]:
     if not periods:
         start = mapped.state_of(mapped.restart_of(np.zeros(len(mapped.scale))))
         start[0], start[1] = made.initial.displacement, made.initial.velocity
-        start[2] = made.damper[0].position
+        start[2] = made.positions[0]
         return mapped, start
     run = simulate(made.replace({"time.periods": periods, "time.transient": 0}))
     return mapped, mapped.state_of(run.final)
@@ -202,7 +202,7 @@ def test_impacts_of_a_ball_on_a_table_shrink_the_plane_by_the_square_of_their_re
     ratio = math.pi * (1 - restitution) / (1 + restitution) * 1.05
     made = period_one_start(restitution, ratio)
     mapped = period_map(made, FREQUENCY)
-    state = np.array([made.damper[0].position, made.damper[0].velocity])
+    state = np.array([made.positions[0], made.damper[0].velocity])
     passage = mapped(state)
     assert passage.sequence == ("impact c.left.0",)
     assert np.linalg.det(passage.derivative) == pytest.approx(restitution**2, rel=1e-10)

@@ -56,6 +56,10 @@ _POINTS = {
     ),
     "with and without friction": (_ONE, [{"damper.0.friction": m} for m in (0.0, 0.1, 0.0, 1e-10, 0.3)]),
     "few events": (_ONE | {"solver": {"max_events": 40}}, [{"excitation.frequency": f} for f in (15.0, 15.9, 16.4)]),
+    "rows that begin spread": (
+        _ONE | {"damper": [{"cavity": "c", "mass": 0.02, "friction": 0.1, "restitution": 0.6}] * 3},
+        [{"cavity.c.gap": g, "damper.1.position": x} for g in (2e-3, 4.1e-3, 6e-3) for x in (-7e-4, 0.0, 3e-4)],
+    ),
     "pulled along": (
         _RIGID | {"gravity": {"orientation_deg": 60.0}}, [{"cavity.c.gap": g} for g in (2e-3, 4e-3, 6e-3)],
     ),

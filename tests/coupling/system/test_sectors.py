@@ -155,6 +155,16 @@ def test_scatter_does_not_depend_on_which_sectors_have_cavities(file):
     assert np.unique(places).size > 6
 
 
+def test_bodies_of_every_sector_begin_spread_over_its_own_gap(file):
+    row = [{"cavity": "c", "mass": 0.01}] * 3
+    for scatter in (None, {"gap": 0.05, "seed": 4}):
+        made = unrolled(scene(file, damper=row, cavity__c__scatter=scatter))
+        gaps = [cavity.gap for cavity in made.cavity]
+        assert len(set(gaps)) == (1 if scatter is None else 6)
+        assert np.reshape(made.positions, (6, 3)) == pytest.approx(np.outer(gaps, [-0.25, 0.0, 0.25]), abs=1e-19)
+    assert unrolled(scene(file, damper=row[:1])).positions == [0.0] * 6
+
+
 def test_paths_of_the_compact_scene_change_all_sectors(file):
     made = scene(file)
     changed = unrolled(made.replace({"cavity.c.gap": 2e-4, "damper.1.mass": 0.03}))

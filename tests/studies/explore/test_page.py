@@ -126,7 +126,7 @@ def test_bodies_stand_evenly_in_every_cavity():
     assert {"bodies", "gap-0", "gap-1", "mass"} <= {control.name for control in controls}
     more = moved(two, controls, {"bodies": "2", "gap-1": "150"})
     assert [damper.cavity for damper in more.damper] == ["a", "a", "b", "b"]
-    assert [damper.position for damper in more.damper] == pytest.approx([-2.5e-5, 2.5e-5, -3.75e-5, 3.75e-5])
+    assert more.positions == pytest.approx([-1e-4 / 6, 1e-4 / 6, -2.5e-5, 2.5e-5])
 
 
 def test_bodies_that_differ_have_controls_of_their_own():

@@ -79,6 +79,8 @@ def facts_of(scene: Scene) -> list[Fact]:
     if whole.axes:
         warnings += sweep_doubts(_closed(whole))
     found = [*_of_structure(scene), *_of_level(scene, resonance), *_of_bodies(scene, resonance)]
+    if whole.damper:
+        found.append(Fact("positions", whole.positions, "m", "of the bodies at time zero"))
     return [*found, *_of_cost(scene, whole), Fact("warnings", warnings)]
 
 

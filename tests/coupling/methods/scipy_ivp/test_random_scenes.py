@@ -58,8 +58,8 @@ def hair(scene):
     Where all come to rest together the start is forgotten: what differs later begins in the collisions after it.
     """
     values = {}
-    for i, damper in enumerate(scene.damper):
-        values[f"damper.{i}.position"] = damper.position * (1 - 2 * APART)
+    for i, (damper, place) in enumerate(zip(scene.damper, scene.positions, strict=True)):
+        values[f"damper.{i}.position"] = place * (1 - 2 * APART)
         values[f"damper.{i}.restitution"] = damper.restitution * (1 - APART * (i + 1))
     data = scene.to_dict()
     for table, keys in {
