@@ -61,7 +61,7 @@ PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
 LIMITS = {
     "penetration": 1e-9, "apart": 1e-8, "motion": 1e-8, "pull": 1e-9, "cone": 1e-9, "along_slip": 1e-8,
     "starts": 1e-9, "newton": 1e-9, "impulse": 1e-9, "momentum": 1e-7, "gain": 1e-9, "ledger": 1e-10,
-    "returns": 1e-10,
+    "returns": 1e-10, "round_off": 0.0,
 }  # fmt: skip
 
 
@@ -82,6 +82,7 @@ class Worst:
     gain: float = 0.0  # energy that an impact brings
     ledger: float = 0.0
     returns: float = 0.0  # energy that friction, dashpots or impacts give back from one event to the next
+    round_off: float = 0.0  # rows of closed contacts that an impact leaves with the round-off of its impulses
     scenes: int = 0
     steps: int = 0
     jams: int = 0  # impacts without a collision
@@ -614,6 +615,8 @@ class Checker:
         # speeds after are sums of these terms, large where a block is wedged: a thousandth of theirs is speed enough
         terms = (np.abs(system.delassus) @ np.abs(impulse)).max()
         allowed = self._moment(after, motion) / speed
+        rows, rates = np.r_[shut, shut & (system.friction > 0)], np.abs(system.J @ after.v)
+        worst.note("round_off", np.sum(rows & (rates > 1e-11 * speed) & (rates < 1e-14 * terms)), where)
         caught = np.any(shut & (then[:u] > 1e-13 * speed) & (then[:u] < allowed * speed))
         self._jump(v, after, impulse, allowed if caught else 0.0, where)
         speed += 1e-3 * terms

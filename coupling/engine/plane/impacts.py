@@ -29,7 +29,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
 )
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
-from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE
+from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE, SPEED_ROUND_OFF
 from vanedamp.coupling.response.recorder import note_impact
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
@@ -205,6 +205,7 @@ def _apply(system, st, rec, log, scratch, count, tiny):
             st.ledger[IMPACT_LOSS] -= (
                 0.5 * scratch.impulse[row] * (scratch.before_impact[row] + row_speed(system, row, st.v))
             )
+    _stop_round_off(system, st, scratch, count)
 
 
 @inlined
@@ -324,9 +325,7 @@ def _stop(system, st, scratch, count, tiny, slow, most):
 
     most: fraction of its bound below which friction counts as that of a contact that sticks.
     """
-    u, found, loss = len(system.rest), 0, 0.0
-    for i in range(len(st.v)):
-        loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    u, found, before = len(system.rest), 0, _kinetic(system, st)
     for p in range(count):
         r = scratch.listed[p]
         normal = scratch.impulse[r]
@@ -335,6 +334,15 @@ def _stop(system, st, scratch, count, tiny, slow, most):
             sticks = scratch.slips[p] == _TURNS or abs(scratch.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
                 found = _stop_row(system, st, scratch, u + r, found)
+    _stop_driven(system, st, scratch, count, tiny, found, before)
+
+
+@inlined
+def _stop_driven(system, st, scratch, count, tiny, found, before):
+    """Stop closed contacts that approach as others have been stopped, and enter what all that takes.
+
+    found: number of directions stopped; before: kinetic energy before that.
+    """
     again = found > 0
     while again:
         again = False
@@ -342,9 +350,40 @@ def _stop(system, st, scratch, count, tiny, slow, most):
             if row_speed(system, scratch.listed[p], st.v) < -tiny:
                 more = _stop_row(system, st, scratch, scratch.listed[p], found)
                 again, found = again or more > found, more
+    st.ledger[IMPACT_LOSS] += before - _kinetic(system, st)
+
+
+@kernel
+def _stop_round_off(system, st, scratch, count):
+    """Stop rows whose speeds are round-off of the impulses (_push): those of a wedged block nearly balance each other.
+
+    Otherwise the last bits would decide which of them separate or slip, and which way, until they turn at once.
+    """
+    u, found, terms, before = len(system.rest), 0, 0.0, _kinetic(system, st)
+    for p in range(count):
+        for row in (scratch.listed[p], u + scratch.listed[p]):
+            total = 0.0
+            for i in range(len(st.v)):
+                total += abs(system.J[row, i]) * scratch.terms[i] / system.mass[i]
+            terms = max(terms, total)
+    noise, tiny = SPEED_ROUND_OFF * terms, AT_REST * st.scale[0]
+    if noise <= tiny:
+        return
+    for p in range(count):
+        r = scratch.listed[p]
+        for row in (r, u + r):
+            if abs(row_speed(system, row, st.v)) <= noise and (row == r or has_friction(system, r)):
+                found = _stop_row(system, st, scratch, row, found)
+    _stop_driven(system, st, scratch, count, tiny, found, before)
+
+
+@inlined
+def _kinetic(system, st):
+    """Return the kinetic energy, J."""
+    energy = 0.0
     for i in range(len(st.v)):
-        loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
-    st.ledger[IMPACT_LOSS] += loss
+        energy += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    return energy
 
 
 @inlined
