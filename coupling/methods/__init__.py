@@ -47,6 +47,8 @@ class Method(Protocol):
     A method that takes bodies in the plane has PLANAR_LAWS: what it accepts there apart from rigid contacts of one
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
     sentence that every run of such bodies with friction carries.
+
+    SOFT_WALLS = True: rigid walls are springs in it, and results in which bodies are deep in them carry a warning.
     """
 
     Options: type[SolverOptions]

@@ -35,6 +35,7 @@ VARIANTS = (
     Variant("co-simulation, Gauss-Seidel, hold 1", "#be185d", "<", {"exchange": "gauss_seidel", "hold": 1}),
 )
 WAVEFORMS = True
+SOFT_WALLS = True
 
 
 class Options(PenaltyOptions):
@@ -46,7 +47,7 @@ class Options(PenaltyOptions):
     """"gauss_seidel": the bodies know the structure's new motion; "jacobi": both start from the last exchange"""
     hold: Annotated[Whole, Field(ge=0, le=1)] = 1
     """order of the extrapolation within a macro-step"""
-    substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 10
+    substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 2
     """steps of the bodies in a macro-step"""
 
     @property

@@ -49,6 +49,7 @@ VARIANTS = (
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
 WAVEFORMS = True
+SOFT_WALLS = True
 PLANAR_LAWS = ("yields",)
 RUBBING_WARNING = (
     "impacts of planar bodies on springs that rub leave other speeds than Newton's law, with any number of steps; "

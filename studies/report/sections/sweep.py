@@ -87,12 +87,12 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "rings": [ring_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.sectors],
         "strength": [sweep_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.stress or sweep.wear],
-        "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
+        "notes": list(dict.fromkeys(note for sweep in sweeps.values() for note in _notes(sweep))),
     }
 
 
-def _body_note(sweep: Sweep) -> str | None:
-    return body_note(sweep.provenance, sweep.scene)
+def _notes(sweep: Sweep) -> Iterator[str]:
+    yield from filter(None, (body_note(sweep.provenance, sweep.scene), *sweep.provenance.get("warnings", ())))
 
 
 def _scene(sweep: Sweep) -> dict[str, Any]:
