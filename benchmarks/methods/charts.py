@@ -133,7 +133,12 @@ class Chart:
     @cached_property
     def settled(self) -> np.ndarray:
         """The series of the exact engine's steady response: one entry per evaluated period."""
-        return self._series(self._steady_run(self.scene, self.effort.means))
+        return self._series(self._steady_run(self.scene, self._means))
+
+    @property
+    def _means(self) -> int:
+        """Periods of a mean: half of them where runs begin in the exact steady state and repeat."""
+        return self.effort.means // (2 if self.repeats else 1)
 
     @property
     def _compared(self) -> int:
@@ -189,7 +194,7 @@ class Chart:
     def _point(self, key: Key) -> dict[str, Any]:
         """Return the status and error of one run, and what it took, s."""
         scene, started = self._variant(key), time.thread_time()
-        means = self.effort.ivp if _by_tolerance(key[0]) else self.effort.means
+        means = self.effort.ivp if _by_tolerance(key[0]) else self._means
         response = self._run(scene, self._compared if self.repeats else means)
         point = _new_point(key, response.status.value) | {"spent": time.thread_time() - started}
         point |= {"energy_residual": response.energy_residual, "penetration": response.penetration}
@@ -229,7 +234,7 @@ class Chart:
         """Return the status and error of a peer's run, and what it took, s; or why it is absent."""
         effort, (name, setting), started = self.effort, key, time.thread_time()
         peer, samples = PEERS[name], _SAMPLES if self.repeats else 0
-        means = effort.means if peer.compiled else effort.ivp if peer.tolerance else effort.others
+        means = self._means if peer.compiled else effort.ivp if peer.tolerance else effort.others
         try:
             run = run_peer(name, self.scene, effort.checked if self.repeats else means, setting, samples)
         except InputError as refused:
