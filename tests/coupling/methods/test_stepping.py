@@ -170,13 +170,10 @@ def steady(scene, **solver):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_steady_amplitudes_are_within_2_percent_by_default(settled, name):
-    """A state near the exact one after a few periods says nothing of this: springs of walls widen the cavity.
-
-    The other half percent: what the mean of so few periods varies by, as contacts begin anywhere in their steps.
-    """
+    """A state near the exact one after a few periods says nothing of this: springs of walls widen the cavity."""
     response = steady(settled, **METHODS[name])
     assert response.status is Status.OK
-    assert response.amplitude_mean == pytest.approx(steady(settled, method="exact").amplitude_mean, rel=0.025)
+    assert response.amplitude_mean == pytest.approx(steady(settled, method="exact").amplitude_mean, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["explicit", "newmark", "gauss-seidel"])
@@ -187,6 +184,26 @@ def test_steady_amplitudes_are_wrong_by_ten_times_the_penetration(settled, name)
         assert 1 - response.amplitude_mean / exact == pytest.approx(10 * response.penetration, rel=0.25)
         [warning] = response.warnings
         assert warning.startswith(f"solver.method: bodies are {response.penetration:.1e} of the free travel deep")
+
+
+@pytest.mark.parametrize("name", ["explicit", "newmark", "hht", "gauss-seidel"])
+def test_restitution_does_not_depend_on_where_in_its_step_a_contact_begins(name):
+    """A body in free flight rebounds with 0.7 of its speed from a wall that it meets at 20 places in a step.
+
+    With a dashpot that acts in whole steps only, rebounds scatter by 0.05.
+    """
+    scene = made(
+        {"structure": {"model": "prescribed", "displacement_amplitude": 1e-9}, "excitation": {"frequency": 1.0},
+         "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 1.0}],
+         "damper": [{"cavity": "c", "mass": 1.0, "velocity": 1.0, "restitution": 0.7}],
+         "time": {"periods": 1, "transient": 0}}
+    )  # fmt: skip
+    solver = METHODS[name] | {"steps_per_period": 200, "contact_steps": 10.0}
+    solver |= {"substeps": 1} if solver["method"] == "cosim" else {}
+    places = (0.25 + place / 4000 for place in range(20))
+    rebounds = [-simulate(by(scene.replace({"damper.0.position": x}), **solver)).slip_velocity[-1, 0] for x in places]
+    assert np.ptp(rebounds) < 0.02
+    assert np.mean(rebounds) == pytest.approx(0.7, abs=0.02)
 
 
 def test_walls_that_are_hard_enough_have_no_warning(settled, pressed):
@@ -211,7 +228,7 @@ def test_sweeps_warn_of_deep_walls_by_the_methods_that_have_them(settled):
 
 
 @pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize(("scene", "tolerance"), [("periodic", 0.1), ("stick_slip", 1e-3)])
+@pytest.mark.parametrize(("scene", "tolerance"), [("periodic", 0.06), ("stick_slip", 1e-3)])
 def test_converges_to_the_exact_engine(scene, tolerance, name, request):
     scene = request.getfixturevalue(scene)
     exact = simulate(scene)
@@ -220,7 +237,7 @@ def test_converges_to_the_exact_engine(scene, tolerance, name, request):
         np.mean([error(scene, exact, **METHODS[name], steps_per_period=count + 7 * i) for i in range(8)])
         for count in (2000, 32000)
     )
-    assert fine < min(tolerance, 0.5 * coarse)
+    assert fine < min(tolerance, 0.4 * coarse)
 
 
 @pytest.mark.parametrize("name", METHODS)
