@@ -1,8 +1,10 @@
 """One chart of speed against accuracy: a scene by every method and by other programs, a row a run, the times in turns.
 
-Scenes that repeat: largest error of response and slips at ten times of every period, relative to their ranges, against
-the exact engine, whose own error is against 40 digits for one mode. Scenes that never repeat: error of the mean
-amplitude, with the 95 % confidence intervals of both means. Times are CPU times per excitation period, without set-up.
+The error of the steady response is that of its mean amplitude, with the 95 % confidence intervals of both means; where
+the structure's motion is prescribed, that of the bodies' mean swing. Scenes that repeat also have the error of the
+state, in the first periods from the exact steady state: the largest of response and slips at ten times of every period,
+relative to their ranges, against the exact engine, whose own error is against 40 digits for one mode. It does not
+include the drift to the method's own steady state. Times are CPU times per excitation period, without set-up.
 Other programs (bench.methods.peers) take part where they are installed and can express the scene.
 """
 
@@ -29,7 +31,7 @@ from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.scene.structures import Rigid
+from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
@@ -43,7 +45,7 @@ DEAR, ONE = "too dear for a mean", 1e-4
 #: start of the status of a run that would have taken too long
 DROPPED = "dropped: "
 #: about what a row takes, s: a run of a scene that repeats, of another; of that by tolerance; the times
-_RUN, _MEAN, _DEAR_MEAN, _TIMES = 0.1, 0.8, 10.0, 6.0
+_RUN, _MEAN, _DEAR_MEAN, _TIMES = 1.5, 1.5, 10.0, 6.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ class Chart:
         contest = Contest("exact engine", float("inf"), self.effort.longest)
         points = [self._taken(rows, contest, key, self._point) for key in _settings(self.effort)]
         if self.repeats and reference["own_error"] is not None:
-            points[0]["error"] = reference["own_error"]
+            points[0] |= dict.fromkeys(("error", "steady"), reference["own_error"])
         absent: dict[str, str] = {}
         for key in _peer_settings(self.effort):
             if key[0] in absent:
@@ -127,6 +129,16 @@ class Chart:
     def exact(self) -> Response:
         """The reference: the exact engine, over the most periods."""
         return self._run(self.scene, self._compared)
+
+    @cached_property
+    def settled(self) -> np.ndarray:
+        """The series of the exact engine's steady response: one entry per evaluated period."""
+        return self._series(self._steady_run(self.scene, self._means))
+
+    @property
+    def _means(self) -> int:
+        """Periods of a mean: half of them where runs begin in the exact steady state and repeat."""
+        return self.effort.means // (2 if self.repeats else 1)
 
     @property
     def _compared(self) -> int:
@@ -182,8 +194,8 @@ class Chart:
     def _point(self, key: Key) -> dict[str, Any]:
         """Return the status and error of one run, and what it took, s."""
         scene, started = self._variant(key), time.thread_time()
-        periods = self._compared if self.repeats else self.effort.ivp if _by_tolerance(key[0]) else self.effort.means
-        response = self._run(scene, periods)
+        means = self.effort.ivp if _by_tolerance(key[0]) else self._means
+        response = self._run(scene, self._compared if self.repeats else means)
         point = _new_point(key, response.status.value) | {"spent": time.thread_time() - started}
         point |= {"energy_residual": response.energy_residual, "penetration": response.penetration}
         # few periods that have not settled have a mean all the same, as those of other programs have
@@ -193,27 +205,50 @@ class Chart:
         point["status"] = status_after(scene, _lengths(key, self.effort)[1])
         if self.repeats:
             samples = np.column_stack([response.displacement, response.body_displacement])
-            return point | {"error": _state_error(samples, self.exact), "floor": _FLOOR}
-        return point | _mean_error(response.amplitude_mean, response.amplitude_mean_confidence, self.exact)
+            point |= {"error": _state_error(samples, self.exact), "floor": _FLOOR}
+            settled = self._steady_run(scene, means)
+            point |= {"penetration": settled.penetration}
+            if settled.status in (Status.OK, Status.NOT_STEADY):
+                point |= _steady_error(self._series(settled), self.settled)
+            return point | {"spent": time.thread_time() - started}
+        found = _mean_error(response.amplitude_mean, response.amplitude_mean_confidence, self.exact)
+        return point | found | {"steady": found["error"]}
+
+    def _steady_run(self, scene: Scene, periods: int) -> Response:
+        kept = {"time.periods": periods, "time.transient": _dropped(periods)}
+        return simulate(scene.replace(kept), samples_per_period=_SAMPLES if self._prescribed else 0)
+
+    @property
+    def _prescribed(self) -> bool:
+        return isinstance(self.scene.structure, Prescribed)
+
+    def _series(self, run: Response | PeerRun) -> np.ndarray:
+        """Return the amplitudes (k,), m, of the evaluated periods; of a prescribed structure the bodies' swings."""
+        series = run.peak
+        if self._prescribed:
+            slips = run.samples[:, 1:] if isinstance(run, PeerRun) else run.body_displacement
+            series = np.ptp(slips.reshape(-1, _SAMPLES, slips.shape[1]), axis=1).sum(axis=1)
+        return series[_dropped(len(series)) :]
 
     def _peer_point(self, key: Key) -> dict[str, Any]:
         """Return the status and error of a peer's run, and what it took, s; or why it is absent."""
         effort, (name, setting), started = self.effort, key, time.thread_time()
-        peer, periods = PEERS[name], effort.checked
-        if not self.repeats:
-            periods = effort.means if peer.compiled else effort.ivp if peer.tolerance else effort.others
+        peer, samples = PEERS[name], _SAMPLES if self.repeats else 0
+        means = self._means if peer.compiled else effort.ivp if peer.tolerance else effort.others
         try:
-            run = run_peer(name, self.scene, periods, setting, _SAMPLES if self.repeats else 0)
+            run = run_peer(name, self.scene, effort.checked if self.repeats else means, setting, samples)
         except InputError as refused:
             return {"absent": str(refused), "status": str(refused), "spent": 0.0}
-        point = _new_point(key, run.status) | {"penetration": run.penetration, "spent": time.thread_time() - started}
-        return point | self._peer_error(run) if run.status == "ok" else point
-
-    def _peer_error(self, run: PeerRun) -> dict[str, float]:
-        if self.repeats:
-            return {"error": _state_error(run.samples, self.exact), "floor": _FLOOR}
-        late = run.peak[_dropped(len(run.peak)) :]
-        return _mean_error(float(late.mean()), mean_confidence(late), self.exact)
+        point = _new_point(key, run.status)
+        if run.status == "ok" and self.repeats:
+            point |= {"error": _state_error(run.samples, self.exact), "floor": _FLOOR}
+            run = run_peer(name, self.scene, means, setting, samples)
+            point |= _steady_error(self._series(run), self.settled) if run.status == "ok" else {}
+        elif run.status == "ok":
+            late = self._series(run)
+            found = _mean_error(float(late.mean()), mean_confidence(late), self.exact)
+            point |= found | {"steady": found["error"]}
+        return point | {"penetration": run.penetration, "spent": time.thread_time() - started}
 
     def _times(self, good: list[dict[str, Any]], number: int) -> list[list[float]]:
         """Return the seconds a period of every round, for each good point."""
@@ -275,9 +310,13 @@ def _dropped(periods: int) -> int:
 
 
 def _new_point(key: Key, status: str) -> dict[str, Any]:
-    """Return a point without figures; `floor`: the error below which the comparison is undecided."""
+    """Return a point without figures; `floor`: the error below which the comparison is undecided.
+
+    steady: error of the steady response, None of a run that fails before; error: that, or the error of the state.
+    """
     return {
-        "method": key[0], "setting": key[1], "status": status, "error": None, "interval": None, "floor": 0.0,
+        "method": key[0], "setting": key[1], "status": status, "error": None, "steady": None, "interval": None,
+        "floor": 0.0,
         "energy_residual": 0.0, "penetration": 0.0, "time": None,
     }  # fmt: skip
 
@@ -301,6 +340,12 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
     theirs = (reference.amplitude_mean_confidence or 0.0) / reference.amplitude_mean
     error = abs(mean / reference.amplitude_mean - 1)
     return {"error": error, "interval": interval, "floor": float(np.hypot(interval, theirs))}
+
+
+def _steady_error(series: np.ndarray, exact: np.ndarray) -> dict[str, float]:
+    """Return the error of the mean of a series (k,), and the half width of its confidence interval, both relative."""
+    mean, interval = series.mean() / exact.mean(), (mean_confidence(series) or 0.0) / exact.mean()
+    return {"steady": float(abs(mean - 1)), "interval": float(interval)}
 
 
 def _lengths(key: Key, effort: Settings) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from vanedamp.studies.figures import BLUE, GREY, RED, draw_grid, save, subplots
 
 
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Draw a panel a scene: error against CPU time per period, and the model ladder if there is one."""
+    """Draw a panel per scene: error against CPU time per period, and the model ladder if there is one."""
     charts, drawn, looks = result["charts"], [], styles()
     figure, axes = subplots(2, 4, size=(21, 10))
     panels = list(axes.flat)
@@ -39,14 +39,14 @@ def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
 def _chart(axes: Axes, name: str, chart: Mapping[str, Any], looks: Mapping[str, tuple[str, str]]) -> None:
     for method, (colour, marker) in looks.items():
         points = [point for point in chart["points"] if point["method"] == method and point["time"]]
-        times = [1e6 * point["time"]["median"] for point in points]
-        errors = [max(point["error"], 1e-14) for point in points]
-        if not points:
-            continue
-        axes.loglog(
-            times, errors, marker + "-", color=colour, markersize=14 if marker == "*" else 5, label=method,
-            zorder=3 if marker == "*" else 2,
-        )  # fmt: skip
+        for which, line, label in (("steady", "-", method), *([("error", ":", None)] if chart["repeats"] else [])):
+            drawn = [(1e6 * p["time"]["median"], max(p[which], 1e-14)) for p in points if p[which] is not None]
+            if drawn:
+                axes.loglog(
+                    *zip(*drawn, strict=True), marker + line, color=colour, label=label,
+                    linewidth=1.5 if label else 0.8, markersize=14 if marker == "*" else 5 if label else 2,
+                    zorder=3 if marker == "*" else 2,
+                )  # fmt: skip
     statuses = [point["status"] for point in chart["points"] if point["status"] not in ("ok", "too dear for a mean")]
     dropped = sum(status.startswith("dropped: ") for status in statuses)
     failed = len(statuses) - dropped
@@ -61,7 +61,8 @@ def _chart(axes: Axes, name: str, chart: Mapping[str, Any], looks: Mapping[str, 
     absent = "".join(f"\n{wrap(reason)}" for reason in chart["absent"].values())
     axes.set_title(f"{name}\n{front}" + (f"\n{note}" if note else "") + absent, fontsize=9)
     axes.set_xlabel("CPU time per period, µs")
-    axes.set_ylabel("error of the state" if chart["repeats"] else "error of the mean amplitude")
+    state = "\ndotted: of the state, in the first periods from the exact one" if chart["repeats"] else ""
+    axes.set_ylabel(f"error of the steady response{state}")
     draw_grid(axes)
 
 

@@ -15,7 +15,7 @@ from benchmarks.methods.full_mesh_comparison import CurveEffort
 from benchmarks.rows import Rows
 from benchmarks.tables import seconds_text, table
 
-_POINT = ("method", "setting", "status", "error", "interval", "floor", "energy_residual", "penetration")
+_POINT = ("method", "setting", "status", "error", "steady", "interval", "floor", "energy_residual", "penetration")
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,10 @@ class WorkPrecision(Settings, Benchmark):
         work_precision_figure(result, folder / "work_precision.png")
 
     def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
-        """Yield time a period and error of every method at its middle setting, and where the exact engine is best."""
+        """Yield time per period and error of every method at its middle setting, and where the exact engine is best.
+
+        Then the errors of the steady response, all methods and settings.
+        """
         charts = result["charts"]
         methods = dict.fromkeys(point["method"] for chart in charts.values() for point in chart["points"])
         lines = []
@@ -76,20 +79,33 @@ class WorkPrecision(Settings, Benchmark):
             setting = _middle(next(chart for chart in charts.values()), method)
             cells = (_cell(chart, method, setting) for chart in charts.values())
             lines.append((f"{method}, {setting:g}" if setting else method, *cells))
-        yield table(("time a period, error", *charts), lines)
+        yield table(("time per period, error of the steady response", *charts), lines)
         for name, chart in charts.items():
             better = chart["dominated_by"]
             yield f"{name}: the exact engine is {'not ' if better else ''}on the front" + (
                 f": {', '.join(better)}" if better else ""
             )
             yield from (f"  without {reason}" for reason in chart["absent"].values())
+        yield table(("error of the steady response", *charts), _steady_lines(charts))
 
 
 FULL = WorkPrecision(
-    3, (100, 300, 1000, 3000, 10_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 2000, 30_000, 400, 1e7, 100_000, 10,
+    3, (100, 300, 1000, 3000, 10_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 2000, 30_000, 400, 1e8, 100_000, 10,
     (0, 1, 2, 4, 7, 10, 15, 20), (300, 1000), 500, CurveEffort(),
 )  # fmt: skip
 QUICK = WorkPrecision(2, (100, 1000), (1e-4, 1e-8), 3, 200, 600, 40, 1e6, 50_000, None, (), (300,), 100)
+
+
+def _steady_lines(charts: Mapping[str, Any]) -> Iterator[Sequence[str]]:
+    """Yield the errors of the steady response of a method at a setting in every chart, or why there is none."""
+    found: dict[tuple[str, float], dict[str, str]] = {}
+    for name, chart in charts.items():
+        for point in chart["points"]:
+            status = point["status"] if point["status"] != "ok" or point["error"] is None else "fails later"
+            text = status if point["steady"] is None else f"{point['steady']:.1e}"
+            found.setdefault((point["method"], point["setting"]), {})[name] = text
+    for (method, setting), texts in found.items():
+        yield f"{method}, {setting:g}" if setting else method, *(texts.get(name, "") for name in charts)
 
 
 def _middle(chart: Mapping[str, Any], method: str) -> float:
@@ -106,4 +122,5 @@ def _cell(chart: Mapping[str, Any], method: str, setting: float) -> str:
         return ""
     if point["time"] is None:
         return str(point["status"])
-    return f"{seconds_text(point['time']['median'])}, {point['error']:.1e}"
+    steady = "fails later" if point["steady"] is None else f"{point['steady']:.1e}"
+    return f"{seconds_text(point['time']['median'])}, {steady}"

@@ -15,7 +15,7 @@ from vanedamp.coupling.ensembles.record import AT_POINTS, STRENGTH, WEAR, Ensemb
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sweep.further import stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import resonance_axis
-from vanedamp.coupling.sweep.sweep import run_all
+from vanedamp.coupling.sweep.sweep import run_all, warnings_in
 from vanedamp.coupling.sweep.worker import COLUMNS, MEASURES, SweepTable, parts_of
 from vanedamp.files.store import frozen
 
@@ -56,7 +56,7 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
         quantile={name: frozen(quantiles(values, count)) for name, values in (results | of_curves).items()},
         indices={name: frozen(indices(values, count, seed)) for name, values in (told | of_curves).items()},
         provenance=provenance
-        | ({"warnings": list(grid.warnings)} if grid.warnings else {})
+        | warnings_in(grid, found["penetration"])
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),
     )

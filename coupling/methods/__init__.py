@@ -48,6 +48,8 @@ class Method(Protocol):
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
     sentence that every run of such bodies with friction carries, and run_warnings, which yields sentences that every
     run of a scene without open choices carries.
+
+    SOFT_WALLS = True: rigid walls are springs in it, and results in which bodies are deep in them carry a warning.
     """
 
     Options: type[SolverOptions]

@@ -44,6 +44,7 @@ VARIANTS = (
     Variant("co-simulation, Gauss-Seidel, hold 1", "#be185d", "<", {"exchange": "gauss_seidel", "hold": 1}),
 )
 WAVEFORMS = True
+SOFT_WALLS = True
 #: by how much the spectral radius of a stable macro-step may exceed 1, as that of a body without a force does
 _UNSTABLE = 1e-9
 
@@ -57,7 +58,7 @@ class Options(PenaltyOptions):
     """"gauss_seidel": the bodies know the structure's new motion; "jacobi": both start from the last exchange"""
     hold: Annotated[Whole, Field(ge=0, le=1)] = 1
     """order of the extrapolation within a macro-step"""
-    substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 10
+    substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 2
     """steps of the bodies in a macro-step"""
 
     @property

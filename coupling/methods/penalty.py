@@ -24,6 +24,7 @@ from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.penalty_forces import (
     PenaltyOptions,
     first_forces,
+    first_share,
     net_load,
     penalty_laws,
     set_forces,
@@ -49,6 +50,7 @@ VARIANTS = (
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
 WAVEFORMS = True
+SOFT_WALLS = True
 PLANAR_LAWS = ("yields",)
 RUBBING_WARNING = (
     "impacts of planar bodies on springs that rub leave other speeds than Newton's law, with any number of steps; "
@@ -180,7 +182,7 @@ def _predict(system, times, motion, problem, parameters, inverse, laws, k):
         accel[i] = product(inverse, i, rhs)
         ahead[i] += beta * h * h * accel[i]
         fast[i] += gamma * h * accel[i]
-    return _list_rows(system, problem, laws, h, ahead, fast, beta, gamma)
+    return _list_rows(system, problem, laws, h, ahead, fast, motion.force, beta, gamma)
 
 
 @kernel
@@ -209,7 +211,7 @@ def _correct(system, times, motion, problem, parameters, turned, count):
 
 
 @kernel
-def _list_rows(system, problem, laws, h, ahead, fast, beta, gamma):
+def _list_rows(system, problem, laws, h, ahead, fast, last, beta, gamma):
     """Set up the problem of the rows that may carry force. Return their number."""
     count, u, first = ZERO, len(system.rest), len(system.rest) - len(system.tangential)
     for place in range(u):
@@ -219,8 +221,10 @@ def _list_rows(system, problem, laws, h, ahead, fast, beta, gamma):
             opened = gap(system, r, ahead)
             if opened > 0.0:
                 continue
-            stiff = laws.spring[r] * beta * h * h + laws.dashpot[r] * gamma * h
-            shift = (laws.spring[r] * opened + laws.dashpot[r] * row_speed(system, r, fast)) / stiff
+            rate = row_speed(system, r, fast)
+            dashpot = laws.dashpot[r] * first_share(opened, rate, last[r], h)
+            stiff = laws.spring[r] * beta * h * h + dashpot * gamma * h
+            shift = (laws.spring[r] * opened + dashpot * rate) / stiff
             list_row(problem, count, r, shift, 0.0, math.inf, 1.0 / stiff)
             count = list_slip(system, problem, count, r, slip, 0.0, 0.0)
             continue

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, Watch, evaluate, run_scene
@@ -20,6 +23,9 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import most_periods
 from vanedamp.files.toml_input import InputError
+
+#: penetration over the free travel above which the error of steady amplitudes exceeds about 1 % (docs/accuracy.md)
+_DEEP = 1e-3
 
 
 def respond(
@@ -39,7 +45,27 @@ def respond(
     ended = run_scene(run, scene, progress, watch)
     outcome = run.outcome() if watch is None else watch.close(run.outcome())
     response = evaluate(scene, outcome, ended, started)
-    return replace(response, final=final_state(scene, run))
+    warnings = response.warnings + wall_warnings(scene, {}, np.array(response.penetration))
+    return replace(response, final=final_state(scene, run), warnings=warnings)
+
+
+def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.ndarray) -> tuple[str, ...]:
+    """Return the warning that bodies are deep in rigid walls, of methods with springs in their place; empty without.
+
+    depth: penetration over the free travel, (..., *grid) over the axes of a sweep.
+    """
+    methods = axes.get("solver.method", [scene.solver.method])
+    if "solver.method" in axes:
+        depth = np.moveaxis(depth, list(axes).index("solver.method") - len(axes), 0)
+    rows = zip(methods, depth.reshape(len(methods), -1), strict=True)
+    soft = [row for name, row in rows if getattr(METHODS.part(name), "SOFT_WALLS", False)]
+    deepest = np.fmax.reduce(np.ravel(soft), initial=0.0)
+    if deepest <= _DEEP:
+        return ()
+    return (
+        f"solver.method: bodies are {deepest:.1e} of the free travel deep in rigid walls, which are springs here; "
+        'steady amplitudes may be wrong by ten times that: take more steps_per_period, or method = "exact"',
+    )
 
 
 def final_state(scene: Scene, run: Run) -> RestartState | None:

@@ -46,6 +46,7 @@ class Sweep(SceneRecord, Plotted):
                           `max_dynamic` and `mean_dynamic` count from the static deflection under the bodies' loads,
                           as `undamped` and `fixed` do
     attached_mass_fraction  fraction of the bodies' mass that the structure feels; nan without bodies or motion
+    penetration           deepest overlap of bodies and rigid walls over the free travel; 0 for the exact engine
     energy_share          (*grid, 4) fraction of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
     in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), fraction of the time off the
@@ -90,6 +91,7 @@ class Sweep(SceneRecord, Plotted):
     attached_mass_fraction: np.ndarray
     energy_share: np.ndarray
     energy_residual: np.ndarray
+    penetration: np.ndarray
     status: np.ndarray
     classification: np.ndarray
     in_plane: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -196,6 +198,7 @@ class Sweep(SceneRecord, Plotted):
         """Return the record in the variables and attributes of a file."""
         for name in ("amplitude_max", "amplitude_mean"):  # all that earlier files have
             values.setdefault(f"{name}_dynamic", values[name])
+        values.setdefault("penetration", np.full(np.shape(values["status"]), np.nan))
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
         given = cls.common(attributes, path)
         given |= {name: frozen(values[name]) for name in (*MEASURES, "energy_share")}

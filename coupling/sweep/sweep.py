@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.methods.registry import wall_warnings
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
@@ -130,10 +131,16 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
-        | ({"warnings": list(grid.warnings)} if grid.warnings else {})
+        | warnings_in(grid, columns["penetration"])
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),
     )
+
+
+def warnings_in(grid: Grid, penetration: np.ndarray) -> dict[str, list[str]]:
+    """Return the warnings of a grid and of its results for the provenance. penetration: (..., *grid) of all points."""
+    found = (*grid.warnings, *wall_warnings(grid.base, grid.axes, penetration))
+    return {"warnings": list(found)} if found else {}
 
 
 #: keys that linear curves do not depend on

@@ -44,7 +44,7 @@ MEASURES = {
     "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_max_dynamic": "m",
     "amplitude_mean_dynamic": "m", "amplitude_rms": "m", "amplitude_harmonic": "m", "amplitude_undamped": "m",
     "amplitude_fixed": "m",
-    "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
+    "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1", "penetration": "1",
 }  # fmt: skip
 #: measures of each body in the plane and their units, each an array over the grid and the bodies
 IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1", "wall_impacts": "1"}
@@ -128,7 +128,7 @@ def _rows(figures: np.ndarray, linear: np.ndarray) -> np.ndarray:
     """Return the rows of runs from their figures (k, figures) and linear amplitudes (k, 2)."""
     rows = np.empty((len(figures), len(COLUMNS)))
     for name, place in _OF_RUN:
-        rows[:, place] = figures[:, FIGURES.index(name)]
+        rows[:, place] = figures[:, FIGURES.index(name)] if name in FIGURES else 0.0  # exact: no penetration
     rows[:, _LINEAR] = linear
     rows[:, len(MEASURES) :] = _shares(figures[:, [FIGURES.index(name) for name in LOSSES]])
     return rows

@@ -51,7 +51,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
         *_summary(result, responses),
         f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s",
     ]
-    write_result(arguments, result.to_json() | speed | resonance | {"headlines": headlines}, lines)
+    found = [warning for warning in result.provenance.get("warnings", ()) if warning not in points.warnings]
+    write_result(arguments, result.to_json() | speed | resonance | {"headlines": headlines}, lines, found)
     finish(prepared, arguments.output)
 
 

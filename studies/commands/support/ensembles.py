@@ -59,7 +59,8 @@ def run_ensemble(arguments: Namespace, scene: Scene) -> None:
         f"{speed['wall_time_s']:.1f} s",
         *([f"{result.not_ok} of {points.size} points are not ok, and left out"] if result.not_ok else []),
     ]
-    write_result(arguments, result.to_json() | speed | resonance, lines, output=result.save)
+    found = [warning for warning in result.provenance.get("warnings", ()) if warning not in points.grid.warnings]
+    write_result(arguments, result.to_json() | speed | resonance, lines, found, output=result.save)
     if checkpoint is not None:
         clear(checkpoint)
 

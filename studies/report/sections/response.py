@@ -42,7 +42,8 @@ def _history(file: str, history: History, page: Page) -> dict[str, Any]:
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
     shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
     shown["static"] = history.measures.get("static_deflection", 0.0)  # earlier files have none
-    shown |= {"hits": bool(history.hits), "note": body_note(history.measures, history.scene)}
+    notes = [body_note(history.measures, history.scene), *history.measures.get("warnings", ())]
+    shown |= {"hits": bool(history.hits), "notes": list(filter(None, notes))}
     shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear", "sectors"))
     if stress := history.measures.get("stress"):
         shown["stress"] = spots_shown(file, stress, history.measures.get("strength", {}), page)

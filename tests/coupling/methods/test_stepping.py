@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.methods import scenes as method_scenes
 from benchmarks.methods.scenes import double
 from benchmarks.stability.macro_step import macro_step
 from benchmarks.stability.scenes import DAMPING, contact_stiffness, coupled_pair
@@ -18,6 +19,7 @@ from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 
 METHODS = {
@@ -58,6 +60,12 @@ def periodic():
         "time.periods": 4, "time.transient": 0,
     }  # fmt: skip
     return scene.replace({key: value if "time" in key else float(value) for key, value in state.items()})
+
+
+@pytest.fixture(scope="module")
+def settled():
+    """Two impacts per period, structure of little damping: the scene of the charts of methods, in its steady state."""
+    return method_scenes.periodic(3000)
 
 
 @pytest.fixture(scope="module")
@@ -144,17 +152,84 @@ def test_moreau_is_of_first_order_over_impacts(periodic):
     assert -np.polyfit(np.log([200, 800, 3200]), np.log(errors), 1)[0] == pytest.approx(1, abs=0.2)
 
 
-def test_penalty_without_a_stiffness_is_of_order_two_thirds(periodic):
-    """Time and depth of a contact are of the size of its duration, 2 steps^(1/3) steps.
+def test_penalty_is_of_order_two_thirds(periodic):
+    """Time and depth of a contact are of the size of its duration, here 2 steps^(1/3) steps.
 
     The mean over many steps: where in its step a contact begins, the last bit may decide.
     """
     exact = simulate(periodic)
     errors = [
-        np.mean([error(periodic, exact, method="penalty", steps_per_period=count + 7 * i) for i in range(40)])
+        np.mean([
+            error(periodic, exact, method="penalty", steps_per_period=n, contact_steps=2 * n ** (1 / 3))
+            for n in range(count, count + 280, 7)
+        ])
         for count in (2000, 8000, 32000)
-    ]
+    ]  # fmt: skip
     assert -np.polyfit(np.log([2000, 8000, 32000]), np.log(errors), 1)[0] == pytest.approx(2 / 3, abs=0.2)
+
+
+def steady(scene, **solver):
+    """The response of a scene that begins in its exact steady state, where a method has reached its own."""
+    return simulate(by(scene.replace({"time.periods": 600, "time.transient": 300}), **solver))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_steady_amplitudes_are_within_2_percent_by_default(settled, name):
+    """A state near the exact one after a few periods says nothing of this: springs of walls widen the cavity."""
+    response = steady(settled, **METHODS[name])
+    assert response.status is Status.OK
+    assert response.amplitude_mean == pytest.approx(steady(settled, method="exact").amplitude_mean, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["explicit", "newmark", "gauss-seidel"])
+def test_steady_amplitudes_are_wrong_by_ten_times_the_penetration(settled, name):
+    exact = steady(settled, method="exact").amplitude_mean
+    for steps, contact in ((300, 14.0), (1000, 20.0)):
+        response = steady(settled, **METHODS[name], steps_per_period=steps, contact_steps=contact)
+        assert 1 - response.amplitude_mean / exact == pytest.approx(10 * response.penetration, rel=0.25)
+        [warning] = response.warnings
+        assert warning.startswith(f"solver.method: bodies are {response.penetration:.1e} of the free travel deep")
+
+
+@pytest.mark.parametrize("name", ["explicit", "newmark", "hht", "gauss-seidel"])
+def test_restitution_does_not_depend_on_where_in_its_step_a_contact_begins(name):
+    """A body in free flight rebounds with 0.7 of its speed from a wall that it meets at 20 places in a step.
+
+    With a dashpot that acts in whole steps only, rebounds scatter by 0.05.
+    """
+    scene = made(
+        {"structure": {"model": "prescribed", "displacement_amplitude": 1e-9}, "excitation": {"frequency": 1.0},
+         "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 1.0}],
+         "damper": [{"cavity": "c", "mass": 1.0, "velocity": 1.0, "restitution": 0.7}],
+         "time": {"periods": 1, "transient": 0}}
+    )  # fmt: skip
+    solver = METHODS[name] | {"steps_per_period": 200, "contact_steps": 10.0}
+    solver |= {"substeps": 1} if solver["method"] == "cosim" else {}
+    places = (0.25 + place / 4000 for place in range(20))
+    rebounds = [-simulate(by(scene.replace({"damper.0.position": x}), **solver)).slip_velocity[-1, 0] for x in places]
+    assert np.ptp(rebounds) < 0.02
+    assert np.mean(rebounds) == pytest.approx(0.7, abs=0.02)
+
+
+def test_walls_that_are_hard_enough_have_no_warning(settled, pressed):
+    assert steady(settled, method="moreau", steps_per_period=300).warnings == ()
+    assert steady(settled, method="penalty", contact_steps=5.0).warnings == ()  # penetration 5e-4
+    assert simulate(by(pressed, method="penalty", steps_per_period=300)).warnings == ()  # the wall's own spring
+
+
+def test_sweeps_warn_of_deep_walls_by_the_methods_that_have_them(settled):
+    data = settled.to_dict() | {"time": {"periods": 20, "transient": 0}}
+    gaps = [settled.cavity[0].gap * factor for factor in (0.98, 1.0, 1.02)]
+
+    def swept(*methods):
+        axes = {"solver.method": list(methods), "cavity.c.gap": gaps}
+        return sweep(made(data | {"sweep": axes, "solver": {"steps_per_period": 300, "method": "penalty"}}))
+
+    found = swept("moreau", "penalty")
+    of_method = found.penetration.max(axis=1)
+    assert (of_method > 1e-3).all() and found.penetration.shape == (2, 3)
+    assert [f"{of_method[1]:.1e} of the free travel" in warning for warning in found.to_json()["warnings"]] == [True]
+    assert swept("moreau").to_json()["warnings"] == []
 
 
 @pytest.mark.parametrize("name", METHODS)
