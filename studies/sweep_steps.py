@@ -107,7 +107,7 @@ def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable
         np.moveaxis(mean, list(points.axes).index("continuation.direction"), 0)[linked] = -np.inf
     index = int(np.argmax(mean))
     if not np.isfinite(mean.flat[index]):
-        note(f"--peak: no point that can run by itself is ok, {path} was not written")
+        note(f"--peak: no point is ok{' that runs by itself' if directions else ''}, {path} was not written")
         return
     values = points.values(index)
     chosen = Points(points.base, points.choices).chosen(values)
