@@ -214,7 +214,9 @@ def _ensemble(record: _Record) -> Iterator[Fact]:
     yield Fact("ranges", {path: list(ends) for path, ends in found.scene.ranges.items()})
     yield Fact("samples", len(found.status))
     yield Fact("status", dict(Counter(map(str, found.status.ravel()))), "", "points")
-    yield Fact("response", list(found.sentences())[:1])
+    low = found.quantile["reduction"][0].ravel()
+    worst = int(np.nanargmin(low)) if np.isfinite(low).any() else 0
+    yield Fact("response", list(found.sentences())[worst : worst + 1], "", "the curve with the lowest reduction")
 
 
 def _orbits(record: _Record) -> Iterator[Fact]:

@@ -160,6 +160,8 @@ def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     assert record.sentence in told and "reduction, %" in told
     assert not list(tmp_path.glob("*.partial"))
     data = json.loads((tmp_path / "life.json").read_text())
+    assert [data["starts"][name]["starts"] for name in ("new", "end")] == [3, 3] and data["starts"] == record.starts
+    assert "as new, from the worst of 3 starts" in told and "at the end, from the worst of 3 starts" in told
     assert data["hours"] == pytest.approx(list(record.hours))
     assert [one["side"] for one in data["contacts"]] == ["floor", "left", "right"]
     assert main(["info", str(out)]) == 0
