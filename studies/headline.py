@@ -71,6 +71,11 @@ class Headline:
         return self.relative(self.damped_peak)
 
     @property
+    def maximum_ratio(self) -> float:
+        """The largest damped amplitude over the undamped peak: what high-cycle fatigue counts."""
+        return self.relative(self.damped_maximum)
+
+    @property
     def too_coarse(self) -> bool:
         """Say whether a step next to a resonance is wider than the resonance: a peak may hide there."""
         return self.spacing > self.half_power_width > 0.0
@@ -105,22 +110,27 @@ class Headline:
         if not math.isfinite(self.peak_ratio):
             unbounded = self.undamped_peak == math.inf
             compared = "that without bodies has no bound" if unbounded else "none without bodies to compare with"
-            text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; {compared}"
+            text = (
+                f"damped peak (mean) {self.damped_peak:.4g} m, at {at}, largest amplitude {self.damped_maximum:.4g} m; "
+                f"{compared}"
+            )
         elif self.undamped_at_edge or not along_frequency:
             text = (
-                f"highest damped mean {self.peak_ratio:.3f} of the highest amplitude without bodies "
-                f"{self.undamped_peak:.4g} m from {format_value(low)} to {format_value(high)}{unit}, at {at}"
+                f"highest damped mean {self.peak_ratio:.3f}, largest amplitude {self.maximum_ratio:.3f} of the highest "
+                f"amplitude without bodies {self.undamped_peak:.4g} m from {format_value(low)} to "
+                f"{format_value(high)}{unit}, at {at}"
             )
         else:
             text = (
-                f"damped peak (mean) {self.peak_ratio:.3f} of the maximum without bodies {self.undamped_peak:.4g} m, "
-                f"at {at}"
+                f"damped peak (mean) {self.peak_ratio:.3f}, largest amplitude {self.maximum_ratio:.3f} of the maximum "
+                f"without bodies {self.undamped_peak:.4g} m, at {at}"
             )
         return "; ".join([text, *self.remarks_in(units)])
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return asdict(self) | {"peak_ratio": self.peak_ratio, "too_coarse": self.too_coarse}
+        ratios = {"peak_ratio": self.peak_ratio, "maximum_ratio": self.maximum_ratio}
+        return asdict(self) | ratios | {"too_coarse": self.too_coarse}
 
 
 def format_value(value: Any) -> str:

@@ -106,12 +106,19 @@ def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> Non
 
 
 def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable[[str], None]) -> None:
-    """Run the point with the highest mean of those that are ok, and write its response; note: takes what to tell."""
+    """Run the point with the highest mean of those that are ok, and write its response; note: takes what to tell.
+
+    Points that began with the state of a neighbour do not count, as they would end in another motion.
+    """
     points = prepared.points
     mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
+    directions = points.axes.get("continuation.direction", ())
+    if directions:
+        linked = [place for place, direction in enumerate(directions) if direction != "independent"]
+        np.moveaxis(mean, list(points.axes).index("continuation.direction"), 0)[linked] = -np.inf
     index = int(np.argmax(mean))
     if not np.isfinite(mean.flat[index]):
-        note(f"--peak: no point is ok, {path} was not written")
+        note(f"--peak: no point is ok{' that runs by itself' if directions else ''}, {path} was not written")
         return
     values = points.values(index)
     chosen = Points(points.base, points.choices).chosen(values)

@@ -27,7 +27,8 @@ from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
-from vanedamp.studies.report.forced_response import best_first, forced_responses
+from vanedamp.studies.report.designs import designs
+from vanedamp.studies.report.forced_response import forced_responses
 
 #: entries of a list that are shown
 _MOST = 10
@@ -202,9 +203,10 @@ def _sweep(record: _Record) -> Iterator[Fact]:
     yield Fact("axes", {path: f"{ends[path]}, {len(values)} values" for path, values in sweep.axes.items()})
     for name, texts in (("status", sweep.status), ("classification", sweep.classification)):
         yield Fact(name, dict(Counter(map(str, texts.ravel()))), "", "points")
-    found = [response.sentence for response in best_first(forced_responses(sweep)) if response.reference > 0]
-    yield Fact("response", found[:1], "", "best curve")
-    yield Fact("curves", len(found))
+    found = [design for design in designs(forced_responses(sweep)) if design.worst.reference > 0]
+    yield Fact("response", [design.sentence for design in found[:1]], "", "best design, by its worst curve")
+    yield Fact("designs", len(found))
+    yield Fact("curves", sum(len(design.curves) for design in found))
 
 
 def _ensemble(record: _Record) -> Iterator[Fact]:
@@ -212,7 +214,9 @@ def _ensemble(record: _Record) -> Iterator[Fact]:
     yield Fact("ranges", {path: list(ends) for path, ends in found.scene.ranges.items()})
     yield Fact("samples", len(found.status))
     yield Fact("status", dict(Counter(map(str, found.status.ravel()))), "", "points")
-    yield Fact("response", list(found.sentences())[:1])
+    low = found.quantile["reduction"][0].ravel()
+    worst = int(np.nanargmin(low)) if np.isfinite(low).any() else 0
+    yield Fact("response", list(found.sentences())[worst : worst + 1], "", "the curve with the lowest reduction")
 
 
 def _orbits(record: _Record) -> Iterator[Fact]:

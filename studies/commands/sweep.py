@@ -13,12 +13,13 @@ from vanedamp.studies.commands.support.budget import check_run, check_sweep
 from vanedamp.studies.commands.support.ensembles import run_ensemble
 from vanedamp.studies.commands.support.messages import print_note, print_warnings, write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
-from vanedamp.studies.report.forced_response import ForcedResponse, best_first, forced_responses
+from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.sector_charts import ring_sentence
 from vanedamp.studies.sweep_steps import PEAK_SAMPLES, doubts, finish, prepare, run_peak, run_points
 from vanedamp.studies.workers import available_cores, workers
 
-#: curves whose headlines are printed
+#: designs whose headlines are printed
 _MOST_LINES = 12
 
 
@@ -46,28 +47,29 @@ def run(arguments: Namespace, scene: Scene) -> None:
         "points_resumed": resumed, "wall_time_s": seconds, "points_per_second": (points.size - resumed) / seconds
     }  # fmt: skip
     responses = forced_responses(result)
-    headlines = [response.to_json() for response in responses]
+    judged = designs(responses)
+    told = {"headlines": [each.to_json() for each in responses], "designs": [each.to_json() for each in judged]}
     lines = [
-        *_summary(result, responses),
+        *_summary(result, judged),
         f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s",
     ]
     found = [warning for warning in result.provenance.get("warnings", ()) if warning not in points.warnings]
-    write_result(arguments, result.to_json() | speed | resonance | {"headlines": headlines}, lines, found)
+    write_result(arguments, result.to_json() | speed | resonance | told, lines, found)
     finish(prepared, arguments.output)
 
 
-def _summary(result: Sweep, responses: Sequence[ForcedResponse]) -> Iterator[str]:
-    """Yield the headlines, best first, and how many points are not ok."""
-    if len(responses) > _MOST_LINES:
-        yield f"the {_MOST_LINES} best of {len(responses)} curves; --json and the report have all:"
-    for response in best_first(responses)[:_MOST_LINES]:
-        if not response.reference > 0:
+def _summary(result: Sweep, judged: Sequence[Design]) -> Iterator[str]:
+    """Yield the headlines of designs, best first, each of its worst curve, and how many points are not ok."""
+    if len(judged) > _MOST_LINES:
+        yield f"the {_MOST_LINES} best of {len(judged)} designs; --json and the report have all:"
+    for design in judged[:_MOST_LINES]:
+        if not design.worst.reference > 0:
             yield (
-                f"{response.name}: nothing excites the structure, or a waveform without linear curves: there is no "
+                f"{design.worst.name}: nothing excites the structure, or a waveform without linear curves: there is no "
                 "maximum without bodies to compare with"
             )
             continue
-        yield response.sentence
+        yield design.sentence
     if result.sectors:
         yield ring_sentence(result)
     bad = [status for status in result.status.ravel() if status != "ok"]

@@ -126,13 +126,15 @@ def onset(curve: Curve) -> Claim:
     below = curve.frequency < curve.onset
     apart = float(np.max(np.abs(curve.mean / curve.undamped - 1)[below])) if below.any() else math.inf
     at = int(np.argmax(~below))
+    found = f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
+    found += f"by at most {apart:.2%} over {below.sum()} points"
     return claim(
         "Up to an onset the damped curve is the one without bodies.",
-        f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
-        f"by at most {apart:.2%} over {below.sum()} points",
+        found if below.any() else f"the curves differ from the lowest frequency on, {curve.frequency[0]:.1f} Hz",
         verdict(apart < 0.01 and below.sum() > 5),
         "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
-        "grows slowly hits only from amplitudes of about half of the gap on.",
+        "grows slowly hits only from amplitudes of about half of the gap on. Going down, a body that hits goes on "
+        "hitting below the onset.",
         {"onset_hz": curve.onset, "difference": apart},
     )
 

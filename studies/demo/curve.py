@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -18,15 +19,20 @@ _UNTOUCHED = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Peak of a curve: frequency (Hz), height over the undamped maximum with 95 % confidence, index of the point."""
+    """Peak of a curve: frequency (Hz), height over the undamped maximum with 95 % confidence, index of the point.
+
+    start: of the run there, in words, where there were several.
+    """
 
     frequency: float
     height: float
     confidence: float
     index: int
+    start: str = ""
 
     def __str__(self) -> str:
-        return f"{self.height:.3f} ± {self.confidence:.3f} at {self.frequency:.1f} Hz"
+        start = f" {self.start}" if self.start else ""
+        return f"{self.height:.3f} ± {self.confidence:.3f} at {self.frequency:.1f} Hz{start}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +49,7 @@ class Curve:
     undamped, fixed            linear curves without bodies and with all fixed
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
+    starts                     of the runs, in words; empty where there was one
     """
 
     name: str
@@ -57,6 +64,7 @@ class Curve:
     impacts: np.ndarray
     periodic: np.ndarray
     reference: float
+    starts: tuple[str, ...] = ()
 
     @property
     def smooth(self) -> np.ndarray:
@@ -92,7 +100,8 @@ class Curve:
         """Return the peak of a curve (n,), by default of the means."""
         values = self.mean if values is None else values
         top = int(np.argmax(values))
-        return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top)
+        start = self.starts[top] if self.starts else ""
+        return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top, start)
 
 
 def curves(sweep: Sweep, name: str) -> list[Curve]:
@@ -108,6 +117,24 @@ def curves(sweep: Sweep, name: str) -> list[Curve]:
         _curve(response, confidence[row], harmonic[row], kinds[row], unit or response.reference)
         for row, response in enumerate(responses)
     ]
+
+
+def worst_of(curves: Sequence[Curve], words: Sequence[str]) -> Curve:
+    """Return the curve that has, at each frequency, the run with the highest mean, and the largest amplitude of all.
+
+    words: how the runs of each curve begin. A frequency at which no run is ok is left out.
+    """
+    frequency = np.unique(np.concatenate([curve.frequency for curve in curves]))
+    shown = [np.isin(frequency, curve.frequency) for curve in curves]
+    whole: dict[str, np.ndarray] = {}
+    for name in (item.name for item in fields(Curve) if isinstance(getattr(curves[0], item.name), np.ndarray)):
+        whole[name] = np.full((len(curves), len(frequency)), -np.inf if name in ("mean", "largest") else 0.0)
+        for row, (curve, at) in enumerate(zip(curves, shown, strict=True)):
+            whole[name][row, at] = getattr(curve, name)
+    worst = whole["mean"].argmax(axis=0)
+    found = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
+    found |= {"largest": whole["largest"].max(axis=0), "periodic": found["periodic"] == 1.0}
+    return replace(curves[0], **found, starts=tuple(words[row] for row in worst))
 
 
 def _curve(

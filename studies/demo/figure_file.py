@@ -93,14 +93,20 @@ class Frequencies:
 
 @dataclass(frozen=True)
 class Effort:
-    """Reductions of a figure's file: frequencies per curve, periods of a run and its transient (None: the file's)."""
+    """Changes of a figure's file: frequencies per curve, periods of a run and its transient (None: the file's).
+
+    starts: directions in which each curve is run, its first axis; none: as the file has it.
+    """
 
     points: int
     periods: int | None = None
     transient: int | None = None
+    starts: tuple[str, ...] = ()
 
     def of(self, scene: Scene) -> Scene:
-        """Return the scene with this many periods."""
+        """Return the scene with these periods and starts."""
+        if self.starts:
+            scene = scene.replace({"sweep": {"continuation.direction": self.starts, **scene.to_dict()["sweep"]}})
         if self.periods is None:
             return scene
         return scene.replace({"time.periods": self.periods, "time.transient": self.transient})
@@ -128,7 +134,8 @@ class FigureScenes:
                 scene = cls.scene(tables, curve, data)
                 scene = scene if effort is None else effort.of(scene)
                 scenes[curve] = cls.swept(scene, chosen, effort.points if effort else chosen.points)
-            return cls(file.stem, data["title"], scenes)
+            starts = f", worst of {len(effort.starts)} starts" if effort and effort.starts else ""
+            return cls(file.stem, data["title"] + starts, scenes)
         except InputError as error:
             raise InputError(f"{file}: {error}") from error
 

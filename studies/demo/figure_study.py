@@ -23,13 +23,14 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, finite, write_json
 from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
-from vanedamp.studies.demo.curve import Curve, curves
+from vanedamp.studies.demo.curve import Curve, curves, worst_of
 from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Structure
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.sweep_steps import compile_engine, ends_of
 from vanedamp.studies.terminal import progress
+from vanedamp.studies.worst_start import STARTS
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
 MODES = 12
@@ -54,6 +55,14 @@ class Session:
     def figure(self, file: Path) -> FigureScenes:
         """Read a figure's scenes, on the structure."""
         return FigureScenes.load(file, self.structure, self.effort)
+
+    def read(self, sweep: Sweep, name: str) -> list[Curve]:
+        """Return the curves of a sweep, each the worst over the starts of the effort."""
+        found, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
+        if not starts:
+            return found
+        count = len(found) // len(starts)
+        return [worst_of(found[place::count], starts) for place in range(count)]
 
     def swept(self, figure: FigureScenes, curve: str) -> Sweep:
         """Run the sweep of a curve, and write its scene (.toml) and result (.h5)."""
@@ -103,7 +112,7 @@ def study(of: FigureStudy, session: Session) -> Study:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     figure = session.figure(of.file)
     sweeps = {curve: session.swept(figure, curve) for curve in figure.scenes}
-    mine = {curve: curves(sweep, curve.replace("_", " ") or figure.name) for curve, sweep in sweeps.items()}
+    mine = {curve: session.read(sweep, curve.replace("_", " ") or figure.name) for curve, sweep in sweeps.items()}
     read = Read(figure, mine, session)
     claims = of.claims(read)
     of.picture(read, session.folder / f"{figure.name}.png")

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.sweep.designs import (
+    UNSURE,
+    amplitude_known,
+    complete,
+    of_design,
+    points_of_designs,
+    relative_amplitudes,
+)
 from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
@@ -27,19 +34,17 @@ from vanedamp.studies.report.forced_response_charts import LOOKS, trace
 
 #: curves behind the chosen one at most; of more, evenly chosen ones are drawn
 _MOST_BEHIND = 60
-#: of runs to the end of time whose results may still change
-_UNSURE = (Status.NOT_STEADY, Status.UNCERTAIN)
 _CHOSEN, _BEST, _LINEAR = COLOURS[0], COLOURS[1], "#0f172a"
 
 
 @dataclass(frozen=True)
 class Best:
-    """The best design of a sweep: the one whose highest amplitude is the lowest, however its runs begin.
+    """The best design of a sweep: the one whose highest amplitude is the lowest, over all that nobody chooses.
 
-    places    an index on every axis: on the frequency and the starts, of its highest amplitude
+    places    an index on every axis: on the frequency, the starts and the like, of its highest amplitude
     amplitude highest mean of the periods' peaks, m
     relative  over the maximum without bodies; nan where there is none
-    designs   number of designs, and how many of them are left out: with points that are not ok
+    designs   number of designs, and how many of them are left out: a point that is not ok may be their worst
     left_out
     """
 
@@ -59,36 +64,16 @@ def abscissas(sweep: Sweep) -> list[str]:
 
 @lru_cache(maxsize=32)  # every move of a slider asks for it
 def best_design(sweep: Sweep) -> Best | None:
-    """Return the best design of a sweep; None if every design has points that are not ok."""
-    swept = resonance_axis(sweep.scene, sweep.axes)[0]
-    paths = list(sweep.axes)
-    over = tuple(k for k, path in enumerate(paths) if path == swept or is_start(path))
-    ok = sweep.status == "ok"
-    complete = ok.all(axis=over)
-    if not complete.any():
+    """Return the best design of a sweep; None if of every design a point that is not ok may be the worst."""
+    judged, known, ok = points_of_designs(sweep), amplitude_known(sweep).ravel(), sweep.status.ravel() == "ok"
+    whole = [complete(points, known, ok) for points in judged]
+    if not whole[0]:
         return None
-    peak = np.where(ok, sweep.amplitude_mean_dynamic, 0.0).max(axis=over)
-    relative = peak / _undamped_maximum(sweep, swept, over)
-    # designs with one maximum without bodies rank alike by either measure
-    figure = relative if np.isfinite(relative[complete]).all() else peak
-    chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
-    places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
-    runs = sweep.amplitude_mean_dynamic[tuple(places.get(path, slice(None)) for path in paths)]
-    highest = np.unravel_index(np.argmax(runs), runs.shape)
-    places |= dict(zip([paths[k] for k in over], map(int, highest), strict=True))
-    return Best(
-        places, float(peak[chosen]), float(relative[chosen]), complete.size, complete.size - int(complete.sum())
-    )
-
-
-def _undamped_maximum(sweep: Sweep, swept: str | None, over: tuple[int, ...]) -> np.ndarray:
-    """Return the maximum without bodies of each design, m; nan where there is none."""
-    if swept is None or "undamped_peak" not in sweep.peaks:
-        top = sweep.amplitude_undamped.max(axis=over)
-    else:
-        at = list(sweep.axes).index(swept)
-        top = np.expand_dims(sweep.peaks["undamped_peak"], at).max(axis=over)
-    return np.where(np.isfinite(top) & (top > 0.0), top, np.nan)
+    worst = judged[0][0]
+    places = dict(zip(sweep.axes, map(int, np.unravel_index(worst, sweep.shape)), strict=True))
+    mean = sweep.amplitude_mean_dynamic
+    relative = relative_amplitudes(sweep, mean)
+    return Best(places, float(mean.flat[worst]), float(relative.flat[worst]), len(judged), whole.count(False))
 
 
 def best_sentence(sweep: Sweep, best: Best | None) -> str:
@@ -99,15 +84,16 @@ def best_sentence(sweep: Sweep, best: Best | None) -> str:
     design = ", ".join(
         setting(path, values[best.places[path]], units[path])
         for path, values in sweep.axes.items()
-        if path != swept and not is_start(path)
+        if path in of_design(sweep)
     )
-    highest = "highest mean amplitude" if swept or any(map(is_start, sweep.axes)) else "mean amplitude"
+    worst = [path for path in sweep.axes if path not in of_design(sweep)]
+    highest = "highest mean amplitude" if worst else "mean amplitude"
     which = f"Best of {best.designs} designs: {design}, " if design else "The only design: "
     text = f"{which}{highest} {1e6 * best.amplitude:.4g} µm"
     if np.isfinite(best.relative):
         text += f", {best.relative:.3f} of the {'maximum' if swept else 'amplitude'} without bodies"
-    if swept is not None:
-        text += f", at {setting(swept, sweep.axes[swept][best.places[swept]], units[swept])}"
+    if worst:
+        text += ", at " + ", ".join(setting(path, sweep.axes[path][best.places[path]], units[path]) for path in worst)
     if best.left_out:
         verb = "is" if best.left_out == 1 else "are"
         text += f"; {best.left_out} of {best.designs} designs {verb} left out, with points that are not ok"
@@ -177,7 +163,7 @@ def _add_troubles(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[s
     """Mark the points that are not ok with their status: at their amplitude if they ran to the end, else at zero."""
     point = _point(sweep, along, places)
     states, means = sweep.status[point], sweep.amplitude_mean_dynamic[point]
-    bad, ended = states != "ok", np.isin(states, _UNSURE) & np.isfinite(means)
+    bad, ended = states != "ok", np.isin(states, UNSURE) & np.isfinite(means)
     if bad.any():
         figure.add_scatter(
             x=x[bad], y=1e6 * np.where(ended, means, 0.0)[bad], mode="markers", name="not ok",

@@ -16,6 +16,7 @@ from vanedamp.studies.life.fast import Found, Runs
 from vanedamp.studies.life.record import LifeRecord, sentence_of
 from vanedamp.studies.life.slow import Moment, Steps, between, integrate
 from vanedamp.studies.life.study import LifeStudy, Wearing
+from vanedamp.studies.worst_start import worst_start
 
 #: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
 _CLOSE = 0.01
@@ -39,7 +40,9 @@ def life(
         first = runs.at(study.scene)
         wearing = study.wearing(runs.contacts)
         moments = list(_moments(_Course(study, wearing, runs, first), progress))
-    return _record(study, wearing, runs, moments, dict(provenance or {}), time.perf_counter() - started)
+    ends = {"new": study.scene, "end": wearing.worn(moments[-1].state)}
+    starts = {name: worst_start(scene, study.frequencies, executor) for name, scene in ends.items()}
+    return _record(study, wearing, runs, moments, starts, dict(provenance or {}), time.perf_counter() - started)
 
 
 class _Course:
@@ -113,8 +116,8 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
 
 
 def _record(
-    study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], provenance: dict[str, Any],
-    took: float,
+    study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], starts: dict[str, Any],
+    provenance: dict[str, Any], took: float,
 ) -> LifeRecord:  # fmt: skip
     """Return the record of moments in the order of their times."""
     volume = np.array([moment.state for moment in moments])
@@ -143,7 +146,7 @@ def _record(
         reference=study.reference, frequency=study.frequencies, contacts=tuple(runs.contacts),
         **{name: frozen(array) for name, array in values.items()},
         hours=hours, runs=runs.asked, trouble=runs.trouble, wall_time_s=took,
-        sentence=sentence_of(hours, study.table, values), provenance=provenance,
+        sentence=sentence_of(hours, study.table, values, starts), starts=starts, provenance=provenance,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.studies.life.study import Contact, Life
+from vanedamp.studies.worst_start import worst_words
 
 _KIND = "life"
 _PLAIN = ("reference", "hours", "runs", "trouble", "wall_time_s", "sentence")
@@ -45,6 +46,7 @@ class LifeRecord:
                        the hours; 0: never reached
     runs, trouble      number of runs, and of those with another status than ok
     sentence           the answer in words
+    starts             worst of the damper over starts (worst_start.worst_start), as "new" and at the "end"
     """
 
     study: Mapping[str, Any]
@@ -69,12 +71,17 @@ class LifeRecord:
     trouble: int
     wall_time_s: float
     sentence: str
+    starts: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, arrays as nested lists."""
         data = {name: getattr(self, name) for name in _PLAIN}
-        data |= {"study": dict(self.study), "contacts": [one._asdict() for one in self.contacts]}
+        data |= {
+            "study": dict(self.study),
+            "starts": dict(self.starts),
+            "contacts": [one._asdict() for one in self.contacts],
+        }
         return data | {name: getattr(self, name).tolist() for name in _ARRAYS}
 
     @property
@@ -102,6 +109,7 @@ class LifeRecord:
         variables["contact"] = Variable(np.array([one.name for one in self.contacts], object), ("contact",))
         attributes = {name: getattr(self, name) for name in _PLAIN} | {
             "hours": json.dumps(self.hours), "study": dict(self.study), "provenance": dict(self.provenance),
+            "starts": dict(self.starts),
             "contacts": json.dumps([list(one) for one in self.contacts]),
         }  # fmt: skip
         save(path, _KIND, variables, attributes)
@@ -112,7 +120,7 @@ class LifeRecord:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, _KIND)
         given: dict[str, Any] = {name: attributes[name] for name in _PLAIN}
-        given |= {name: json.loads(attributes[name]) for name in ("study", "provenance")}
+        given |= {name: json.loads(attributes.get(name, "{}")) for name in ("study", "starts", "provenance")}
         given["hours"] = tuple(json.loads(attributes["hours"]))
         given["contacts"] = tuple(Contact(*one) for one in json.loads(attributes["contacts"]))
         given |= {name: frozen(values[name]) for name in _ARRAYS}
@@ -120,9 +128,20 @@ class LifeRecord:
 
 
 def sentence_of(
+    hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray],
+    starts: Mapping[str, Any],
+) -> str:  # fmt: skip
+    """Return how long the damper damps, in words: at rest at first, and what is left from the worst start."""
+    worst = [f"{word}, {worst_words(starts[name])}" for name, word in (("new", "as new"), ("end", "at the end"))]
+    if starts["new"]["starts"] == 1:
+        worst = [worst_words(starts["new"])]
+    return "; ".join([_hours_of(hours, table, values), *worst])
+
+
+def _hours_of(
     hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray]
 ) -> str:
-    """Return how long the damper damps, in words."""
+    """Return how long the damper damps, by runs that begin as the scene."""
     lost, early, late = hours
     reduction, first, last = f"{table.threshold:.0%}", values["reduction"][0], values["reduction"][-1]
     if lost == 0.0:

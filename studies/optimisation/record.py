@@ -17,7 +17,7 @@ _KIND = "optimisation"
 _PLAIN = (
     "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
 )  # fmt: skip
-_TABLES = ("study", "headlines", "gradient", "provenance")
+_TABLES = ("study", "headlines", "starts", "gradient", "provenance")
 _ARRAYS = {
     "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
     "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
@@ -95,6 +95,7 @@ class Optimisation:
     frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
                        where a run is not ok
     headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
+    starts             worst of these designs over starts (worst_start.worst_start), by the same names
     gradient           where derivatives led the best design as designed (gradient.descend)
     scenes, trouble    number of runs, and of those with another status than ok
     wall_time_s        s
@@ -123,6 +124,7 @@ class Optimisation:
     wall_time_s: float
     sentence: str
     headlines: Mapping[str, Any] = field(default_factory=dict)
+    starts: Mapping[str, Any] = field(default_factory=dict)
     gradient: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -149,11 +151,8 @@ class Optimisation:
     def to_json(self) -> dict[str, Any]:
         """Return plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
-        return (
-            self._plain()
-            | {"study": dict(self.study), "headlines": dict(self.headlines), "gradient": dict(self.gradient)}
-            | arrays
-        )
+        given = {name: dict(getattr(self, name)) for name in _TABLES if name != "provenance"}
+        return self._plain() | given | arrays
 
     def _plain(self) -> dict[str, Any]:
         optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}

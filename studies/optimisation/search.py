@@ -29,6 +29,7 @@ from vanedamp.studies.optimisation.record import Optimisation, Optimum
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
 from vanedamp.studies.optimisation.tolerances import estimate
 from vanedamp.studies.terminal import stage
+from vanedamp.studies.worst_start import worst_start, worst_words
 
 #: generations of a search, at least
 _GENERATIONS = 5
@@ -75,6 +76,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     headlines = {name: trial.headline(design, responses[name][0]) for name, design in curves.items()}
     with stage("derivatives by tolerances"):
         estimates = {name: estimate(study, best[name], responses[name][0], trial.sample, trial.within) for name in best}
+    with stage("runs from other starts"):
+        starts = {name: trial.worst_start(design) for name, design in curves.items()}
     took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": tables(table), "scene": study.scene.to_dict()},
@@ -95,11 +98,12 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
+        starts=starts,
         gradient=gradient,
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
-        sentence=_sentence(study, nominal, robust, headlines, trial.scenes, took),
+        sentence=_sentence(study, nominal, robust, headlines, starts, trial.scenes, took),
         provenance=provenance,
     )
 
@@ -164,6 +168,11 @@ class _Trial:
         none = np.full(len(known), np.nan)
         curves = (known, known, none, none, none, undamped, fixed)
         return headline(self.study.frequencies, *curves, peaks, along_frequency=True)
+
+    def worst_start(self, design: Design) -> dict[str, Any]:
+        """Return the worst curve of a design as it is, from several starts (worst_start.worst_start)."""
+        scene = self.study.scene_of(design, NO_DEVIATION, float(self.study.frequencies[0]))
+        return worst_start(scene, self.study.frequencies, self._executor)
 
     def search(self, robust: bool, designs: Sequence[Design]) -> Design:
         """Return the best design by differential evolution, from the first of some designs or from a Latin hypercube.
@@ -271,8 +280,9 @@ def _of_band(headline: Headline) -> dict[str, Any]:
 
 
 def _sentence(
-    study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline], scenes: int, took: float
-) -> str:
+    study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline],
+    starts: Mapping[str, dict[str, Any]], scenes: int, took: float,
+) -> str:  # fmt: skip
     table = study.table
     if not table.by_amplitude:
         return _measured_sentence(study, nominal, robust, scenes, took)
@@ -283,13 +293,14 @@ def _sentence(
     else:
         of = "the maximum without bodies (worst in the band)"
     left = f"{1 - nominal.reduction:.0%} left"
-    text = f"{_format_design(nominal.design, study)} gains {nominal.reduction:.0%} of {of} ({left})"
+    text = f"{_format_design(nominal.design, study)} gains {nominal.reduction:.0%} of {of} ({left}); "
+    text += worst_words(starts["nominal"])
     if asdict(table.tolerances) != NO_DEVIATION:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
             f"; it gains {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "
             f"{_format_design(robust.design, study)} gains {robust.reduction:.0%}, "
-            f"{robust.reduction_tolerances:.0%} {kind}"
+            f"{robust.reduction_tolerances:.0%} {kind}; {worst_words(starts['robust'])}"
         )
     remarks = dict.fromkeys(remark for headline in headlines.values() for remark in headline.remarks)
     return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
@@ -309,7 +320,7 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum, scenes: 
             f"; {nominal.amplitude_tolerances:.3g} within the tolerances; robust: "
             f"{_format_design(robust.design, study)}: {robust.amplitude:.3g}, {robust.amplitude_tolerances:.3g} within"
         )
-    return f"{text}. {scenes} scenes in {took:.0f} s."
+    return f"{text}; one start only: every run begins as the scene. {scenes} scenes in {took:.0f} s."
 
 
 def _format_design(design: Design, study: Study) -> str:

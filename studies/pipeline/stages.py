@@ -281,7 +281,8 @@ class Sweep(Stage):
     def work(self, tools: Tools) -> str:
         """Run the points that are not done."""
         from vanedamp.files.checkpoint_file import clear
-        from vanedamp.studies.report.forced_response import best_first, forced_responses
+        from vanedamp.studies.report.designs import designs
+        from vanedamp.studies.report.forced_response import forced_responses
         from vanedamp.studies.sweep_steps import doubts, finish, prepare, run_peak, run_points
 
         scene = self._scene()
@@ -303,7 +304,7 @@ class Sweep(Stage):
         finish(prepared, self.outputs[0])
         bad = int((result.status != "ok").sum())
         told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
-        best = [response for response in best_first(forced_responses(result)) if response.reference > 0]
+        best = [design for design in designs(forced_responses(result)) if design.worst.reference > 0]
         return told + (best[0].sentence if best else f"{result.status.size} points")
 
     def _check(self, scene: Scene) -> None:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
+from vanedamp.coupling.sweep.designs import amplitude_known, is_choice
 from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
+from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
@@ -52,6 +54,8 @@ class ForcedResponse:
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
     source             the file it comes from
+    peak_known         whether no point that is not ok may be the peak
+    design, start      what stands for the numbers of its scene that the designer chooses, and for how its runs begin
     """
 
     name: str
@@ -73,6 +77,9 @@ class ForcedResponse:
     onset_of: str = "impacts on walls"
     settings: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+    peak_known: bool = True
+    design: Hashable = None
+    start: Hashable = None
 
     @property
     def linear(self) -> LinearCurves:
@@ -111,6 +118,8 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
     others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]
+    leaves = [(path, value) for path, value in _leaves(sweep.scene.to_dict()) if path not in paths]
+    base = [frozenset(leaf for leaf in leaves if of(leaf[0])) for of in (is_choice, is_start)]
     responses = []
     for combination in itertools.product(*(range(len(values)) for values in others)):
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
@@ -118,13 +127,22 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         settings = {path: axis[index] for path, axis, index in zip(labels, others, combination, strict=True)}
         values = [setting(path, value, units[path]) for path, value in settings.items()]
         title = ", ".join([name or model_name(sweep.scene), *values])
-        responses.append(response_along(sweep, point, paths[along], title, settings))
+        design, start = (
+            (same, *((path, value) for path, value in settings.items() if of(path)))
+            for same, of in zip(base, (is_choice, is_start), strict=True)
+        )
+        found = response_along(sweep, point, paths[along], title, settings)
+        responses.append(replace(found, design=design, start=start))
     return responses
 
 
-def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
-    """Return responses by rising damped peak relative to that without bodies; those without any at the end."""
-    return sorted(responses, key=lambda response: np.nan_to_num(response.headline.peak_ratio, nan=math.inf))
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Hashable]]:
+    """Yield the values of nested tables and lists by their dotted paths."""
+    if isinstance(value, Mapping | list | tuple):
+        for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _leaves(each, f"{path}.{key}" if path else str(key))
+    else:
+        yield path, value
 
 
 def response_along(
@@ -135,7 +153,7 @@ def response_along(
     point: indices on each axis, in the axes' order: on `axis` in the order of the curve, on the others
     one index.
     """
-    ok = sweep.status[point] == "ok"
+    ok, mean = sweep.status[point] == "ok", sweep.amplitude_mean_dynamic[point]
     damped = {
         "damped_max": sweep.amplitude_max_dynamic, "damped_mean": sweep.amplitude_mean_dynamic,
         "confidence": sweep.amplitude_mean_confidence,
@@ -169,6 +187,7 @@ def response_along(
         hertz=hertz if axis == swept else math.nan,
         onset_of="impacts on walls" if counted or alone else "impacts of any kind",
         settings=settings,
+        peak_known=bool(ok.any() and amplitude_known(sweep)[point].all() and not (mean[~ok] > mean[ok].max()).any()),
         **cut,
     )  # fmt: skip
 

@@ -28,8 +28,9 @@ from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
 from vanedamp.studies.report.border_chart import borders_figure
+from vanedamp.studies.report.designs import best_first
 from vanedamp.studies.report.ensemble_charts import ensemble_figure
-from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
+from vanedamp.studies.report.forced_response import forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.identification_charts import data_figure
 from vanedamp.studies.report.life_charts import life_figure

@@ -15,13 +15,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
-from vanedamp.studies.report.forced_response import (
-    ForcedResponse,
-    best_first,
-    forced_responses,
-    linear_curves,
-    model_name,
-)
+from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.forced_response import forced_responses, linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.map_chart import has_responses
 from vanedamp.studies.report.pictures import mode_picture
@@ -41,10 +36,11 @@ def summary(results: Results, page: Any) -> dict[str, Any]:
         for response in forced_responses(result.record)
     ]
     if found:
-        best = best_first(found)[0]
+        judged = designs(found)
+        best = judged[0].worst
         sweep = results.kinds["sweep"][best.source].record
         scene = base_scene(sweep.scene).replace(best.settings)
-        answer += _answer(best, len(found))
+        answer += _answer(judged[0], len(judged))
         rows = zip(best.x.tolist(), *(getattr(best, name).tolist() for name in _COLUMNS), strict=True)
         figure = responses_figure([best], [linear_curves(sweep, best)])
         chart = page.chart("summary", figure, (best.axis, *_COLUMNS), rows, [best.source])
@@ -106,17 +102,19 @@ def _bodies(scene: Scene, mass: float) -> Iterator[str]:
             yield f"Cavity {cavity.name}, gap {1e6 * cavity.gap:.4g} µm{play}: {'; '.join(words)}."
 
 
-def _answer(best: ForcedResponse, curves: int) -> list[str]:
-    """Return two sentences on the best response of some curves."""
-    found, which = best.headline, f"The best of {curves} curves" if curves > 1 else "The curve"
+def _answer(design: Design, count: int) -> list[str]:
+    """Return sentences on the best of a number of designs, by its worst curve."""
+    best, found = design.worst, design.worst.headline
+    which = f"The best of {count} designs" if count > 1 else "The design"
     unit = "" if best.units == "1" else f" {best.units}"
     if not math.isfinite(found.peak_ratio):
-        return [f"{best.sentence}."]
+        return [f"{design.sentence}."]
     at = f"{format_value(found.damped_peak_at)}{unit}"
     first = (
         f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * found.damped_peak:.4g} µm "
-        f"at {at}, without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
-        f"{found.peak_ratio:.1%} is left."
+        f"at {at}, the largest amplitude {1e6 * found.damped_maximum:.4g} µm, "
+        f"without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
+        f"{found.peak_ratio:.1%} is left, at its largest {found.maximum_ratio:.1%}"
     )
     onset = "The bodies hit no wall"
     if found.onset is not None:
@@ -131,6 +129,7 @@ def _answer(best: ForcedResponse, curves: int) -> list[str]:
         f"{onset}; with the bodies fixed the maximum would be {1e6 * found.fixed_peak:.4g} µm at "
         f"{format_value(found.fixed_peak_at)}{unit}."
     )
+    first = "; ".join([first, *design.remarks]) + "."
     return [first, "; ".join([second.removesuffix("."), *found.remarks_in(best.units)]) + "."]
 
 

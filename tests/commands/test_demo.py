@@ -14,11 +14,13 @@ from tests.tools.schemas import faults
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.store import load
 from vanedamp.studies.cli import main
 from vanedamp.studies.demo import demo
 from vanedamp.studies.demo.figure_file import Effort, FigureScenes, Structure
-from vanedamp.studies.demo.figure_study import write_scene
+from vanedamp.studies.demo.figure_study import Session, write_scene
 from vanedamp.studies.report.forced_response import forced_responses
+from vanedamp.studies.worst_start import STARTS
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
 STRUCTURE = Structure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
@@ -87,7 +89,7 @@ def rigid(tmp_path_factory):
     """The folder of a small rigid demonstration."""
     folder = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(demo, "EFFORT", Effort(points=6, periods=430, transient=390))
+        patch.setattr(demo, "EFFORT", Effort(points=6, periods=430, transient=390, starts=tuple(STARTS)))
         assert main(["demo", "--rigid", "--workers", "1", "-o", str(folder)]) == 0
     return folder
 
@@ -108,6 +110,25 @@ def test_the_demo_leaves_a_pipeline_that_repeats_it(rigid, monkeypatch):
     np.testing.assert_array_equal(Sweep.load("again/fig9.h5").amplitude_mean, before.amplitude_mean)
 
 
+def test_claims_are_of_the_worst_start(rigid):
+    """Of each gap and frequency, by the file: the highest mean of the runs that are ok, and the largest amplitude."""
+    found = Sweep.load(rigid / "fig9.h5")
+    assert found.axes["continuation.direction"].tolist() == list(STARTS)
+    session = Session(Structure.shipped(), rigid, effort=Effort(points=6, starts=tuple(STARTS)))
+    ok = found.status == "ok"
+    for place, curve in enumerate(session.read(found, "fig9")):
+        shown = ok[:, place].any(axis=0)
+        for values, of in ((found.amplitude_mean, curve.mean), (found.amplitude_max, curve.largest)):
+            highest = np.where(ok, values, -np.inf)[:, place].max(axis=0)[shown] / curve.reference
+            np.testing.assert_allclose(of, highest, rtol=1e-12)
+        runs = np.where(ok, found.amplitude_mean, -np.inf)[:, place, curve.peak().index]
+        assert curve.peak().start == list(STARTS.values())[int(np.argmax(runs))]
+    # the motion at a peak is that of a run that can run again by itself
+    single = Sweep.load(rigid / "fig10_single.h5")
+    _, again = load(rigid / "fig10_single_peak.h5", "response")
+    assert again["amplitude_mean"] == np.where(single.status == "ok", single.amplitude_mean, 0.0)[0].max()
+
+
 @pytest.mark.slow
 def test_demo_leaves_every_file_of_the_pipeline(tmp_path, capfd):
     report = demo.run_demo(tmp_path / "out", workers=2)
@@ -122,7 +143,7 @@ def test_demo_leaves_every_file_of_the_pipeline(tmp_path, capfd):
     curves = {"fig9": 1, "fig12_reduced": 0, "fig12_rigid": 0}
     for stem, index in curves.items():
         result = Sweep.load(report.parent / f"{stem}.h5")
-        assert set(result.status.ravel()) == {"ok"}
+        assert np.mean(result.status == "ok") > 0.98 and set(result.status.ravel()) <= {"ok", "not_steady"}
         assert result.energy_residual.max() < 1e-8
         response = forced_responses(result)[index]
         first = response.headline.undamped_peak_at

@@ -23,13 +23,8 @@ from vanedamp.studies.report.bifurcation_chart import (
     diagram_panels,
 )
 from vanedamp.studies.report.charts import Chart
-from vanedamp.studies.report.forced_response import (
-    ForcedResponse,
-    best_first,
-    forced_responses,
-    linear_curves,
-    model_name,
-)
+from vanedamp.studies.report.designs import best_first
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import (
     bodies_in_plane,
     cycle,
@@ -131,7 +126,7 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
 
 
 def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], page: Page) -> dict[str, Any]:
-    """Return charts and table of the responses along one axis, best first; a study's keep their order."""
+    """Return charts and table of the responses along one axis, best design first; a study's keep their order."""
     every = len(responses)
     places = {response.name: place for place, response in enumerate(responses)}
     if page.study is None:

@@ -354,14 +354,15 @@ def test_points_of_a_sweep_run_again(grid, along):
 
 
 def test_best_design_has_the_lowest_peak(grid):
-    peaks = grid.amplitude_mean.max(axis=1)
-    gap, restitution = np.unravel_index(np.argmin(peaks), peaks.shape)
+    """At its worst restitution, which nobody chooses."""
+    peaks = grid.amplitude_mean.max(axis=(1, 2))
+    gap = int(np.argmin(peaks))
     best = best_design(grid)
-    at = int(np.argmax(grid.amplitude_mean[gap, :, restitution]))
+    at, restitution = np.unravel_index(np.argmax(grid.amplitude_mean[gap]), grid.shape[1:])
     assert best.places == {"cavity.c1.gap": gap, "excitation.frequency": at, "damper.restitution": restitution}
     assert best.amplitude == peaks.min()
     assert best.relative == pytest.approx(peaks.min() / grid.peaks["undamped_peak"][gap, restitution])
-    assert (best.designs, best.left_out) == (6, 0)
+    assert (best.designs, best.left_out) == (3, 0)
     assert f"gap = {1e6 * GAPS[gap]:.4g} µm" in best_sentence(grid, best)
     assert start_places(grid) == best.places
 
@@ -373,7 +374,7 @@ def test_designs_with_points_that_are_not_ok_are_no_best(grid):
     troubled = replace(grid, status=status)
     second = best_design(troubled)
     assert (second.left_out, second.amplitude > best.amplitude) == (1, True)
-    assert "1 of 6 designs is left out" in best_sentence(troubled, second)
+    assert "1 of 3 designs is left out" in best_sentence(troubled, second)
     assert "5 of 6 points are ok; left out: 1 event_budget" in status_sentence(
         troubled, "excitation.frequency", best.places
     )

@@ -30,7 +30,8 @@ def study(**changes):
 
 @pytest.fixture
 def found(monkeypatch):
-    """A function that runs a study with a damper, of some options."""
+    """A function that runs a study with a damper, of some options, from one start."""
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
 
     def run(case=None, **options):
         monkeypatch.setattr(fast, "simulate", damper := Damper(**options))
@@ -160,6 +161,8 @@ def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     assert record.sentence in told and "reduction, %" in told
     assert not list(tmp_path.glob("*.partial"))
     data = json.loads((tmp_path / "life.json").read_text())
+    assert [data["starts"][name]["starts"] for name in ("new", "end")] == [3, 3] and data["starts"] == record.starts
+    assert "as new, from the worst of 3 starts" in told and "at the end, from the worst of 3 starts" in told
     assert data["hours"] == pytest.approx(list(record.hours))
     assert [one["side"] for one in data["contacts"]] == ["floor", "left", "right"]
     assert main(["info", str(out)]) == 0

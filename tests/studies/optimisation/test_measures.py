@@ -56,7 +56,7 @@ def test_measure_is_that_of_the_runs(file, measure, tmp_path):
     assert record.nominal.amplitude == pytest.approx(record.history_amplitude.min(), rel=1e-12)
     assert record.gradient["steps"] == 0 and record.headlines == {}
     words = {"stress": "of the stress without bodies", "life": "life used in 10000 h", "wear": "of X worn off"}
-    assert words[measure] in record.sentence
+    assert words[measure] in record.sentence and "one start only" in record.sentence
     record.save(tmp_path / "optimum.h5")
     assert Optimisation.load(tmp_path / "optimum.h5").sentence == record.sentence
     assert optimisation_figure(record).data

@@ -18,6 +18,7 @@ from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import deviations, optimise
 from vanedamp.studies.optimisation.study import Design, Study
 from vanedamp.studies.report.optimum_chart import optimisation_figure
+from vanedamp.studies.worst_start import STARTS
 
 EXAMPLE = ROOT / "docs" / "examples" / "optimise.toml"
 
@@ -64,6 +65,10 @@ def test_best_of_all_that_was_tried(found):
     assert 0 < record.nominal.amplitude < 1
     assert record.scenes == calls[-1][0] and record.trouble == 0
     assert f"{record.scenes} scenes in" in record.sentence
+    for name, optimum in (("nominal", record.nominal), ("robust", record.robust)):
+        assert record.starts[name]["starts"] == 3  # of which one is that of the search
+        assert record.starts[name]["peak_ratio"] >= optimum.amplitude * (1 - 1e-9)
+    assert f"from the worst of 3 starts, {STARTS[record.starts['nominal']['direction']]}, " in record.sentence
 
 
 def test_designs_stay_within_their_bounds(found):
