@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
@@ -40,5 +39,5 @@ def simulate(
     took = time.perf_counter() - started
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice,
-        warnings=warnings_of(chosen.scene) + response.warnings, wall_time_s=took,
+        warnings=chosen.warnings + response.warnings, wall_time_s=took,
     )  # fmt: skip
