@@ -101,12 +101,16 @@ def _chains(first: int, count: int) -> None:
             verdicts.append(chain_verdict(seed, Path(folder)))
             print(seed, verdicts[-1], flush=True)
     spent = np.array([[found.choice_seconds, found.run_seconds] for found in verdicts])
+    missed, surely, warned, whole = (
+        sum(values) for values in zip(*(
+            (found.missed(), found.missed(True), found.warned, found.model == str(found.whole)) for found in verdicts
+        ), strict=True)
+    )  # fmt: skip
     print(
-        f"{count} chains: {sum(found.missed() for found in verdicts)} beyond {TOLERANCE}, "
-        f"{sum(found.missed(True) for found in verdicts)} surely; {sum(found.warned for found in verdicts)} warned; "
-        f"whole model taken for {sum(found.model == str(found.whole) for found in verdicts)}; choice {spent[:, 0].sum():.1f} s, "
-        f"one run of the whole model {spent[:, 1].sum():.1f} s, median ratio {np.median(spent[:, 0] / spent[:, 1]):.1f}"
+        f"{count} chains: {missed} beyond {TOLERANCE}, {surely} surely; {warned} warned; {whole} take the whole model"
     )
+    choice, run = spent.sum(axis=0)
+    print(f"choices {choice:.1f} s, runs {run:.1f} s, median ratio {np.median(spent[:, 0] / spent[:, 1]):.1f}")
 
 
 def _figure_12(folder: Path) -> None:

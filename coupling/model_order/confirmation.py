@@ -108,9 +108,7 @@ def _named(rung: Rung) -> str:
     return f"{what} and {extra} attachment mode{'s' * (extra != 1)}" if rung.attached else what
 
 
-def _with(
-    choice: Choice, rung: Rung, why: str, difference: float | None = None, apart: float = 0.0
-) -> Confirmed:  # fmt: skip
+def _with(choice: Choice, rung: Rung, why: str, difference: float | None = None, apart: float = 0.0) -> Confirmed:
     """Return the choice of a model, with the sentence on its runs."""
     sentence = f"{_named(rung)}, {why}: {choice.sentence}" if why else choice.sentence
     if difference is not None:
@@ -134,20 +132,22 @@ class _Pair:
             replace(body, velocity=body.velocity + speed) for body, speed in zip(scene.damper, speeds, strict=True)
         ]
         self._starts = (scene, replace(scene, damper=tuple(flying)))
-        self._whole = self._means(whole)
+        self._whole, widths = self._means(whole)
         apart = float(abs(self._whole[1] - self._whole[0]))
-        self.apart = apart if not apart <= (1.0 + 2.0 * _KNOWN) * tolerance else 0.0
+        self.apart = 0.0 if apart <= tolerance + np.linalg.norm(widths) else apart
 
     def difference(self, rung: Rung) -> float:
         """Return the largest difference of a model's means from the whole one's; inf where one is not known."""
-        difference = np.abs(self._means(rung) - self._whole).max()
+        difference = np.abs(self._means(rung)[0] - self._whole).max()
         return float(np.inf if np.isnan(difference) else difference)
 
     def _means(self, rung: Rung) -> np.ndarray:
-        return np.array([self._mean(with_modes(start, rung.modes, rung.attached)) for start in self._starts])
+        """Return means and confidences (2, starts) of a model."""
+        return np.array([self._mean(with_modes(start, rung.modes, rung.attached)) for start in self._starts]).T
 
-    def _mean(self, scene: Scene) -> float:
-        """Return the mean amplitude of a scene, from a run that goes on until it is steady and known; else nan."""
+    def _mean(self, scene: Scene) -> tuple[float, float]:
+        """Return mean amplitude and confidence of a scene, from a run that is continued until it is steady and the
+        mean is known; else nan."""
         time = timed(scene).time
         length, done = time.simulated, time.simulated
         run = respond(replace(scene, time=Time(length, time.dropped)))
@@ -155,7 +155,8 @@ class _Pair:
             length *= 2
             done += length
             run = respond(replace(scene, time=Time(length, length // 4)), start=run.final)
-        return run.amplitude_mean / self._peak if self._knows(run) else math.nan
+        known = run.amplitude_mean, run.amplitude_mean_confidence or 0.0
+        return (known[0] / self._peak, known[1] / self._peak) if self._knows(run) else (math.nan, math.nan)
 
     def _knows(self, run: Response) -> bool:
         confidence = run.amplitude_mean_confidence
