@@ -23,6 +23,7 @@ from benchmarks.model_order.scenes import chain_trial
 from benchmarks.model_order.trial import LONG
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
+from vanedamp.coupling.model_order.confirmation import with_modes
 from vanedamp.coupling.scene.scene import Scene, Time
 
 #: chains that nothing was settled on, tolerance, and positions at which the body begins, of its gap
@@ -49,7 +50,7 @@ class Verdict:
 
     def missed(self, surely: bool = False) -> bool:
         """Say whether the tolerance is exceeded from one of the starts."""
-        return bool((self.errors - surely * self.confidences > TOLERANCE).any())
+        return bool(np.any(self.errors - surely * self.confidences > TOLERANCE))
 
     def __str__(self) -> str:
         errors = " ".join(f"{error:.3f}" for error in self.errors)
@@ -64,7 +65,7 @@ def judge(scene: Scene, undamped: float) -> Verdict:
     choice_seconds = time.thread_time() - began
     estimate: dict[str, Any] = chosen.estimate or {}
     size = estimate["ladder"][-1]["modes"]
-    own, whole = chosen.scene, replace(scene, structure=replace(chosen.scene.structure, modes=size, attached=False))
+    own, whole = chosen.scene, with_modes(scene, size)
     began = time.thread_time()
     respond(replace(whole, time=Time()))
     run_seconds = time.thread_time() - began
@@ -119,27 +120,26 @@ def _figure_12(folder: Path) -> None:
     from vanedamp.studies.demo.demo import EFFORT, FIGURES
     from vanedamp.studies.demo.figure_study import Session, prepare
 
-    figure = Session(prepare(folder), folder, None, EFFORT).figure(FIGURES["fig12"].file)
-    scene = figure.scenes["reduced"]
+    structure = prepare(folder)
+    figure = Session(structure, folder, None, EFFORT).figure(FIGURES["fig12"].file)
+    scene, peak = figure.scenes["reduced"], structure.amplitude
     began = time.thread_time()
     points = grid(scene)
     seconds = time.thread_time() - began
-    peak, estimate = scene.excitation.resonance_amplitude, points.estimate or {}
+    estimate = points.estimate or {}
     print(f"choice, {seconds:.1f} s: {estimate['sentence']}", *points.warnings, sep="\n")
     models = {"one mode": 1, "choice": estimate["modes"], "whole model": estimate["ladder"][-1]["modes"]}
     bare = Points(points.base)
     made = [bare.raw(values) for values in scene.sweep_points()[1]]
-    means = {modes: np.array([_of_model(item, modes, peak) for item in made]) for modes in set(models.values())}
+    means = {
+        modes: np.array([_means(with_modes(item, modes), peak) for item in made]) for modes in set(models.values())
+    }
     whole = means[models["whole model"]]
     for name, modes in models.items():
         errors = np.abs(means[modes] - whole)
         beyond = errors[:, 0].max(axis=1) > estimate["tolerance"]
         surely = (errors[:, 0] - np.hypot(means[modes], whole)[:, 1] > estimate["tolerance"]).any(axis=1)
         print(f"{name}: {beyond.sum()} of {len(made)} points beyond {estimate['tolerance']}, {surely.sum()} surely")
-
-
-def _of_model(scene: Scene, modes: int, peak: float) -> np.ndarray:
-    return _means(replace(scene, structure=replace(scene.structure, modes=modes, natural=True, attached=False)), peak)
 
 
 def main(arguments: Sequence[str]) -> None:
