@@ -68,9 +68,9 @@ def test_tolerances_of_the_trial(tmp_path):
     assert missed <= 1
 
 
-@pytest.mark.parametrize("seed", [4014, 4042])
+@pytest.mark.parametrize("seed", [4006, 4014])
 def test_a_choice_answers_as_the_whole_model_from_the_same_start(tmp_path, seed):
-    """Chains on which models 0.03 to 0.04 off were taken: means over two starts, runs that were not steady."""
+    """Chains on which models 0.04 and 0.1 off were taken: means over two starts, runs that were not steady."""
     found = starts.chain_verdict(seed, tmp_path)
     assert found.warned or not found.missed()
 
