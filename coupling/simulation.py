@@ -11,7 +11,6 @@ from typing import Any
 
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.moved_start import Mean, as_one, moved
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -53,7 +52,7 @@ def simulate(
     took = time.perf_counter() - started
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice,
-        warnings=warnings_of(chosen.scene) + notes + doubt, wall_time_s=took, moved_start=other,
+        warnings=chosen.warnings + notes + doubt, wall_time_s=took, moved_start=other,
     )  # fmt: skip
 
 

@@ -24,6 +24,8 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import write_csv
 
 TOLERANCES = (0.1, 0.03, 0.01)
+#: periods of a scene for which a choice is made: for few it is the whole model
+LONG = 40_000
 #: a model: number of natural modes, and whether attachment modes come with them
 Kind = tuple[int, bool]
 _STARTS = (-0.3, 0.2)
@@ -112,7 +114,7 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
 
 def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
     """Return the estimate of the model that is chosen for a trial's band and a tolerance."""
-    scene = trial.scene.replace({"structure.tolerance": tolerance})
+    scene = trial.scene.replace({"structure.tolerance": tolerance, "time.periods": LONG})
     scene = scene.replace({"excitation.resonance_near": [min(trial.band), max(trial.band)]})
     scenes = [scene.replace({"excitation.frequency": frequency}) for frequency in trial.band]
     estimate = select_model_orders(scenes)[0].estimate

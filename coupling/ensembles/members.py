@@ -96,7 +96,7 @@ def members(scene: Scene) -> Members:
     nominal = replace(scene, ranges={})
     if not scene.axes:
         nominal = replace(nominal, continuation=type(scene.continuation)())
-    own = grid(nominal, empty=True)
+    own = grid(nominal, empty=True, more=True)
     columns = design(scene.ranges, scene.sampled).T
     found = Members(scene, own, {path: frozen(values) for path, values in zip(scene.ranges, columns, strict=True)})
     points = Points(own.base)

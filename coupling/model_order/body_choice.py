@@ -39,6 +39,9 @@ from vanedamp.coupling.system.transient import short_transient
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
+#: periods up to which blocks run without a check: it takes some 1500 periods of a block where tilts persist, and at
+#: five points of a sweep, where they do not, 2500 to 8000 (docs/bodies.md)
+WORTH = 6_000
 #: relative error of the mean amplitude that is allowed unless a body says otherwise
 TOLERANCE = 0.05
 #: tilts that blocks begin with, as fractions of the largest that their cavity allows; fraction above which it has grown
@@ -135,11 +138,25 @@ def judge_all(scenes: Sequence[Scene]) -> Advice:
     )  # fmt: skip
 
 
-def judge(scene: Scene) -> Advice:
-    """Return the advice for a scene with bodies of shape "auto", all of them alike. Raises InputError."""
+def unjudged(scenes: Sequence[Scene], periods: int) -> Advice:
+    """Return the advice to run blocks for so few periods that no check pays. Raises InputError."""
+    return Advice(
+        shape="block", sentence=f"blocks: without a check, which pays from {WORTH} periods on; {periods} are run",
+        tilts=0, persisting=0, smallest_tilt=0.0, error=None, confidence=None,
+        tolerance=min(map(_tolerance, scenes)), slider_periods=0, block_periods=0, points=0,
+    )  # fmt: skip
+
+
+def _tolerance(scene: Scene) -> float:
+    """Return the tolerance of a scene with bodies of shape "auto". Raises InputError for one that cannot be tried."""
     if reason := why_no_restart(scene):
         raise InputError(f'damper.shape: "auto" {reason}; say which body it is')
-    tolerance = min(damper.tolerance or TOLERANCE for damper in scene.damper if damper.shape == "auto")
+    return min(damper.tolerance or TOLERANCE for damper in scene.damper if damper.shape == "auto")
+
+
+def judge(scene: Scene) -> Advice:
+    """Return the advice for a scene with bodies of shape "auto", all of them alike. Raises InputError."""
+    tolerance = _tolerance(scene)
     sliders = with_sliders(scene)
     settled = short_transient(sliders)
     sliders = _watched(sliders, 2 * settled + _SLIDER_WINDOW + _LATER)

@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.model_order import selection
-from vanedamp.coupling.model_order.body_choice import Advice, judge_all, needs_body, with_blocks, with_sliders
+from vanedamp.coupling.model_order.body_choice import (
+    WORTH,
+    Advice,
+    judge_all,
+    needs_body,
+    unjudged,
+    with_blocks,
+    with_sliders,
+)
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.sectors import unrolled
@@ -42,24 +50,42 @@ class Chosen(NamedTuple):
     advice: dict[str, Any] | None = None
     start: RestartState | None = None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be read before the scene's results are used."""
+        apart = (self.estimate or {}).get("states_apart", 0.0)
+        states = (
+            f"structure.modes: steady states differ by {100.0 * apart:.2g} % of the peak without bodies, more than the "
+            "tolerance, and the start decides which is reached; run several starts",
+        )  # fmt: skip
+        return selection.warnings_of(self.scene) + (states if apart else ())
+
 
 def leaves_open(scene: Scene) -> bool:
     """Whether a scene leaves something open."""
     return selection.needs_selection(scene) or needs_body(scene)
 
 
-def choose(scene: Scene) -> Chosen:
-    """Return a scene with its open choices made. Raises InputError when there is no good choice."""
-    return with_choices(scene, choices_of([scene]))
+def choose(scene: Scene, more: bool = False) -> Chosen:
+    """Return a scene with its open choices made. Raises InputError when there is no good choice.
+
+    more: as of choices_of.
+    """
+    return with_choices(scene, choices_of([scene], more))
 
 
-def choices_of(scenes: Iterable[Scene]) -> Choices:
-    """Return the choices that suit all of these scenes. Raises InputError when there is no good one."""
+def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
+    """Return the choices that suit all of these scenes. Raises InputError when there is no good one.
+
+    more: whether many more periods will be run than those of the scenes: fewer are not worth a choice.
+    """
     scenes = [unrolled(scene) for scene in scenes]
-    modes = selection.choices_of(scenes)
+    modes = selection.choices_of(scenes, more)
     undecided = [scene for scene in scenes if needs_body(scene)]
     if not undecided:
         return Choices(modes)
+    if not more and (periods := selection.periods_of(undecided)) <= WORTH:
+        return Choices(modes, unjudged(undecided, periods))
     tried = np.unique(np.linspace(0, len(undecided) - 1, _POINTS).round().astype(int))
     return Choices(modes, judge_all([selection.with_choice(undecided[place], modes).scene for place in tried]))
 

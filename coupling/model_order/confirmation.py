@@ -1,13 +1,15 @@
-"""Runs that confirm a choice of modes: the model chosen compared with the whole one, with the bodies as they are.
+"""Runs that confirm a choice of modes: the model chosen compared with the whole one, start by start.
 
-The estimate weighs errors of forces; it does not predict which of several steady states is reached. So both models
-run from the scene's own start, and each once more from the other's motion. Where their mean amplitudes differ by more
-than the tolerance a larger model is tried. A difference is one of steady states that both models have if each keeps the
-other's motion: then no number of modes decides between them.
+The estimate weighs errors of forces; it does not predict which of several steady states a start reaches. So both models
+run until they are steady from the same two starts, the scene's own and one whose bodies fly, and a smaller model is
+taken if its mean amplitude is the whole one's from each of them, within the tolerance. The whole model is taken where
+its own steady states differ by more, since other starts may then reach another one on a smaller model, where a run
+does not become steady, and where so few periods are to be run that no choice pays.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -15,119 +17,147 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
-from vanedamp.coupling.system.transient import short_transient
-from vanedamp.files.store import frozen
+from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
+from vanedamp.coupling.system.transient import timed
 from vanedamp.rom.error_estimate import Choice, Rung
 
-#: scenes that are run, evenly spread over their frequencies; models that are tried; periods of which means are taken
-_SCENES, _MODELS, _WINDOW = 3, 4, 400
-#: periods after which a run counts as settled at the latest
-_LONGEST = 2000
-#: safety factor on a difference of means, which scatter themselves
-_SAFETY = 1.5
+#: periods up to which the whole model runs before a choice of one takes its time: a choice takes as long as some 10,000
+#: periods of the whole model, for 10 to 100 coordinates (docs/reduction.md)
+WORTH = 20_000
+#: scenes that are tried, fewest and most, evenly spread over their frequencies, and periods to be run for each of them
+_SCENES, _EACH = (3, 9), 10_000
+#: models that are tried
+_MODELS = 4
+#: safety factor on a difference of means, fraction of the tolerance to which they are known, and the longest run for it
+_SAFETY, _KNOWN, _LONGEST = 1.5, 0.3, 16_000
 
 
 @dataclass(frozen=True)
 class Confirmed(Choice):
-    """A choice that runs have confirmed, or that rests on the estimate only.
+    """A choice that runs have confirmed, or the whole model.
 
-    difference: largest difference of the mean amplitude from the whole model's, relative to the peak without bodies;
-    None where nothing was run. several: whether both models have several steady states between which they differ.
+    difference: largest difference of the mean amplitude from the whole model's from the same start, relative to the
+    peak without bodies; None where no smaller model was run. apart: the difference of the whole model's own means from
+    two starts of a scene, where it exceeds the tolerance; 0 otherwise.
     """
 
     difference: float | None = None
-    several: bool = False
+    apart: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data: `estimate` of the results."""
-        return super().to_json() | {"difference": self.difference, "several_states": self.several}
+        states = {"several_states": self.apart > 0.0, "states_apart": self.apart}
+        return super().to_json() | {"difference": self.difference} | states
 
 
-def confirmed(choice: Choice, scenes: Sequence[Scene], peak: float) -> Confirmed:
-    """Return the choice, or a larger model, whose runs differ from the whole model's by the tolerance at most.
+def with_modes(scene: Scene, modes: int | None, attached: bool = False) -> Scene:
+    """Return the scene with a number of natural modes of its structure; None: with the coordinates of its file."""
+    structure = scene.structure
+    assert isinstance(structure, Rom)
+    return replace(scene, structure=replace(structure, modes=modes, natural=modes is not None, attached=attached))
 
-    peak: largest amplitude without bodies, m. Where only steady states differ that both models have, the smallest such
-    model is taken, and its sentence says so; where no model tried will do, it is the whole one.
+
+def peak(scene: Scene) -> float:
+    """Return the amplitude of the resonance without bodies, m."""
+    whole = with_modes(scene, None)
+    return excitation_force(whole) * chosen_resonance(whole).flexibility
+
+
+def unconfirmed(choice: Choice, periods: float) -> Confirmed:
+    """Return the whole model for so few periods that no choice pays. choice: has it only."""
+    why = f"the whole model, as {periods:.0f} periods are run and a choice takes as long as {WORTH // 2} or more of it"
+    return replace(_with(choice, choice.chosen, ""), sentence=f"{_named(choice.chosen)}, {why}")
+
+
+def confirmed(choice: Choice, scenes: Sequence[Scene], periods: float) -> Confirmed:
+    """Return the choice, or a larger model, whose mean amplitudes are the whole one's from the same starts.
+
+    periods: that are to be run.
     """
     whole, tolerance = choice.ladder[-1], choice.tolerance
+    if choice.chosen == whole:
+        return _with(choice, whole, "")
     by_frequency = sorted(scenes, key=lambda scene: scene.frequency)
-    places = np.unique(np.linspace(0, len(scenes) - 1, _SCENES).round().astype(int))
-    pairs = [_Pair(by_frequency[place], whole, peak, tolerance) for place in places]
+    count = min(len(scenes), int(np.clip(periods // _EACH, *_SCENES)))
+    pairs = []
+    for place in np.unique(np.linspace(0, len(scenes) - 1, count).round().astype(int)):
+        pairs.append(_Pair(by_frequency[place], whole, tolerance, min(_LONGEST, periods / (2 * count))))
+        apart = pairs[-1].apart
+        if np.isnan(apart):
+            return _with(choice, whole, "the whole model, as its runs are not steady enough to compare a smaller one")
+        if apart:
+            why = "the whole model, as it has several steady states and a smaller one may reach another"
+            return _with(choice, whole, why, apart=apart)
     larger = [rung for rung in choice.ladder if rung.size > choice.chosen.size and rung.error <= tolerance]
-    tried = [choice.chosen, *(larger[2**k - 1] for k in range(_MODELS - 1) if 2**k - 1 < len(larger))]
-    alike: Confirmed | None = None
-    for rung in tried:
-        if (rung.modes, rung.attached) == (whole.modes, whole.attached):
-            break
-        difference, several = max(pair.compare(rung) for pair in pairs)
-        found = _with(choice, rung, difference, several)
-        if _SAFETY * difference <= tolerance:
-            return found
-        alike = alike or (found if several else None)
-    return alike or _with(choice, whole, 0.0, False)
+    failed = "as the estimate's choice did not hold in runs"
+    for rung in [choice.chosen, *(larger[2**k - 1] for k in range(_MODELS - 1) if 2**k - 1 < len(larger))]:
+        difference = max(pair.difference(rung) for pair in pairs)
+        if rung != whole and _SAFETY * difference <= tolerance:
+            return _with(choice, rung, "" if rung == choice.chosen else failed, difference)
+    return _with(choice, whole, f"the whole model, {failed}")
 
 
-def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confirmed:
-    """Return the choice of a model, with the sentence on its runs."""
+def _named(rung: Rung) -> str:
+    """Return a model in words."""
     what = f"{rung.modes} mode{'s' * (rung.modes != 1)}"
-    if rung.attached:
-        what += f" and {rung.size - rung.modes} attachment mode{'s' * (rung.size - rung.modes != 1)}"
-    sentence = choice.sentence
-    if rung != choice.chosen:
-        sentence = f"{what}, as the estimate's choice did not hold in runs: {sentence}"
-    sentence += f"; in runs of both {100 * difference:.2g} % off the whole model's mean amplitude"
-    if several:
-        sentence += ", as both have several steady states and the start decides which is reached"
+    extra = rung.size - rung.modes
+    return f"{what} and {extra} attachment mode{'s' * (extra != 1)}" if rung.attached else what
+
+
+def _with(choice: Choice, rung: Rung, why: str, difference: float | None = None, apart: float = 0.0) -> Confirmed:
+    """Return the choice of a model, with the sentence on its runs."""
+    sentence = f"{_named(rung)}, {why}: {choice.sentence}" if why else choice.sentence
+    if difference is not None:
+        sentence += f"; in runs from equal starts {100 * difference:.2g} % off the whole model's mean amplitude"
     values = {item.name: getattr(choice, item.name) for item in fields(Choice)} | {"chosen": rung, "sentence": sentence}
-    return Confirmed(**values, difference=difference, several=several)
+    return Confirmed(**values, difference=difference, apart=apart)
 
 
 class _Pair:
-    """A scene with the whole model, with which other models are compared. Differences are relative to a peak, m."""
+    """A scene from two starts on the whole model, with which others are compared. Relative to the peak without bodies.
 
-    def __init__(self, scene: Scene, whole: Rung, peak: float, tolerance: float) -> None:
-        self.peak, self.tolerance = peak, tolerance
-        self.scene = replace(scene, solver=options_of({}), sweep={})
-        settled = min(short_transient(self._with(whole)), _LONGEST)
-        self.scene = replace(self.scene, time=Time(settled + _WINDOW, settled))
-        self.whole = self._with(whole)
-        self.reference = respond(self.whole)
+    apart: difference of the means, where it exceeds the tolerance, else 0; nan where one is not known.
+    """
 
-    def _with(self, rung: Rung) -> Scene:
-        structure = self.scene.structure
-        assert isinstance(structure, Rom)
-        return replace(self.scene, structure=replace(structure, modes=rung.modes, natural=True, attached=rung.attached))
+    def __init__(self, scene: Scene, whole: Rung, tolerance: float, longest: float) -> None:
+        self._peak, self._known, self._longest = peak(scene) or math.inf, _KNOWN * tolerance, longest
+        scene = replace(scene, solver=options_of({}), sweep={}, time=Time())
+        # they cross their cavities in a sixth of a period
+        speeds = [2.0 * math.pi * scene.frequency * scene.cavity[scene.cavity_of(body)].gap for body in scene.damper]
+        flying = [
+            replace(body, velocity=body.velocity + speed) for body, speed in zip(scene.damper, speeds, strict=True)
+        ]
+        self._starts = (scene, replace(scene, damper=tuple(flying)))
+        self._whole, widths = self._means(whole)
+        apart = float(abs(self._whole[1] - self._whole[0]))
+        self.apart = 0.0 if apart <= tolerance + np.linalg.norm(widths) else apart
 
-    def compare(self, rung: Rung) -> tuple[float, bool]:
-        """Return the difference of mean amplitudes, and whether one that is too large is of common steady states."""
-        made = self._with(rung)
-        own, whole = [respond(made)], [self.reference]
-        if own[0].final is not None and whole[0].final is not None:
-            small, large = basis_of(made), basis_of(self.whole)
-            own.append(respond(made, start=_in_modes(whole[0].final, large, small)))
-            whole.append(respond(self.whole, start=_in_modes(own[0].final, small, large)))
-        means = [np.array([run.amplitude_mean for run in runs]) / self.peak for runs in (own, whole)]
-        scatter = self._scatter(own[0], whole[0])
-        difference = max(abs(means[0].mean() - means[1].mean()), abs(means[0][0] - means[1][0]) - scatter)
-        kept = np.abs(means[0] - means[1][::-1]).max() <= self.tolerance + scatter
-        return float(difference), bool(_SAFETY * difference > self.tolerance and kept and len(own) == 2)
+    def difference(self, rung: Rung) -> float:
+        """Return the largest difference of a model's means from the whole one's; inf where one is not known."""
+        difference = np.abs(self._means(rung)[0] - self._whole).max()
+        return float(np.inf if np.isnan(difference) else difference)
 
-    def _scatter(self, *runs: Response) -> float:
-        """Return the confidence of a difference of means, over the peak."""
-        return float(np.linalg.norm([run.amplitude_mean_confidence or 0.0 for run in runs])) / self.peak
+    def _means(self, rung: Rung) -> np.ndarray:
+        """Return means and confidences (2, starts) of a model."""
+        return np.array([self._mean(with_modes(start, rung.modes, rung.attached)) for start in self._starts]).T
 
+    def _mean(self, scene: Scene) -> tuple[float, float]:
+        """Return mean amplitude and confidence of a scene, from a run that is continued until it is steady and the
+        mean is known; else nan."""
+        time = timed(scene).time
+        length, done = time.simulated, time.simulated
+        run = respond(replace(scene, time=Time(length, time.dropped)))
+        while not self._knows(run) and run.final is not None and done + 2 * length <= self._longest:
+            length *= 2
+            done += length
+            run = respond(replace(scene, time=Time(length, length // 4)), start=run.final)
+        known = run.amplitude_mean, run.amplitude_mean_confidence or 0.0
+        return (known[0] / self._peak, known[1] / self._peak) if self._knows(run) else (math.nan, math.nan)
 
-def _in_modes(state: RestartState, before: ModalBasis, after: ModalBasis) -> RestartState:
-    """Return a state in the modes of another model of the structure: its lowest modes, in their order."""
-    one, other = (np.array(list(basis.rows.values())) for basis in (before, after))
-    count = min(one.shape[1], other.shape[1])
-    sign = np.where((one[:, :count] * other[:, :count]).sum(axis=0) < 0.0, -1.0, 1.0)
-    moved = np.zeros((2, other.shape[1]))
-    moved[:, :count] = sign * np.array([state.displacement, state.velocity])[:, :count]
-    return replace(state, displacement=frozen(moved[0]), velocity=frozen(moved[1]), speed=frozen(()))
+    def _knows(self, run: Response) -> bool:
+        confidence = run.amplitude_mean_confidence
+        return run.status is Status.OK and confidence is not None and confidence <= self._known * self._peak

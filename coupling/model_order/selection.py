@@ -22,14 +22,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
-from vanedamp.coupling.model_order.confirmation import confirmed
+from vanedamp.coupling.model_order.confirmation import WORTH, confirmed, peak, unconfirmed, with_modes
 from vanedamp.coupling.response.moved_start import touching
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.body_loads import load_warnings
 from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
-from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
+from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
@@ -77,9 +77,10 @@ def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
     return [with_choice(scene, choices) for scene in scenes]
 
 
-def choices_of(scenes: Iterable[Scene]) -> Choices:
+def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
     """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
+    more: whether many more periods will be run than those of the scenes.
     Raises InputError for a scene with stops, whose impacts the estimate does not include, and for one whose sines it
     cannot try.
     """
@@ -95,7 +96,12 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
         if fault:
             raise InputError(f'structure.modes: "auto" {fault}; give a number of modes')
         groups.setdefault(_group(scene), []).append(scene)
-    return {key: _choice(members) for key, members in groups.items()}
+    return {key: _choice(members, math.inf if more else periods_of(members)) for key, members in groups.items()}
+
+
+def periods_of(scenes: Iterable[Scene]) -> int:
+    """Return the number of periods that scenes run, at least."""
+    return sum(scene.time.simulated for scene in scenes)
 
 
 def _has_first_order(scene: Scene) -> bool:
@@ -215,9 +221,12 @@ def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
     return found
 
 
-def _choice(scenes: Sequence[Scene]) -> Choice:
-    """Return the fewest natural modes for all of these scenes, which have one model."""
+def _choice(scenes: Sequence[Scene], periods: float) -> Choice:
+    """Return the fewest natural modes for all of these scenes, which have one model. periods: to be run with it."""
     first = scenes[0]
+    rigid_contacts = any(scene.contact.rigid for scene in scenes)
+    trying = not rigid_contacts and bool(first.damper)
+    brief = trying and periods <= WORTH
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
     forced = list(dict.fromkeys(label for scene in scenes for label in _forced(scene)))
@@ -231,7 +240,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
             if label not in model.interface:
                 raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
         own = [scene for scene in scenes if scene.speed == speeds[place]]
-        found.append(_ladders(own, model, frequency_grid(model, min(driven), max(driven)), at, labels))
+        found.append(_ladders(own, model, frequency_grid(model, min(driven), max(driven)), at, labels, brief))
     rigid = max(ladders.rigid for ladders in found)
     choices = [
         choose(worst_rungs([ladders.rungs[attached] for ladders in found]), structure.tolerance, rigid)
@@ -241,17 +250,11 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
-    if any(scene.contact.rigid for scene in scenes):
+    if rigid_contacts:
         return replace(choice, sentence=choice.sentence + _NEWTON)
-    peak = _peak(first) if first.damper else 0.0
-    return confirmed(choice, scenes, peak) if peak else choice
-
-
-def _peak(scene: Scene) -> float:
-    """Return the amplitude of the resonance without bodies, m."""
-    assert isinstance(scene.structure, Rom)
-    whole = replace(scene, structure=replace(scene.structure, modes=None))
-    return excitation_force(whole) * chosen_resonance(whole).flexibility
+    if brief:
+        return unconfirmed(choice, periods)
+    return confirmed(choice, scenes, periods) if trying and peak(first) else choice
 
 
 class _Ladders(NamedTuple):
@@ -262,10 +265,14 @@ class _Ladders(NamedTuple):
 
 
 def _ladders(
-    scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray, at: str, labels: list[str]
+    scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray, at: str, labels: list[str], brief: bool
 ) -> _Ladders:
-    """Return the errors of models of fewer modes for scenes at the speed of a whole model."""
+    """Return the errors of models of fewer modes for scenes at the speed of a whole model. brief: of the whole one."""
     forced = list(dict.fromkeys(label for scene in scenes for label in _forced(scene)))
+    rigid = float(rigid_errors(model, frequencies, at, labels, forced).max())
+    if brief:
+        size = min(_finest(scene, model).size for scene in scenes)
+        return _Ladders(rigid, ([Rung(size, size, 0.0, 0.0)], [Rung(size, size, 0.0, 0.0)]))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
         if any(scene.contact.needs_residual_flexibility for scene in scenes) and not _yields(smaller):
@@ -281,7 +288,7 @@ def _ladders(
         ]
         for attached in (False, True)
     )
-    return _Ladders(float(rigid_errors(model, frequencies, at, labels, forced).max()), (loose, attached))
+    return _Ladders(rigid, (loose, attached))
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
@@ -322,9 +329,7 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
     apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
     worst, met = 0.0, False
     for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
-        smaller = (
-            model if not scene.contact.needs_residual_flexibility or _yields(model) else massless(model, model.size - 1)
-        )
+        smaller = _finest(scene, model)
         collisions = list(dict.fromkeys(_collisions(scene, smaller)))
         if not collisions:
             continue
@@ -367,8 +372,7 @@ def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple
 
 def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
     """Return the largest amplitude without bodies in the range, m; 0 where no force drives it."""
-    assert isinstance(scene.structure, Rom)
-    force = excitation_force(replace(scene, structure=replace(scene.structure, modes=None)))
+    force = excitation_force(with_modes(scene, None))
     return force * float(np.abs(_waves(scene, model, frequencies)).max())
 
 
@@ -387,6 +391,12 @@ def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
             element = scene.contact.element(damper.restitution, reduced, lost)
             found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
     return found
+
+
+def _finest(scene: Scene, model: ReducedModel) -> ReducedModel:
+    """Return the largest model on which the scene's contacts have a meaning."""
+    complete = not scene.contact.needs_residual_flexibility or _yields(model)
+    return model if complete else massless(model, model.size - 1)
 
 
 def _yields(model: ReducedModel) -> bool:

@@ -90,7 +90,7 @@ def orbits(
     data = dict(provenance or {})
 
     def found() -> Branches:
-        notes = (*warnings_of(search.first), *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ())]))
+        notes = (*search.warnings, *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ())]))
         names, scale = tuple(search.map.names), frozen(search.map.scale)
         return Branches(
             described, names, scale, tuple(diagram.branches), diagram.iterations, notes, data,
@@ -164,9 +164,11 @@ class _Search:
         if track is not None and self.to is not None:
             corners = itertools.product((self.low, self.to), (self.first_second, track.to))
             ends += [_at(centred(base), {path: one, track.parameter: two}) for one, two in corners]
+        self.warnings = warnings_of(ends[0])
         if leaves_open(base):
-            choices = choices_of(ends)
-            ends = [with_choices(end, choices).scene for end in ends]
+            choices = choices_of(ends, more=True)
+            made = [with_choices(end, choices) for end in ends]
+            ends, self.warnings = [each.scene for each in made], made[0].warnings
         self.first = ends[0]
         second = "" if track is None else track.parameter
         self._periods = 1 if self.table.wave else self.table.periods

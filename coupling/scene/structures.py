@@ -91,7 +91,8 @@ class Rom:
     file: Annotated[str, BeforeValidator(_file)]
     """file of the reduced model (`vanedamp reduce`, `vanedamp import`), relative to the scene's"""
     modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
-    """number of modes, the first ones (default: all); "auto": as many natural modes as the tolerance needs"""
+    """number of modes, the first ones (default: all); "auto": as many natural modes as the tolerance needs, all for
+    few periods"""
     natural: bool = False
     """take the model's own lowest natural modes in place of those of its basis"""
     attached: bool = False

@@ -14,7 +14,6 @@ import numpy as np
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
-from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
@@ -193,10 +192,11 @@ class PointList:
         yield Chain(range(self.size), False)
 
 
-def grid(scene: Scene, empty: bool = False) -> Grid:
+def grid(scene: Scene, empty: bool = False, more: bool = False) -> Grid:
     """Return the grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run.
 
-    empty: whether a scene without axes is a grid of one point.
+    empty: whether a scene without axes is a grid of one point; more: whether open choices are for more runs than the
+    grid's.
     """
     for path in scene.ranges:
         raise InputError(f"ranges: {path} is a range, which vanedamp.ensemble samples; give a number")
@@ -219,12 +219,12 @@ def grid(scene: Scene, empty: bool = False) -> Grid:
     base = base_scene(scene)
     points = Points(base)
     _check_speeds(points, axes)
-    choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if undecided else NOTHING
+    choices = choices_of((points.raw(values) for values in scene.sweep_points()[1]), more) if undecided else NOTHING
     start = with_choices(first, choices)
     assemble(start.scene)
     advice = None if choices.body is None else choices.body.to_json()
     last = with_choices(points.raw({path: values[-1] for path, values in axes.items()}), choices)
-    warnings = tuple(dict.fromkeys(warnings_of(start.scene) + warnings_of(last.scene)))
+    warnings = tuple(dict.fromkeys(start.warnings + last.warnings))
     return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
-from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual
 from vanedamp.coupling.response.event_log import named_bodies
 from vanedamp.coupling.response.figures import contact_gain
@@ -95,7 +94,7 @@ def ramp(
     """
     table, base, planned = table_of(scene), ramped(scene), courses(scene)
     ends = [scene_at(base, table, value) for value in (table.from_, table.to)]
-    choices = choices_of(ends) if leaves_open(base) else NOTHING
+    choices = choices_of(ends, more=True) if leaves_open(base) else NOTHING
     for end in ends:  # before the first run: a speed may be too high
         assemble(with_choices(end, choices).scene)
     total, before = sum(len(course.time) for course in planned), 0
@@ -110,7 +109,7 @@ def ramp(
             if number < len(runs):  # of the checkpoint
                 continue
             if not runs:
-                notes += warnings_of(first)
+                notes += chosen.warnings
             if table.start == "steady":
                 start, warnings = _steady(first, start)
                 notes += warnings

@@ -13,7 +13,6 @@ from scipy.linalg import eigh
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
-from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.evaluation import Ended, evaluate
 from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Response, Status
@@ -78,7 +77,7 @@ def ring_down(
     return RingDown(
         scene=scene, status=status, linear=_linear(system, mode), duration=periods * system.period, **motion,
         drive=None if drive is None else _of_drive(drive), wall_time_s=time.perf_counter() - began,
-        estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene),
+        estimate=chosen.estimate, advice=chosen.advice, warnings=chosen.warnings,
         provenance=dict(provenance or {}) | ({"hot_spots": spots} if spots else {}),
     )  # fmt: skip
 

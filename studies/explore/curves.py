@@ -63,7 +63,7 @@ def explorable(scene: Scene) -> Scene:
     if excitation.signal is not None or (excitation.waveform is not None and excitation.waveform.timed):
         raise InputError("excitation.waveform: the curve is drawn over excitation.frequency; give force and harmonics")
     plain = replace(scene, sweep={}, continuation=Continuation(), orbit=None, ramp=None, ring_down=None)
-    return choose(plain).scene
+    return choose(plain, more=True).scene
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from benchmarks.model_order.structures import beam_model
+from benchmarks.model_order.trial import LONG
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
+from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.model_order.selection import select_model_order, select_model_orders
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -128,7 +130,10 @@ def test_massless_contact_is_a_collision_in_closed_form(tmp_path):
 
 def test_auto_chooses_and_says_so(file):
     law = {"law": "compliant", "stiffness": 50.0}
-    made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7)
+    many = {"periods": LONG}
+    made = scene(
+        file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7, time=many
+    )
     settled, estimate = select_model_order(made)
     assert settled.structure.natural
     assert 1 < settled.structure.modes < 41
@@ -141,10 +146,73 @@ def test_auto_chooses_and_says_so(file):
     response = simulate(made)
     assert response.estimate == estimate
     assert response.to_json()["estimate"]["sentence"] == estimate["sentence"]
-    stricter = select_model_order(scene(file, contact=law, structure__modes="auto", structure__tolerance=0.02)).scene
+    stricter = select_model_order(made.replace({"structure.tolerance": 0.02})).scene
     assert stricter.structure.modes >= settled.structure.modes
     newton = select_model_order(scene(file, structure__modes="auto", structure__tolerance=0.05)).estimate
     assert "Newton's impacts do not converge" in newton["sentence"]
+
+
+def test_few_periods_take_the_whole_model(file):
+    """A choice takes longer than such a run: all 41 coordinates, at once and with the reason; the answer is theirs."""
+    law = {"law": "compliant", "stiffness": 50.0}
+    made = scene(file, contact=law, structure__modes="auto", damper__restitution=0.7)
+    found = simulate(made)
+    assert found.estimate["modes"] == 41 and found.estimate["difference"] is None
+    assert "41 modes, the whole model, as 30 periods are run" in found.estimate["sentence"]
+    own = simulate(made.replace({"structure.modes": 41, "structure.natural": True}))
+    np.testing.assert_array_equal(found.peak, own.peak)
+    assert found.amplitude_mean == pytest.approx(simulate(made.replace({"structure.modes": None})).amplitude_mean)
+    # contacts of a massless boundary need flexibility that a mode lacks
+    massless = select_model_order(made.replace({"contact": {"law": "massless"}, "damper.0.restitution": 1.0}))
+    assert massless.estimate["modes"] == 40
+
+
+def two_masses(tmp_path, ratio, **changes):
+    """A body at rest in the middle of its cavity, out of reach of the walls or not, below the first resonance."""
+    stiffness = np.array([[3.0, -1.0], [-1.0, 1.0]])
+    squares, shapes = np.linalg.eigh(stiffness)
+    first = float(np.sqrt(squares[0]) / (2 * np.pi))
+    ReducedModel.from_matrices(np.eye(2), stiffness, {"tip": [0.0, 1.0]}, damping_ratio=0.002).save(tmp_path / "two.h5")
+    made = scene(
+        str(tmp_path / "two.h5"), structure__modes="auto", structure__tolerance=0.03, damper__restitution=0.7,
+        damper__mass=0.02 / shapes[1, 0] ** 2, contact={"law": "compliant", "stiffness": 20.0}, time={"periods": LONG},
+        excitation={"frequency": ratio * first, "resonance_amplitude": 1.0, "resonance_near": first, "at": "tip"},
+    )  # fmt: skip
+    return made.replace(changes)
+
+
+@pytest.mark.parametrize(("ratio", "apart"), [(0.955, True), (0.97, True), (0.9, False)])
+def test_steady_states_that_differ_take_the_whole_model_and_warn(tmp_path, ratio, apart):
+    """Below the onset a body rests in the middle, where the response is the linear one, or flies from wall to wall."""
+    made = two_masses(tmp_path, ratio)
+    chosen = choose(made)
+    short = made.replace({"structure.modes": None, "time": {"periods": 1500}})
+    speed = 2 * np.pi * made.frequency * made.cavity[0].gap
+    rest, flying = (simulate(short.replace({"damper.0.velocity": value})) for value in (0.0, speed))
+    model, first = ReducedModel.load(made.structure.file), made.frequency / ratio
+    linear, resonant = np.abs(model.frf([made.frequency, first], "tip", "tip"))
+    assert rest.amplitude_mean == pytest.approx(linear / resonant, rel=1e-3) and not rest.impacts_per_period
+    difference = flying.amplitude_mean - rest.amplitude_mean
+    assert (difference > 0.03) == apart == chosen.estimate["several_states"]
+    assert chosen.estimate["states_apart"] == pytest.approx(difference if apart else 0.0, rel=0.02)
+    assert [warning[:43] for warning in chosen.warnings] == [
+        "structure.modes: steady states differ by " + f"{100 * difference:.2g}"[:2]
+    ] * apart
+    if apart:
+        assert chosen.estimate["modes"] == 2 and "has several steady states" in chosen.estimate["sentence"]
+
+
+def test_results_warn_of_steady_states_that_differ(tmp_path):
+    """In runs and in sweeps, whose points fly in one state and rest in the other."""
+    made = two_masses(tmp_path, 0.97)
+    warning = choose(made).warnings[0]
+    assert warning.startswith("structure.modes: steady states differ")
+    assert simulate(made).to_json()["warnings"] == [warning]
+    swept = sweep(
+        made.replace({"time.periods": 1500, "sweep": {"damper.0.velocity": np.linspace(0.0, 0.4, 15).tolist()}})
+    )
+    assert np.ptp(swept.amplitude_mean) > 0.03
+    assert swept.to_json()["warnings"][0].startswith("structure.modes: steady states differ")
 
 
 def test_sweep_has_one_model(file):
@@ -162,7 +230,7 @@ def test_a_wide_band_sees_the_collisions_of_the_narrow_one(tmp_path):
     first, law = float(model.natural_frequencies_hz[0]), {"law": "compliant", "stiffness": 300.0}
     made = scene(str(tmp_path / "beam.h5"), contact=law, structure__modes="auto", damper__restitution=0.7,
                  damper__mass=0.01, cavity__gap=0.6, excitation__force=None,
-                 excitation__resonance_amplitude=1.0)  # fmt: skip
+                 excitation__resonance_amplitude=1.0, time={"periods": LONG})  # fmt: skip
     found = []
     for band in ([0.97, 0.985, 1.0], [0.83, 0.86, 0.89, 0.92, 0.975, 0.99, 1.02, 1.05]):
         swept = [made.replace({"excitation.frequency": share * first}) for share in band]
@@ -178,7 +246,8 @@ def test_gaps_of_a_sweep_are_tried_apart(file):
     """A first gap out of reach does not hide the collisions of a second one."""
     law = {"law": "compliant", "stiffness": 50.0}
     made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7,
-                 excitation__force=None, excitation__resonance_amplitude=0.6, excitation__frequency=0.247)  # fmt: skip
+                 excitation__force=None, excitation__resonance_amplitude=0.6, excitation__frequency=0.247,
+                 time={"periods": LONG})  # fmt: skip
     alone = select_model_order(made).estimate["modes"]
     both = select_model_orders([made.replace({"cavity.c.gap": gap}) for gap in (50.0, 0.5)])[0].estimate["modes"]
     assert both >= alone > 1

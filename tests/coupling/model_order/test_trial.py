@@ -7,6 +7,7 @@ bench ladder` adds what the models cost.
 import numpy as np
 import pytest
 
+from benchmarks.model_order import starts
 from benchmarks.model_order import trial as auto_choice
 from benchmarks.model_order.scenes import SEED, chain_trial, trials
 from benchmarks.model_order.structures import beam_model, rod_model
@@ -43,7 +44,7 @@ def test_tolerance_is_kept(tmp_path, structure, index):
 def test_runs_refuse_what_the_estimate_would_take(tmp_path, seed, modes, least):
     """Chains whose estimate promised 0.034 and 0.043 for models of two modes, which are 0.40 and 0.14 off."""
     trial = chain_trial(tmp_path / "rom.h5", seed)
-    scene = trial.scene.replace({"structure.tolerance": 0.05})
+    scene = trial.scene.replace({"structure.tolerance": 0.05, "time.periods": auto_choice.LONG})
     estimate = select_model_order(scene).estimate
     rung = next(r for r in estimate["ladder"] if r["modes"] == modes)
     whole = (estimate["ladder"][-1]["modes"], False)
@@ -51,7 +52,7 @@ def test_runs_refuse_what_the_estimate_would_take(tmp_path, seed, modes, least):
     deviations, _ = auto_choice.errors([scene], kinds, trial.undamped, 600)
     assert rung["receptance"] + rung["collision"] <= 0.05 and deviations[0] > least
     assert deviations[1] <= 0.05
-    assert estimate["difference"] <= 0.05 and not estimate["several_states"]
+    assert not estimate["several_states"]
     assert "did not hold in runs" in estimate["sentence"]
 
 
@@ -65,3 +66,18 @@ def test_tolerances_of_the_trial(tmp_path):
         for (_, error, confidence, _), tolerance in zip(found, auto_choice.TOLERANCES * 10, strict=True)
     )
     assert missed <= 1
+
+
+@pytest.mark.parametrize("seed", [4006, 4014])
+def test_a_choice_answers_as_the_whole_model_from_the_same_start(tmp_path, seed):
+    """Chains on which models 0.04 and 0.1 off were taken: means over two starts, runs that were not steady."""
+    found = starts.chain_verdict(seed, tmp_path)
+    assert found.warned or not found.missed()
+
+
+@pytest.mark.slow
+def test_choices_answer_as_the_whole_model_from_four_starts(tmp_path):
+    """Twenty chains (`python -m benchmarks.model_order.starts` runs a hundred): some choices are smaller models."""
+    found = [starts.chain_verdict(seed, tmp_path) for seed in range(starts.SEED, starts.SEED + 20)]
+    assert sum(verdict.missed() and not verdict.warned for verdict in found) == 0
+    assert sum(verdict.model != str(verdict.whole) for verdict in found) >= 8
