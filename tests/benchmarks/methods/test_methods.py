@@ -100,6 +100,13 @@ def test_work_precision_leaves_its_results(tmp_path, capsys, pictures):
     assert chart["classification"] == "periodic-1"
     coarse, fine = (point["error"] for point in chart["points"] if point["method"] == "Moreau-Jean")
     assert fine < 0.3 * coarse
+    # a mean of the last 15 of 30 periods, from the exact steady state, in which the method drifts from it
+    scene = method_scenes.periodic(3000).replace({"time.periods": 30, "time.transient": 15})
+    stepped = simulate(method_scenes.by(scene, method="penalty", steps_per_period=1000)).amplitude_mean
+    label, drift = "penalty, central differences", abs(stepped / simulate(scene).amplitude_mean - 1)
+    points = {(row["method"], float(row["setting"])): row for row in rows if row["scene"] == "periodic 1:1 impact"}
+    assert float(points[label, 1000]["steady"]) == pytest.approx(drift, rel=1e-6) and drift > 0.01
+    assert float(points["exact engine", 0]["steady"]) < 1e-12
     # of the peers only those with a tolerance have a setting in this effort
     for name in ("SUNDIALS CVODE", "heyoka"):
         errors = [point["error"] for point in chart["points"] if point["method"] == name]
@@ -109,6 +116,7 @@ def test_work_precision_leaves_its_results(tmp_path, capsys, pictures):
     bench.print_summary(result)
     out = capsys.readouterr().out
     assert "exact engine is" in out and "| Moreau-Jean, 1000 " in out
+    assert "| penalty, central differences, 100 " in out  # the table of steady errors has every setting
 
 
 def test_timed_runs_are_not_judged_by_what_so_few_periods_have_settled():
