@@ -206,7 +206,7 @@ class Chart:
         if self.repeats:
             samples = np.column_stack([response.displacement, response.body_displacement])
             point |= {"error": _state_error(samples, self.exact), "floor": _FLOOR}
-            settled = self._steady_run(scene, means)
+            settled = self._steady_run(scenes.solved(self.scene, key, _LEAST), means)
             point |= {"penetration": settled.penetration}
             if settled.status in (Status.OK, Status.NOT_STEADY):
                 point |= _steady_error(self._series(settled), self.settled)
@@ -242,7 +242,7 @@ class Chart:
         point = _new_point(key, run.status)
         if run.status == "ok" and self.repeats:
             point |= {"error": _state_error(run.samples, self.exact), "floor": _FLOOR}
-            run = run_peer(name, self.scene, means, setting, samples)
+            run = run_peer(name, self.scene, means, setting, _SAMPLES if self._prescribed else 0)
             point |= _steady_error(self._series(run), self.settled) if run.status == "ok" else {}
         elif run.status == "ok":
             late = self._series(run)
