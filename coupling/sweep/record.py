@@ -114,7 +114,7 @@ class Sweep(SceneRecord, Plotted):
         return usual[0] if usual else max(lengths, key=lengths.__getitem__)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]  # others have it as a field
         """To be read before results are used."""
         return tuple(self.provenance.get("warnings", ()))
 
