@@ -81,7 +81,7 @@ def run_points(
 
 def doubts(prepared: Prepared, result: Sweep) -> list[str]:
     """Return the warnings of a result that its points did not have before they ran."""
-    return [text for text in result.provenance.get("warnings", ()) if text not in prepared.points.warnings]
+    return [text for text in result.warnings if text not in prepared.points.warnings]
 
 
 def ends_of(points: Grid | Members) -> list[Scene]:

@@ -26,10 +26,11 @@ _SECTIONS = 33
 def with_moved_starts(grid: Grid, sweep: Sweep, executor: Executor | None) -> Sweep:
     """Return a sweep that says what the peak of each curve is in a run from moved bodies (Sweep.moved_starts).
 
-    Warnings name peaks with another mean, and neighbours that never part. Linked runs are left out: they begin with
-    their neighbours' states.
+    Warnings name peaks with another mean, and neighbours that never part. Linked runs are left out, which begin with
+    their neighbours' states, and curves of one point, as of maps at one frequency.
     """
-    peaks = [] if grid.along is not None or not grid.axes else list(_peaks(sweep))
+    curves = grid.along is None and sweep.axes and len(sweep.axes[sweep.along]) > 1
+    peaks = list(_peaks(sweep)) if curves else []
     if not peaks:
         return sweep
     maker, points = Points(grid.base, grid.choices), [grid.values(peak) for peak in peaks]
@@ -46,7 +47,7 @@ def with_moved_starts(grid: Grid, sweep: Sweep, executor: Executor | None) -> Sw
     for place, number in enumerate(rows):
         motion = (sections[name][place] for name in ("section_slip", "section_slip_velocity"))
         notes += [f"at {_named(points[number])}: {note}" for note in as_one(unrolled(scenes[number]), *motion)]
-    warnings = [*sweep.provenance.get("warnings", ()), *_first(notes)]
+    warnings = [*sweep.warnings, *_first(notes)]
     more = {"moved_starts": found} | ({"warnings": warnings} if warnings else {})
     return replace(sweep, provenance={**sweep.provenance, **more})
 

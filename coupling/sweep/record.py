@@ -116,6 +116,11 @@ class Sweep(SceneRecord, Plotted):
         return usual[0] if usual else max(lengths, key=lengths.__getitem__)
 
     @property
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]  # others have it as a field
+        """To be read before results are used."""
+        return tuple(self.provenance.get("warnings", ()))
+
+    @property
     def moved_starts(self) -> list[dict[str, Any]]:
         """Of the peak of each curve that has impacts: where it is, what a run from bodies about 1e-9 of their gap aside
         comes to, and whether it `agrees` (response.moved_start); empty if not asked for, and for linked runs."""
@@ -146,7 +151,7 @@ class Sweep(SceneRecord, Plotted):
     def to_json(self) -> dict[str, Any]:
         """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
-        notes = {"warnings": list(self.provenance.get("warnings", ()))}
+        notes = {"warnings": list(self.warnings)}
         kept = ("estimate", "advice", "moved_starts")
         notes |= {name: self.provenance[name] for name in kept if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}

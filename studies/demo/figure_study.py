@@ -75,7 +75,7 @@ class Session:
         points = grid(scene)
         compile_engine(ends_of(points), self.pool)
         with progress(stem) as report:
-            found = sweep(points, self.pool, report, checkpoint, provenance(scene))
+            found = sweep(points, self.pool, report, checkpoint, provenance(scene), moved_starts=True)
         found.save(path)
         clear(checkpoint)
         return found

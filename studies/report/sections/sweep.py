@@ -82,17 +82,13 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "rings": [ring_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.sectors],
         "strength": [sweep_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.stress or sweep.wear],
-        "notes": list(dict.fromkeys(note for sweep in sweeps.values() for note in _notes(sweep))),
+        "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
+        "warnings": list(dict.fromkeys(text for sweep in sweeps.values() for text in sweep.warnings)),
     }
 
 
-def _notes(sweep: Sweep) -> list[str]:
-    """Return what is to be read before the results of a sweep are used."""
-    note = body_note(sweep.provenance, sweep.scene)
-    return [
-        *([note] if note else []),
-        *(f"{text[:1].upper()}{text[1:]}." for text in sweep.provenance.get("warnings", ())),
-    ]
+def _body_note(sweep: Sweep) -> str | None:
+    return body_note(sweep.provenance, sweep.scene)
 
 
 def _scene(sweep: Sweep) -> dict[str, Any]:

@@ -53,6 +53,7 @@ def test_bodies_begin_with_equal_gaps(places, expected, tmp_path):
         wider = made.replace({"cavity.c.gap": 2 * GAP, "damper.mass": 0.03})
         assert wider.positions == pytest.approx(np.multiply(expected, 2 * GAP), abs=1e-18)
         assert "position" not in wider.to_dict()["damper"][0]
+        assert wider.number("damper.0.position") == wider.positions[0]
 
 
 def test_a_single_body_begins_at_mid_travel_to_the_last_bit():
