@@ -141,7 +141,7 @@ def test_a_critically_damped_structure_is_refused_as_by_itself(monkeypatch):
     scene, points, task = validate(Scene, tables, "scene"), _POINTS["frequencies"][1], Task(range(12))
     found, one_by_one = run_points(scene, NOTHING, points, task), _alone(monkeypatch, scene, points, task)
     assert found.texts == one_by_one.texts
-    assert found.texts[0][0].startswith("error: InputError: structure: a mode is critically damped")
+    assert found.texts[0][0].startswith("error: InputError: structure: the mode of 15.9155 Hz is critically damped")
 
 
 def test_threads_do_not_share_what_they_keep():
