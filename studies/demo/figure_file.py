@@ -212,7 +212,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return tables with counted cavities and bodies spelt out; these start spread about mid-travel."""
+    """Return tables with counted cavities and bodies spelt out; single ones start aside, each in its own place."""
     cavities, names = [], {}
     for table in tables.get("cavity", []):
         count = table.get("count")
@@ -226,7 +226,7 @@ def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
         table = {key: value for key, value in table.items() if key != "count"}
         homes = names.get(table["cavity"], [table["cavity"]])
         for place, home in enumerate(homes):
-            for body in range(count):
-                aside = ((place + 0.5) / len(homes) - 0.5) / 2 if count == 1 else (body + 0.5) / count - 0.5
-                dampers.append({"position": aside * gaps.get(home, 0.0)} | table | {"cavity": home})
+            aside = ((place + 0.5) / len(homes) - 0.5) / 2
+            own = {"position": aside * gaps.get(home, 0.0)} if count == 1 else {}
+            dampers += [own | table | {"cavity": home}] * count
     return tables | {"cavity": cavities, "damper": dampers}

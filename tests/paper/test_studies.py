@@ -66,7 +66,7 @@ def test_counted_bodies_and_cavities():
     assert [damper.cavity for damper in many.damper] == [cavity.name for cavity in many.cavity]
     assert len(row.damper) == 32
     assert len(row.cavity) == 1
-    places = [damper.position for damper in row.damper]
+    places = list(row.positions)
     assert places == sorted(places)
     assert max(places) == pytest.approx(-min(places))
     assert max(places) < row.cavity[0].gap / 2
