@@ -186,7 +186,7 @@ def test_sliders_by_poissons_law():
     newton, poisson = (simulate(scene.replace({"contact": {"law": law}}), events=True) for law in ("newton", "poisson"))
     np.testing.assert_allclose(poisson.peak[:10], newton.peak[:10], rtol=1e-9)
     assert poisson.impacts_per_period > 0.5
-    with pytest.raises(InputError, match=r"impacts in two phases, is for solver\.method exact or moreau"):
+    with pytest.raises(InputError, match=r"two phases, of \"poisson\", are for solver\.method exact or moreau"):
         simulate(scene.replace({"contact": {"law": "poisson"}, "solver.method": "penalty"}))
 
 

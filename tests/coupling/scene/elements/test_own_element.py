@@ -107,7 +107,8 @@ def test_a_tether_throws_the_body_back(method):
     """Free flight over the slack at v; half a swing at sqrt(k/m), which returns v: 4 slack/v + 2 pi sqrt(m/k)."""
     solver, tolerance = METHODS[method]
     response = simulate(tethered(solver), events=True, samples_per_period=100)
-    assert response.status is Status.OK
+    # a spring without loss makes or takes the truncation error of steps
+    assert response.status in ({Status.OK} if tolerance < 1e-6 else {Status.OK, Status.ENERGY})
     begins = [event for event in response.event_list if event.kind == "impact"]
     assert {(event.damper, event.side) for event in begins} == {(0, "tether")}
     fly, swing = 2 * SLACK / SPEED, math.pi * math.sqrt(MASS / STIFFNESS)
