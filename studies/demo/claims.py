@@ -123,19 +123,31 @@ def _level(reduced: Curve, rigid: Curve) -> Claim:
 
 
 def onset(curve: Curve) -> Claim:
-    below = curve.frequency < curve.onset
-    apart = float(np.max(np.abs(curve.mean / curve.undamped - 1)[below])) if below.any() else math.inf
-    at = int(np.argmax(~below))
-    found = f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz; below it the curves differ "
-    found += f"by at most {apart:.2%} over {below.sum()} points"
+    found = [_onset(start, each) for start, each in curve.each or (("", curve),)]
+    shown = [apart < 0.01 and points > 5 for _, apart, points in found]
     return claim(
         "Up to an onset the damped curve is the one without bodies.",
-        found if below.any() else f"the curves differ from the lowest frequency on, {curve.frequency[0]:.1f} Hz",
-        verdict(apart < 0.01 and below.sum() > 5),
+        "; ".join(text for text, _, _ in found),
+        verdict(all(shown), any(shown)),
         "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
-        "grows slowly hits only from amplitudes of about half of the gap on. Going down, a body that hits goes on "
-        "hitting below the onset.",
-        {"onset_hz": curve.onset, "difference": apart},
+        "grows slowly hits only from amplitudes of about half of the gap on. A body that hits as the frequency goes "
+        "down goes on hitting below the onset.",
+        {"onset_hz": (curve.each[0][1] if curve.each else curve).onset, "difference": found[0][1]},
+    )
+
+
+def _onset(start: str, curve: Curve) -> tuple[str, float, int]:
+    """Return an onset in words, and by how much the curves differ below it, over how many points."""
+    below = curve.frequency < curve.onset
+    of = f"{start}: " if start else ""
+    if not below.any():
+        return f"{of}the curves differ from the lowest frequency on, {curve.frequency[0]:.1f} Hz", math.inf, 0
+    apart, at = float(np.max(np.abs(curve.mean / curve.undamped - 1)[below])), int(np.argmax(~below))
+    onset = f"onset between {curve.frequency[max(at - 1, 0)]:.1f} and {curve.onset:.1f} Hz"
+    return (
+        f"{of}{onset}; below it the curves differ by at most {apart:.2%} over {below.sum()} points",
+        apart,
+        below.sum(),
     )
 
 

@@ -50,6 +50,7 @@ class Curve:
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
     starts                     of the runs, in words; empty where there was one
+    each                       the curves of all starts by these words, of which this is the worst; else empty
     """
 
     name: str
@@ -65,6 +66,7 @@ class Curve:
     periodic: np.ndarray
     reference: float
     starts: tuple[str, ...] = ()
+    each: tuple[tuple[str, Curve], ...] = ()
 
     @property
     def smooth(self) -> np.ndarray:
@@ -134,7 +136,9 @@ def worst_of(curves: Sequence[Curve], words: Sequence[str]) -> Curve:
     worst = whole["mean"].argmax(axis=0)
     found = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
     found |= {"largest": whole["largest"].max(axis=0), "periodic": found["periodic"] == 1.0}
-    return replace(curves[0], **found, starts=tuple(words[row] for row in worst))
+    return replace(
+        curves[0], **found, starts=tuple(words[row] for row in worst), each=tuple(zip(words, curves, strict=True))
+    )
 
 
 def _curve(
