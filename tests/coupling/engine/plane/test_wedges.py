@@ -8,7 +8,7 @@ import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
 from tests.tools.planar_laws import LONGEST, check_laws, tables
-from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, UNDECIDED, OPEN
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, OPEN, UNDECIDED
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import Motion
