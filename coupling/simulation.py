@@ -63,7 +63,8 @@ def _from_moved(
 
     None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
     """
-    if response.status is not Status.OK or not response.impacts_per_period or not scene.damper:
+    hit = response.impacts_per_period or response.counters.get("impacts")  # the transient's choose a state as well
+    if response.status is not Status.OK or not hit or not scene.damper:
         return None, ()
     places = moved(scene, scene.positions if start is None else start.slip.tolist())
     if start is None:

@@ -160,6 +160,16 @@ def test_no_second_run_without_impacts_or_bodies():
     assert simulate(scene(0.0, 0.0)).moved_start is None
 
 
+def test_impacts_of_the_transient_count():
+    """They choose the steady state, even if it has none."""
+    struck = scene(None, excitation={"frequency": 15.9, "force": 1e-3}, initial={"displacement": 6e-3}).replace(
+        {"damper.friction": 0.3}
+    )
+    found = simulate(struck, moved_start=True)
+    assert found.counters["impacts"] > 0 == found.impacts_per_period
+    assert found.moved_start["agrees"] and not found.moved_start["impacts_per_period"]
+
+
 def test_a_sweep_checks_the_peak_of_each_curve(tmp_path):
     """Bit for bit as runs by themselves; linked runs, which begin with states, are left out."""
     places, frequencies = [0.0, 1e-4], [15.9, 17.5]
