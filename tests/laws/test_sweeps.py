@@ -16,6 +16,8 @@ import pytest
 
 from tests.tools.random_sweeps import TRAPS, RandomSweep, differing, one_by_one, random_sweep, run_cut, same
 from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.alike import Kind
@@ -80,7 +82,8 @@ def test_what_is_kept_shares_no_memory_with_a_record(seed):
     drawn = random_sweep(seed)
     kind = Kind(drawn.scene)
     records = [kind.scene, kind.run.whole, kind.start, kind.linear]
-    written = [kind.run.system, *kind.statistics, kind.run.state, kind.run.flows, kind.run.scratch, kind.run.records]
+    run = kind.run
+    written = [run.system, *kind.statistics, run.state, run.flows, run.scratch, run.records, run.known.stack]
     before = [array.tobytes() for array in arrays_of(records)]
     shared = [np.shares_memory(one, other) for one in arrays_of(records) for other in arrays_of(written)]
     assert len(shared) > 1000
@@ -89,6 +92,20 @@ def test_what_is_kept_shares_no_memory_with_a_record(seed):
     numbers = {path: np.array([point[path] for point in drawn.points]) for path in paths}
     kind.run_all(numbers, None, drawn.linked, lambda place, start: start)
     assert before == [array.tobytes() for array in arrays_of(records)]
+
+
+def test_flows_that_runs_pass_on_share_no_memory_with_their_systems():
+    """Orbits, ramps and choices let a run take over the flows of an earlier one (engine.backends.reuse_subsystems)."""
+    block = {"shape": "block", "length": 0.02, "height": 0.01}
+    planar = WIDE | {"cavity": [WIDE["cavity"][0] | {"play": 1e-4}], "damper": [WIDE["damper"][0] | block]}
+    for tables in (WIDE, planar):
+        scene = validate(Scene, tables, "scene")
+        first, second = run_of(scene), run_of(scene)
+        assert first.advance_to(20) is Status.OK
+        second.reuse(first)
+        system, kept = list(arrays_of(second.whole)), list(arrays_of(second.flows))
+        assert len(kept) > 20
+        assert not any(np.shares_memory(one, other) for one in system for other in kept)
 
 
 def arrays_of(value: Any) -> Iterator[np.ndarray]:
