@@ -43,7 +43,7 @@ def fig14(curves: Curves) -> list[Claim]:
     text = ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in level.items())
     light = "Gravity is a sixteen-hundredth of the walls' acceleration here, so that it matters only to a body at rest."
     best = min(level, key=lambda name: level[name])
-    together = {name: np.array([curve.mean for curve in curves[f"{name}_starts"]]) for name in ("double", "quad")}
+    together = {name: np.concatenate([curve.mean for curve in curves[f"{name}_starts"]]) for name in ("double", "quad")}
     share = {name: float(np.mean(means > TOGETHER)) for name, means in together.items()}
     linked = {name: float(max(curve.mean.max() for curve in curves[f"{name}_linked"])) for name in together}
     worst = {name: max(float(means.max()), linked[name]) for name, means in together.items()}

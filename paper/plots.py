@@ -36,7 +36,7 @@ def orientations_picture(
     curves: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path
 ) -> None:
     """Draw horizontal and vertical responses, and the tops over the angle."""
-    curves = {label: of for label, of in curves.items() if "starts" not in label}
+    curves = {label: of for label, of in curves.items() if not label.endswith((" starts", " linked"))}
     figure, (first, second, third) = subplots(1, 3, size=(16, 5.2))
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
         draw_linear(axes, curves["single"][index])
