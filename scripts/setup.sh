@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What vanedamp needs, on Debian or Ubuntu: system packages, a virtual environment on the system's interpreter, the pinned
 # packages of requirements.txt and the project itself. dolfinx is PyPI's wheel where there is one for that interpreter
-# (x86-64, Python 3.12 and newer), otherwise apt's; DOLFINX=wheel or DOLFINX=apt decides.
+# (x86-64, Python 3.12 and newer), otherwise apt's; DOLFINX=wheel or DOLFINX=apt decides. VENV names another folder.
 #
 #     scripts/setup.sh [product] [tests] [checks] [browser] [peers] [docs]
 #
@@ -11,7 +11,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 python=/usr/bin/python3
-venv=.venv
+venv=${VENV:-.venv}
 stamp=$venv/setup- # stamp and group: what the group was made from; written last, so that a killed set-up starts over
 
 # first what the engine compiles with, then the rest while it compiles
@@ -134,36 +134,24 @@ pinned() { awk -v group="[$1]" '/^# \[/ { found = $2 == group; next } found && N
 
 pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
 
-extras_of() {
-    case $1 in
-        product) echo fem,explore ;;
-        tests) echo exchange,nastran,cluster,dev ;;
-        checks) echo dev ;;
-        *) echo "$1" ;;
-    esac
-}
-
 install_python_packages() {
-    if [ $dolfinx = wheel ]; then
-        # pip finds what these need
-        [ "$1" != engine ] || pip --constraint requirements.txt $(pinned engine | sed 's/==.*//') scipy h5py
-        [ "$1" = engine ] || pip --constraint requirements.txt -e ".[$(extras_of "$1")]"
-        return
-    fi
     # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
+    [ "$1" != engine ] || [ $dolfinx = apt ] || pip --no-deps -r <(pinned wheel)
     pip --no-deps -r <(pinned "$1")
     [ "$1" != product ] || pip --no-deps --no-build-isolation -e .
 }
 
 # Both engines side by side, each in a process of its own.
 compile_engines() {
-    local engine
+    local engine job jobs=()
     say "compiling the engines"
     for engine in line plane; do
-        $venv/bin/python -c "from vanedamp.coupling.sweep.sweep import warm_up_engine; warm_up_engine('$engine')" ||
-            say "that failed; the first run compiles it" &
+        $venv/bin/python -c "from vanedamp.coupling.sweep.sweep import warm_up_engine; warm_up_engine('$engine')" &
+        jobs+=($!)
     done
-    wait
+    for job in "${jobs[@]}"; do
+        wait "$job" || { say "the engines do not compile"; return 1; }
+    done
 }
 
 # A finished set-up whose interpreter still finds the packages, also after an upgrade of the system's Python.

@@ -7,7 +7,6 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.compiler.function_address import quantile_address
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.response.at_rest import at_rest
@@ -62,7 +61,6 @@ class Measured(NamedTuple):
     rolls: Annotated[np.ndarray, "b", bool]  # whether friction makes the body roll
     fixed: Annotated[np.ndarray, "b", bool]  # whether the structure does not move its floor
     orders: bool  # whether order 1 may be missing among the loads
-    quantile_at: int  # address of Student's quantile
     scale: Annotated[np.ndarray, "s"]  # (3 + 2b,) room for the scale of each state
     held: Annotated[np.ndarray, "b", bool]  # room for which bodies are at rest
 
@@ -78,7 +76,7 @@ def measured_of(scene: Scene, system: System) -> Measured:
         rest=system.rest, play=system.play, J=system.J, body=system.body, other=system.other,
         lies=~system.across & ~system.without_body[:c] & np.isinf(system.spring[:c]),
         rolls=np.array([damper.form.rolls for damper in scene.damper], bool), fixed=~moves.any(axis=1),
-        orders=excitation.waveform is not None or bool(excitation.distributed), quantile_at=quantile_address(),
+        orders=excitation.waveform is not None or bool(excitation.distributed),
         scale=np.zeros(3 + 2 * b), held=np.zeros(b, bool),
     )  # fmt: skip
 
@@ -106,7 +104,7 @@ def measure(measured, records, first, done, confidence, figures):
         momentum += records.momentum[i]
     harmonic *= 2.0 / span
     if math.isnan(confidence):
-        confidence = confidence_of(records.peak, first, done, np.inf, measured.quantile_at)
+        confidence = confidence_of(records.peak, first, done, np.inf)
     figures[MAX], figures[MEAN], figures[CONFIDENCE] = peak, peaks / max(count, 1), confidence
     figures[STATIC], figures[MAX_DYNAMIC], figures[MEAN_DYNAMIC] = static, dynamic, dynamics / max(count, 1)
     figures[RMS] = math.sqrt(max(square / span, 0.0))

@@ -67,7 +67,7 @@ def judged(setup, free, stuck, records, first, done, peaks):
         not (moves and (setup.driven or setup.excited[0]))
         or (left <= tolerance and not _touched(setup, records, ZERO, done))
     ):  # fmt: skip
-        return True, np.inf, confidence_of(peaks, ZERO, n, np.inf, setup.quantile_at) + left * mean
+        return True, np.inf, confidence_of(peaks, ZERO, n, np.inf) + left * mean
     if n < 2:
         return False, 0.0, np.nan
     quiet = not _touched(setup, records, first, done)
@@ -79,7 +79,7 @@ def judged(setup, free, stuck, records, first, done, peaks):
     given = left <= tolerance and not setup.open
     repeats = remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat)
     relaxations = rate * n
-    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations, setup.quantile_at)
+    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations)
     if quiet or repeats:
         return repeats, rate, own + (remaining if repeats else 0.0)
     # neighbouring parts of the window must not be too much alike for statistics, beyond the tolerance of its mean

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.linalg import LinAlgError
 
 from vanedamp.coupling.numerics.compiler.jit import CacheError
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
@@ -53,9 +54,9 @@ LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
 #: columns of every point: measures, then fractions of the losses; behind them `parts_of`
 COLUMNS = (*MEASURES, *LOSSES)
-#: faults of a point: errors of its parameters; all others, such as of imports, files and memory, would meet the
-#: next point as well
-OF_A_POINT = (ArithmeticError, LookupError, RuntimeError, ValueError)
+#: faults of a point: of its parameters and of arithmetic; all others, such as of imports, files, memory and the
+#: program, would meet the next point as well
+OF_A_POINT = (ArithmeticError, LinAlgError, VanedampError)
 _LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
 _OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in _LINEAR]
 
@@ -88,6 +89,15 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
     Those that differ in numbers only run as one (sweep.alike). Raises SweepError for errors that are no fault of a
     point.
     """
+    try:
+        return _run_points(base, choices, points, task)
+    except OF_A_POINT:
+        raise
+    except Exception as error:
+        raise _stopped(error, f"points {task.points[0]} to {task.points[-1]}") from error
+
+
+def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     started = time.perf_counter()
     points, maker, state = PointTable.of(points), Points(base, choices), task.start if task.linked else None
     values, parts = np.full((len(points), width_of(base)), np.nan), parts_of(base)
@@ -217,10 +227,7 @@ def _run(
             put_exponents(row[parts["exponents"]], chosen.scene, periods, response.final)
     except Exception as error:  # one broken point must not cost the others
         if isinstance(error, StoreError | CacheError) or not isinstance(error, OF_A_POINT):
-            where = ", ".join(f"{path} = {value}" for path, value in point.items())
-            raise SweepError(
-                f"stopped at {where}: {type(error).__name__}: {error}; run the same again to go on from the checkpoint"
-            ) from error
+            raise _stopped(error, ", ".join(f"{path} = {value}" for path, value in point.items())) from error
         return None, broken(error).texts[0]
     for name, place in _OF_RUN:
         value = getattr(response, name)
@@ -235,6 +242,11 @@ def _run(
     put_wear(row[parts["wear"]], response.wear)
     put_sectors(row[parts["sectors"]], response.sectors)
     return response.final, (response.status.value, response.classification)
+
+
+def _stopped(error: Exception, where: str) -> SweepError:
+    again = "run the same again to go on from the checkpoint"
+    return SweepError(f"stopped at {where}: {type(error).__name__}: {error}; {again}")
 
 
 def _shares(losses: np.ndarray) -> np.ndarray:

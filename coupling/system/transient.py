@@ -13,7 +13,6 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.compiler.function_address import quantile_address
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.scene.scene import Scene
@@ -75,7 +74,6 @@ class Setup(NamedTuple):
     dropped: int  # periods that are left out unless it does
     simulated: int
     most: int  # longest run; 0: no longer than its length
-    quantile_at: int  # address of Student's quantile
 
 
 class Transient:
@@ -98,7 +96,6 @@ class Transient:
             rigid=any(damper.stiffness is None for damper in scene.friction_damper), tolerance=float(time.tolerance),
             open=time.open, suited=time.open and not prescribed, dropped=time.dropped, simulated=time.simulated,
             most=0 if time.steady and not prescribed else most_periods(scene),
-            quantile_at=quantile_address(),
         )  # fmt: skip
         self.numbers, self.parts = (setup, free, stuck), (loose, held)
         begin_transient(setup, loose, held, free, stuck)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import random
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -268,3 +269,9 @@ def _change_record(path: Path, draw: random.Random) -> None:
                 file.attrs[attribute] = np.bytes_(b"\xff\xfe" + str(file.attrs[attribute]).encode())
             case _:
                 file[name].attrs["DIMENSION_LIST"] = 1
+
+
+if __name__ == "__main__":  # the samples, to a folder
+    from vanedamp.studies.cli import main
+
+    write_samples(Path(sys.argv[1]), main)

@@ -9,7 +9,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import cfunc, config, types
-from numba.extending import get_cython_function_address, intrinsic, overload
+from numba.extending import intrinsic, overload
 
 _PROTOTYPE = CFUNCTYPE(c_double, c_double, c_double)
 
@@ -28,12 +28,6 @@ def address_of(function: Callable[[float, float], float]) -> int:
     compiled: Any = cfunc(types.float64(types.float64, types.float64), error_model="numpy")(function)
     _KEPT.append(compiled)
     return int(compiled.address)
-
-
-@cache
-def quantile_address() -> int:
-    """Return the address of Student's quantile, of degrees of freedom and a probability."""
-    return int(get_cython_function_address("scipy.special.cython_special", "stdtrit"))
 
 
 def call(address: int, first: float, second: float) -> float:

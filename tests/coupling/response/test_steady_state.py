@@ -1,11 +1,12 @@
 """Steady state and confidence: against processes whose statistics are known, and on the engine's own responses."""
 
+import mpmath
 import numpy as np
 import pytest
 
 from tests.coupling.engine.line.test_closed_forms import cluster
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
+from vanedamp.coupling.response.steady_state import mean_confidence, student_quantile, transient_length
 from vanedamp.coupling.simulation import simulate
 
 
@@ -27,6 +28,17 @@ def test_confidence_interval_covers_the_mean(correlation):
         series = autoregressive(rng, 2000, correlation)
         covered += abs(series.mean()) <= mean_confidence(series)
     assert 0.95 - 3 * np.sqrt(0.05 * 0.95 / 400) - 0.01 <= covered / 400 <= 0.99
+
+
+def test_students_quantile_is_that_of_the_incomplete_beta_function():
+    for freedom in [1.0, 1.2, 2.0, 2.7, 4.0, 6.9, 9.0]:
+        with mpmath.workdps(30):
+            t = mpmath.mpf(student_quantile(freedom))
+            # P(|T| < t), whose slope is that of the density
+            tail = mpmath.betainc(freedom / 2, 0.5, 0, freedom / (freedom + t**2), regularized=True)
+            density = (1 + t**2 / freedom) ** (-(freedom + 1) / 2) / mpmath.sqrt(freedom)
+            density /= mpmath.beta(freedom / 2, mpmath.mpf(0.5))
+            assert abs((tail - mpmath.mpf("0.05")) / (2 * density * t)) < 1e-15
 
 
 def test_transient_of_a_decay_is_found():

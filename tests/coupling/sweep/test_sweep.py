@@ -221,9 +221,12 @@ def test_a_broken_run_is_one_point(monkeypatch, result):
 
 @pytest.mark.parametrize(
     "fault",
-    [EOFError("cut"), ImportError("no such library"), MemoryError(), OSError(24, "too many files"), StoreError("gone")],
+    [
+        EOFError("cut"), ImportError("no such library"), MemoryError(), OSError(24, "too many files"),
+        StoreError("gone"), KeyError("fault"), RuntimeError("fault"), ValueError("no such function"),
+    ],
     ids=lambda fault: type(fault).__name__,
-)
+)  # fmt: skip
 def test_what_is_no_fault_of_a_point_ends_a_sweep(fault, monkeypatch, result, tmp_path):
     """It would meet all others, too; what is finished is kept."""
     last = result.axes["excitation.frequency"][-1]
