@@ -2,9 +2,11 @@
 # The tests of finite elements and reduction on other releases of dolfinx: clean Debian root folders, set up by
 # scripts/setup.sh as on a fresh machine, with PyPI's wheel of dolfinx or apt's. As root, with debootstrap; some 4 GB each.
 #
-#     scripts/test_versions.sh [trixie-wheel] [trixie-apt] [sid-apt] [TEST ...]
+#     scripts/test_versions.sh [trixie-wheel] [trixie-apt] [sid-apt] [bookworm-apt] [TEST ...]
+#     scripts/test_versions.sh --make [bookworm-apt] [trixie-wheel] ...
 #
-# Default: these three, and all tests of modal/ and rom/.
+# Default: the first three, and all tests of modal/ and rom/. --make: `make demo` and `make test`, as a user calls them,
+# in new root folders.
 # The folders stay in $VERSIONS (/var/tmp/vanedamp-versions), so that a second call takes the tests' time alone. Packages
 # come from where this machine's own come from, or from $MIRROR.
 set -euo pipefail
@@ -71,17 +73,28 @@ prepare() {
 
 run() {
     local suite=$1 root=$home/$1
+    [ ! "$make" ] || rm -f "$root/bootstrapped"
     prepare "$suite" "$root" || return 1
-    local begun=$SECONDS
+    local begun=$SECONDS target
+    if [ "$make" ]; then
+        inside "$root" bash -c 'apt-get -qq update && apt-get -qq install -y --no-install-recommends make >/dev/null'
+        for target in demo test; do
+            begun=$SECONDS
+            inside "$root" env DOLFINX="${suite#*-}" make -C /vanedamp $target || { say "$suite: make $target failed"; return 1; }
+            say "$suite: make $target in $((SECONDS - begun)) s; .venv $(du -sh "$root/vanedamp/.venv" | cut -f1)"
+        done
+        return
+    fi
     inside "$root" env DOLFINX="${suite#*-}" /vanedamp/scripts/setup.sh || { say "$suite: the set-up failed"; return 1; }
     say "$suite: set up in $((SECONDS - begun)) s"
     inside "$root" bash -c 'cd /vanedamp && exec .venv/bin/python -m pytest -q "$@"' -- "${tests[@]}"
 }
 
-suites=() tests=()
+suites=() tests=() make=
 for word in "$@"; do
     case $word in
-        trixie-wheel | trixie-apt | sid-wheel | sid-apt) suites+=("$word") ;;
+        --make) make=yes ;;
+        bookworm-apt | trixie-wheel | trixie-apt | sid-wheel | sid-apt) suites+=("$word") ;;
         *) tests+=("$word") ;;
     esac
 done

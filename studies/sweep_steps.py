@@ -95,7 +95,8 @@ def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> Non
 
     Left out are scenes with open choices, which decide what is compiled.
     """
-    with stage("compile or load the engine"), suppress(BrokenExecutor):  # a scene that ends its worker does so again
+    title = "load the engine; the first time it is compiled, which takes a minute or two"
+    with stage(title), suppress(BrokenExecutor):  # a scene that ends its worker does so again
         for scene in scenes:
             if leaves_open(scene):
                 continue
