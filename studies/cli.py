@@ -12,20 +12,13 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from vanedamp.files.errors import VanedampError, shortened
+from vanedamp.files.packages import PackageError, not_loaded
 from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.interrupts import swallowed_interrupts_again, terminate_as_interrupt
 from vanedamp.studies.terminal import stages_shown
 
 BAD_INPUT = 2
 _INTERRUPTED, _TERMINATED = 130, 143
-#: packages of the finite elements, and how to get them
-_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py", "cffi")
-_FINITE_ELEMENTS = (
-    "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx, or "
-    "conda's environment.yml (CONTRIBUTING.md)"
-)
-#: names of packages that differ from their modules'
-_ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
 
 
 class _Version(argparse.Action):
@@ -81,8 +74,10 @@ def _on_first_rank(words: Sequence[str]) -> int:
     """Run the command line, under mpirun on the first rank only."""
     if not _under_mpi():
         return _run(words)
-    from vanedamp.modal.petsc import ranks
-
+    try:
+        from vanedamp.modal.petsc import ranks
+    except PackageError as error:
+        return _refuse(str(error))
     with ranks() as first:
         return _run(words) if first else 0
 
@@ -117,9 +112,7 @@ def _message(error: Exception, file: str | None) -> str | None:
     if isinstance(error, MemoryError):
         return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
     if isinstance(error, ImportError):
-        package = (error.name or "").split(".")[0]
-        remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
-        return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+        return not_loaded(error)
     if not isinstance(error, VanedampError):  # bad input has error classes of our own
         return None
     message = str(error)
