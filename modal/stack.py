@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from vanedamp.files.packages import PackageError, not_loaded
+from vanedamp.files.machine import PackageError, not_loaded
 
 _h5py = find_spec("h5py")
 # the folder of a wheel's own libraries

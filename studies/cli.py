@@ -12,13 +12,15 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from vanedamp.files.errors import VanedampError, shortened
-from vanedamp.files.packages import PackageError, not_loaded
+from vanedamp.files.machine import PackageError, not_loaded, out_of_memory
 from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.interrupts import swallowed_interrupts_again, terminate_as_interrupt
 from vanedamp.studies.terminal import stages_shown
 
 BAD_INPUT = 2
 _INTERRUPTED, _TERMINATED = 130, 143
+#: of a run; the process then ends with the status of bad input
+_NO_MEMORY = -1
 
 
 class _Version(argparse.Action):
@@ -60,6 +62,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             _ignore_interrupts()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
+    if status == _NO_MEMORY:
+        if argv is None:  # libraries want memory to end, too: OpenBLAS waits for it for ever
+            os._exit(BAD_INPUT)
+        return BAD_INPUT
     return status
 
 
@@ -96,21 +102,30 @@ def _run(words: Sequence[str]) -> int:
     except BrokenPipeError:  # the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (ValueError, OSError, ImportError, MemoryError) as error:
+    except Exception as error:
         message = _message(error, input_file)
         if message is None:
             raise
-        return _refuse(message)
+        _refuse(message)
+        return BAD_INPUT if _lacking(error) is None else _NO_MEMORY
     return 0
+
+
+def _lacking(error: Exception) -> str | None:
+    """Return what the memory has no room for; input that asks for too much has a line of its own."""
+    return None if isinstance(error, VanedampError) else out_of_memory(error)
 
 
 def _message(error: Exception, file: str | None) -> str | None:
     """Describe the error of the input (in a file) or the machine's deficiency; None for a fault of the program."""
+    if (lacking := _lacking(error)) is not None:
+        return (
+            f"not enough memory ({lacking}): free some, raise its limit (ulimit -v), or make the mesh, the model or "
+            "the sweep smaller"
+        )
     if isinstance(error, OSError):
         where = error.filename or "standard output, or another file"
         return f"{where}: {error.strerror}" if error.strerror else str(error)
-    if isinstance(error, MemoryError):
-        return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
     if isinstance(error, ImportError):
         return not_loaded(error)
     if not isinstance(error, VanedampError):  # bad input has error classes of our own
