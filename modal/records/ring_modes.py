@@ -31,7 +31,7 @@ class RingModes(Displayed):
                     it, each with its own frequency
     families        (m,) order within the diameter, from 0
     frequencies_hz  (m,)
-    residuals       (m,) as those of modal.eigen.Modes
+    residuals       (m,) as those of `modes.Modes`
     shapes          (m, n) kg^-1/2, complex z on sector 0: the modal mass over the ring is 1, that is N z^H M z = 1 for
                     h = 0 and N / 2 (real z), and (N / 2) z^H M z = 1 else. Its largest component is real and positive
     provenance      of the matrices (JSON-able)

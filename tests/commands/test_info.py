@@ -118,7 +118,7 @@ def test_figures_are_those_of_the_records(said):
     swept = said("sweep.h5")[0]
     assert swept["status"] == {"ok": 4} and swept["scene"]["sweep"] and swept["bodies"] == {"slider": 1}
     assert said("optimise.h5")[0]["answer"] in said("optimise.h5")[1]
-    diagram = vd.modal.campbell.Campbell.load("campbell.h5")
+    diagram = vd.Campbell.load("campbell.h5")
     assert len(said("campbell.h5")[0]["crossings"]) == len(diagram.crossings)
     assert len(said("ramp.h5")[0]["runs"]) == len(vd.Ramp.load("ramp.h5").runs)
 
