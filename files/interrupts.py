@@ -1,7 +1,9 @@
-"""Interrupts (Ctrl-C) that wait: for files that are put in place, for processes that are being started."""
+"""Interrupts (Ctrl-C) that wait for files put in place and processes being started; signals that libraries take."""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -44,3 +46,24 @@ def _blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def signals_kept() -> Iterator[None]:
+    """Let libraries begin or end, and put the handlers of signals back: MPI's and PETSc's, which gmsh has, too, print,
+    abort, and let a closed pipe end the process.
+
+    By the C library: Python has its own handlers only, and sets them in its main thread only.
+    """
+    if os.name != "posix":
+        yield
+        return
+    libc = ctypes.CDLL(None)
+    kept = {number: ctypes.create_string_buffer(1024) for number in range(1, signal.SIGRTMIN)}  # of any sigaction
+    for number, action in kept.items():
+        libc.sigaction(number, None, action)
+    try:
+        yield
+    finally:
+        for number, action in kept.items():
+            libc.sigaction(number, action, None)

@@ -9,8 +9,9 @@ import numpy as np
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.modal.eigen import Modes, static_shape
+from vanedamp.modal.eigen import static_shape
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
+from vanedamp.modal.records.modes import Modes
 
 
 class BaseExcitationError(VanedampError):

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.records.modes import Modes
 
 #: a pair of modes below this MAC is no pair
 LEAST_MAC = 0.5

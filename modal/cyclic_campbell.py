@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.campbell import Campbell, CampbellError, Crossing, checked_speeds
+from vanedamp.modal.campbell import CampbellError, checked_speeds
 from vanedamp.modal.cyclic import CyclicSector, aliased
 from vanedamp.modal.cyclic_rotation import rotating_diameter
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
+from vanedamp.modal.records.campbell import Campbell, Crossing
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import SpeedRange, meetings, ritz_modes
 

@@ -16,8 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.modal.cyclic import CyclicSector, Diameter
-from vanedamp.modal.cyclic_modes import Family, RingModes, gathered, independent, scaled
+from vanedamp.modal.cyclic_modes import Family, gathered, independent, scaled
 from vanedamp.modal.gyroscopic import dense_modes, gyroscopic_modes
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.modal.rotating import RotatingMatrices
 
 

@@ -9,13 +9,13 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-import ufl
 from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
 from vanedamp.modal.algebra import cross_matrix
 from vanedamp.modal.eigen import SolverError
+from vanedamp.modal.fenicsx import ufl
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product
 from vanedamp.modal.statics import Statics

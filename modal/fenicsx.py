@@ -6,9 +6,6 @@ that become scipy matrices.
 
 from __future__ import annotations
 
-import vanedamp.modal.stack  # noqa: F401
-
-# isort: split
 import contextlib
 import importlib
 import logging
@@ -20,17 +17,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-import cffi
-import dolfinx
-import dolfinx.fem.petsc
-import dolfinx.io
-import dolfinx.mesh
-import dolfinx.plot
 import numpy as np
-import petsc4py
-import ufl
-from dolfinx import fem
-from mpi4py import MPI
 from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
@@ -38,11 +25,24 @@ from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.files.store import digest
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
+from vanedamp.modal.stack import loading
 
-try:
-    gmshio: Any = importlib.import_module("dolfinx.io.gmsh")
-except ImportError:  # its name before 0.10
-    gmshio = importlib.import_module("dolfinx.io.gmshio")
+with loading():
+    import cffi
+    import dolfinx
+    import dolfinx.fem.petsc
+    import dolfinx.io
+    import dolfinx.mesh
+    import dolfinx.plot
+    import petsc4py
+    import ufl
+    from dolfinx import fem
+    from mpi4py import MPI
+
+    try:
+        gmshio: Any = importlib.import_module("dolfinx.io.gmsh")
+    except ModuleNotFoundError:  # its name before 0.10
+        gmshio = importlib.import_module("dolfinx.io.gmshio")
 
 _UNNAMED = "unnamed"
 

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.machine import out_of_memory
 
 
 class GmshError(VanedampError):
@@ -20,6 +21,8 @@ def __getattr__(name: str) -> Any:
     try:
         return getattr(import_module("gmsh"), name)
     except OSError as error:
+        if out_of_memory(error):
+            raise
         raise GmshError(
             f"gmsh, which reads and makes meshes, cannot be loaded ({error}): apt install libglu1-mesa libgl1 "
             "libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1"

@@ -8,13 +8,13 @@ speeds both look the same. So the closest approach itself is sought, as the root
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg, optimize
 
 from vanedamp.modal.correlation import Pairing, modal_assurance, pair_modes
-from vanedamp.modal.speed_range import RPM, SpeedModes, SpeedRange
+from vanedamp.modal.records.campbell import Approach
+from vanedamp.modal.speed_range import SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
@@ -22,33 +22,6 @@ CLEAR_MAC = 0.9
 LEAST_EXCHANGE = 0.25
 #: speeds closer than this fraction of the range are no longer divided
 _CLOSEST = 1e-8
-
-
-@dataclass(frozen=True)
-class Approach:
-    """The closest approach of two tracked modes.
-
-    kind             "veering" or "crossing"
-    first, second    modes: of lower and higher frequency before it
-    speed            rad/s
-    frequency_hz     middle of the two
-    gap_hz           their distance; zero at a crossing
-    exchange         MAC of the first one after a veering with the second one before it, the largest over the range: 1
-                     for a full exchange of shapes
-    """
-
-    kind: str
-    first: int
-    second: int
-    speed: float
-    frequency_hz: float
-    gap_hz: float
-    exchange: float
-
-    @property
-    def rpm(self) -> float:
-        """Speed, 1/min."""
-        return self.speed * RPM
 
 
 class Tracks:

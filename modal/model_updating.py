@@ -17,9 +17,10 @@ from scipy.optimize import least_squares, linear_sum_assignment
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.correlation import LEAST_MAC, MeasuredShapes, Pairing, measured_mac, modal_assurance, pair_modes
-from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.records.modes import Modes
 
 #: factors stay between this and its inverse
 LIMIT = 0.02

@@ -6,8 +6,6 @@ import contextlib
 import itertools
 import os
 import re
-import signal
-import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from scipy.sparse import csgraph
 
 from vanedamp.files.foreign import apart, existing
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
+from vanedamp.files.interrupts import signals_kept
 from vanedamp.files.store import file_stamp, replacing
 from vanedamp.modal import gmsh_on_demand as gmsh
 
@@ -35,11 +34,8 @@ def session(name: str) -> Iterator[None]:
         current = gmsh.model.getCurrent()
     else:
         # reading config files and catching signals are a program's business, not a library's
-        with _native_stderr_muted():
+        with _native_stderr_muted(), signals_kept():
             gmsh.initialize(readConfigFiles=False, interruptible=False)
-        handler = signal.getsignal(signal.SIGTERM)
-        if handler is not None and threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, handler)  # gmsh resets it
     terminal = gmsh.option.getNumber("General.Terminal")
     gmsh.option.setNumber("General.Terminal", 0)
     try:
@@ -56,7 +52,8 @@ def session(name: str) -> Iterator[None]:
             gmsh.model.setCurrent(current)
             gmsh.option.setNumber("General.Terminal", terminal)
         else:
-            gmsh.finalize()
+            with signals_kept():
+                gmsh.finalize()
 
 
 def merge(path: Path) -> None:

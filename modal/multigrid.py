@@ -11,17 +11,13 @@ known; the rigid motions are its near-null space.
 
 from __future__ import annotations
 
-import vanedamp.modal.stack  # noqa: F401
-
-# isort: split
 import contextlib
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
-from vanedamp.modal.petsc import Product, SolverError, factorize, owned
+from vanedamp.modal.petsc import PETSc, Product, SolverError, factorize, owned
 
 # steps of the smoother, and the part of the spectrum, below the largest eigenvalue, that it is to damp
 _STEPS, _DAMPED = 3, 15.0

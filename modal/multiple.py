@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vanedamp.modal.eigen import Modes, shape_signs
+from vanedamp.modal.eigen import shape_signs
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.records.modes import Modes
 
 # below this fraction of its largest possible value, a component along a guide is round-off
 _NOISE = 1e-6

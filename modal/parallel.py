@@ -6,9 +6,6 @@ included, is up to rank 0 only.
 
 from __future__ import annotations
 
-import vanedamp.modal.stack  # noqa: F401
-
-# isort: split
 import contextlib
 import time
 import traceback
@@ -16,8 +13,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
+
+from vanedamp.modal.stack import loading
+
+with loading():
+    from mpi4py import MPI
 
 COMM: MPI.Comm = MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else MPI.COMM_SELF
 _PATIENCE = 2e-3  # s; a blocking receive would keep the core busy that rank 0 computes on

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
+from vanedamp.modal.records.modes import Modes
 
 NOTABLE_SHARE = 0.1
 

@@ -7,20 +7,20 @@ eigenvalue problems (SLEPc) and inertia counts (see `parallel`), on MUMPS; a Fac
 
 from __future__ import annotations
 
-import vanedamp.modal.stack  # noqa: F401
-
-# isort: split
 import contextlib
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import linalg, sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
 from vanedamp.modal.lanczos import NotConvergedError, directions, eigenpairs
+from vanedamp.modal.stack import loading
+
+with loading():
+    from petsc4py import PETSc
 
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2
@@ -256,7 +256,8 @@ _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _neares
 
 
 def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any], which: str) -> Any:
-    from slepc4py import SLEPc  # one rank and the lowest modes do without
+    with loading():
+        from slepc4py import SLEPc  # one rank and the lowest modes do without
 
     eps = stack.enter_context(owned(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)

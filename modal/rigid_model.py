@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.eigen import Modes
+from vanedamp.modal.records.modes import Modes
 
 FATIGUE_SHARE = 0.7
 

@@ -14,13 +14,12 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.algebra import hermitian_part, orthogonal, orthonormal, symmetric_part
-from vanedamp.modal.eigen import Modes, factorize, solve_modes
+from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
+from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-#: 1/min per rad/s
-RPM = 30.0 / np.pi
 # of the unit length of a shape: missing part of it for which the basis gains a field
 _LACKING = 1e-10
 # of the highest square that was solved for: the least distance of a mode from it

@@ -10,10 +10,11 @@ import numpy as np
 from scipy.integrate import simpson
 
 from paper.scene_files import FOLDER
-from vanedamp.modal.campbell import Campbell, campbell
+from vanedamp.modal.campbell import campbell
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.participation import effective_masses
+from vanedamp.modal.records.campbell import Campbell
 
 TITLE = "Campbell diagram of a blade on a hub"
 #: engine orders of the diagram, and modes that are followed

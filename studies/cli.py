@@ -12,20 +12,15 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from vanedamp.files.errors import VanedampError, shortened
+from vanedamp.files.machine import PackageError, not_loaded, out_of_memory
 from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.interrupts import swallowed_interrupts_again, terminate_as_interrupt
 from vanedamp.studies.terminal import stages_shown
 
 BAD_INPUT = 2
 _INTERRUPTED, _TERMINATED = 130, 143
-#: packages of the finite elements, and how to get them
-_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py", "cffi")
-_FINITE_ELEMENTS = (
-    "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx, or "
-    "conda's environment.yml (CONTRIBUTING.md)"
-)
-#: names of packages that differ from their modules'
-_ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
+#: of a run; the process then ends with the status of bad input
+_NO_MEMORY = -1
 
 
 class _Version(argparse.Action):
@@ -67,6 +62,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             _ignore_interrupts()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
+    if status == _NO_MEMORY:
+        if argv is None:  # libraries want memory to end, too: OpenBLAS waits for it for ever
+            os._exit(BAD_INPUT)
+        return BAD_INPUT
     return status
 
 
@@ -81,8 +80,10 @@ def _on_first_rank(words: Sequence[str]) -> int:
     """Run the command line, under mpirun on the first rank only."""
     if not _under_mpi():
         return _run(words)
-    from vanedamp.modal.petsc import ranks
-
+    try:
+        from vanedamp.modal.petsc import ranks
+    except PackageError as error:
+        return _refuse(str(error))
     with ranks() as first:
         return _run(words) if first else 0
 
@@ -101,25 +102,32 @@ def _run(words: Sequence[str]) -> int:
     except BrokenPipeError:  # the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (ValueError, OSError, ImportError, MemoryError) as error:
+    except Exception as error:
         message = _message(error, input_file)
         if message is None:
             raise
-        return _refuse(message)
+        _refuse(message)
+        return BAD_INPUT if _lacking(error) is None else _NO_MEMORY
     return 0
+
+
+def _lacking(error: Exception) -> str | None:
+    """Return what the memory has no room for; input that asks for too much has a line of its own."""
+    return None if isinstance(error, VanedampError) else out_of_memory(error)
 
 
 def _message(error: Exception, file: str | None) -> str | None:
     """Describe the error of the input (in a file) or the machine's deficiency; None for a fault of the program."""
+    if (lacking := _lacking(error)) is not None:
+        return (
+            f"not enough memory ({lacking}): free some, raise its limit (ulimit -v), or make the mesh, the model or "
+            "the sweep smaller"
+        )
     if isinstance(error, OSError):
         where = error.filename or "standard output, or another file"
         return f"{where}: {error.strerror}" if error.strerror else str(error)
-    if isinstance(error, MemoryError):
-        return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
     if isinstance(error, ImportError):
-        package = (error.name or "").split(".")[0]
-        remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
-        return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+        return not_loaded(error)
     if not isinstance(error, VanedampError):  # bad input has error classes of our own
         return None
     message = str(error)

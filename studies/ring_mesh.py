@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vanedamp.modal.algebra import rotation, turns
-from vanedamp.modal.cyclic_modes import RingModes
+from vanedamp.modal.records.ring_modes import RingModes
 
 #: distance up to which nodes of two sectors are one, over the sector's size
 _SAME = 1e-4

@@ -33,7 +33,7 @@ def pyuff() -> Any:
     """Return the package. Raises MeasurementError without it."""
     try:
         return importlib.import_module("pyuff")
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise MeasurementError("universal files need pyuff: pip install pyuff; CSV files need nothing") from error
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.cyclic import CyclicSector, Diameter
-from vanedamp.modal.cyclic_modes import RingModes, ring_modes
+from vanedamp.modal.cyclic_modes import ring_modes
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.rom.bases.projection import Factorize
 from vanedamp.rom.ring.deviations import RingError
 

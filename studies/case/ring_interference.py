@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.campbell import Campbell
-from vanedamp.modal.cyclic_modes import RingModes
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.campbell import Campbell
+from vanedamp.modal.records.interference import Interference
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.case.stages import Structure, campbell_diagram
 
 #: about the speed of [rotation], speeds of operation where nothing says them

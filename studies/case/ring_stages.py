@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.cyclic import CyclicSector
-from vanedamp.modal.cyclic_modes import RingModes, ring_modes
+from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes
 from vanedamp.modal.eigen import factorize
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing

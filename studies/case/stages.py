@@ -18,11 +18,11 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, load_any, save
 from vanedamp.files.toml_input import InputError, tables
 from vanedamp.modal.algebra import first_largest
-from vanedamp.modal.campbell import Campbell, campbell
+from vanedamp.modal.campbell import campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.cyclic_campbell import ring_campbell
 from vanedamp.modal.cyclic_statics import RingStatics
-from vanedamp.modal.eigen import Modes, factorize, solve_modes
+from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
@@ -30,6 +30,8 @@ from vanedamp.modal.measurements import read_shapes, read_temperature
 from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
+from vanedamp.modal.records.campbell import Campbell
+from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.statics import Statics

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vanedamp.files.checkpoint_file import clear
-from vanedamp.modal.campbell import Campbell
+from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result

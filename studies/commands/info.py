@@ -19,7 +19,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import Variable, decoding, load_any
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.sector_ring import load_ring

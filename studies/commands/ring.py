@@ -9,8 +9,8 @@ from pathlib import Path
 
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.interference import Interference
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import RPM
+from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_interference import ring_interference
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_output import toml
 from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.export import OUTPUT, Option
@@ -110,4 +110,4 @@ def describe(
     for label, row, direction in zip(model.interface, matrices["selection"], model.directions, strict=True):
         interface[label] = {"row": row.tolist()} | ({"direction": direction.tolist()} if np.any(direction) else {})
     with replacing(target) as temporary:
-        temporary.write_text(tomli_w.dumps({"matrices": table, "interface": interface}), encoding="utf-8")
+        temporary.write_text(toml({"matrices": table, "interface": interface}), encoding="utf-8")

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from vanedamp.modal.campbell import Campbell
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import RPM, Campbell
 from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.report.charts import COLOURS
 

@@ -19,10 +19,10 @@ from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.campbell import Campbell
-from vanedamp.modal.cyclic_modes import RingModes
 from vanedamp.modal.frf import UNITS
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.campbell import Campbell
+from vanedamp.modal.records.interference import Interference
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.life.record import LifeRecord

@@ -9,9 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 
-from vanedamp.modal.campbell import Crossing
-from vanedamp.modal.interference import Interference
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import RPM, Crossing
+from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 
 _ORDER, _MARK = "#64748b", "#111827"

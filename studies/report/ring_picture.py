@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.modal.interference import Interference
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import RPM
+from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.report.charts import COLOURS
 

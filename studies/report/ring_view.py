@@ -9,8 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from vanedamp.modal.algebra import turns
-from vanedamp.modal.cyclic_modes import RingModes
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.report.charts import Table
 from vanedamp.studies.report.mode_chart import (
     MOST_TRIANGLES,

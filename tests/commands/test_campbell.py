@@ -7,7 +7,7 @@ import pytest
 
 import vanedamp as vd
 from tests.tools.input_files import BLOCK, changed
-from vanedamp.modal.campbell import Campbell
+from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.operation_tables import CampbellTable
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main

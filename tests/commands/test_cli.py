@@ -18,8 +18,8 @@ from tests.tools.processes import ROOT, environment, vanedamp
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import StoreError, load
-from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrix_files import read_folder
+from vanedamp.modal.records.modes import Modes
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.commands.support.messages import write_result

@@ -4,6 +4,7 @@ import importlib
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import threading
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import DAMPED_BLOCK, SCENE, rom_scene
-from tests.tools.processes import ROOT, environment, vanedamp
+from tests.tools.processes import ROOT, environment, vanedamp, without_stages
 from vanedamp.files.store import StoreError, Variable, load, replacing, save
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.matrix_files import FILES
@@ -273,6 +274,54 @@ def test_missing_packages(package, arguments, remedy, folder):
     assert finished.stderr.count("\n") == 1
     assert finished.stderr.startswith(f"vanedamp: needs {package}, which cannot be loaded")
     assert remedy in finished.stderr
+
+
+@pytest.mark.parametrize(
+    ("package", "raised", "arguments", "line"),
+    [
+        ("petsc4py", "ImportError('libX.so: cannot open')", ["modal", "case.toml"],
+         "a library is installed, but cannot be loaded (libX.so: cannot open)"),
+        ("petsc4py", "ImportError('libX.so: failed to map segment from shared object')", ["modal", "case.toml"],
+         "not enough memory (libX.so: failed to map segment from shared object): free some, "),
+        ("gmsh", "OSError('libX.so: cannot open')", ["mesh", "case.toml", "-o", "block.msh"],
+         "case.toml: gmsh, which reads and makes meshes, cannot be loaded (libX.so: cannot open): apt install "),
+        ("gmsh", "OSError('libX.so: failed to map segment')", ["mesh", "case.toml", "-o", "block.msh"],
+         "not enough memory (libX.so: failed to map segment): free some, "),
+        ("h5py", "MemoryError()", ["run", "scene.toml", "-o", "response.h5"], "not enough memory (none left): free "),
+        ("h5py", "RuntimeError(\"can't start new thread\")", ["run", "scene.toml", "-o", "response.h5"],
+         "not enough memory (can't start new thread): free some, "),
+    ],
+)  # fmt: skip
+def test_libraries_that_do_not_load(package, raised, arguments, line, folder):
+    (folder / "broken" / package).mkdir(parents=True)
+    # what runs at the end of a process, as in OpenBLAS, may wait for memory for ever
+    (folder / "broken" / package / "__init__.py").write_text(
+        f"import atexit\natexit.register(print, 'the end', flush=True)\nraise {raised}"
+    )
+    finished = vanedamp(*arguments, cwd=folder, PYTHONPATH=f"{folder / 'broken'}{os.pathsep}{ROOT}")
+    assert finished.returncode == BAD_INPUT
+    assert finished.stderr.count("\n") == 1 and finished.stderr.startswith(f"vanedamp: {line}")
+    assert ("the end" in finished.stdout) == ("memory" not in line)
+
+
+@pytest.mark.parametrize("arguments", [["info", "it.h5"], ["modal", "case.toml", "--json", "-"]])
+def test_a_reader_that_closes_the_pipe(arguments, folder):
+    save("it.h5", "own", {}, {"answer": 42})
+    words = [sys.executable, "-m", "vanedamp", *arguments]
+    with subprocess.Popen(words, cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE) as ran:
+        ran.stdout.close()
+        error = without_stages(ran.stderr.read().decode())
+    assert (ran.returncode, error) == (1, "")
+
+
+def test_solvers_leave_the_handlers_of_signals():
+    """They print pages at a fault, and Python's own handler has nothing to say."""
+    code = "import ctypes, faulthandler\nfaulthandler.enable()\nimport vanedamp.modal.elasticity\nctypes.string_at(0)"
+    crashed = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=False
+    )
+    assert crashed.returncode == -signal.SIGSEGV
+    assert crashed.stderr.startswith("Fatal Python error: Segmentation fault") and "PETSC" not in crashed.stderr
 
 
 def test_no_folder_for_compiled_functions(folder):

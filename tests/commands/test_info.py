@@ -1,12 +1,15 @@
 """`vanedamp info`: what it says of the results of commands, against the records in the files."""
 
 import json
+import subprocess
+import sys
 
 import h5py
 import numpy as np
 import pytest
 
 import vanedamp as vd
+from tests.tools.extras import bare
 from tests.tools.input_files import DAMPED_BLOCK, SCENE
 from vanedamp.files.store import Variable, digest, load_any, save
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -115,7 +118,7 @@ def test_figures_are_those_of_the_records(said):
     swept = said("sweep.h5")[0]
     assert swept["status"] == {"ok": 4} and swept["scene"]["sweep"] and swept["bodies"] == {"slider": 1}
     assert said("optimise.h5")[0]["answer"] in said("optimise.h5")[1]
-    diagram = vd.modal.campbell.Campbell.load("campbell.h5")
+    diagram = vd.Campbell.load("campbell.h5")
     assert len(said("campbell.h5")[0]["crossings"]) == len(diagram.crossings)
     assert len(said("ramp.h5")[0]["runs"]) == len(vd.Ramp.load("ramp.h5").runs)
 
@@ -128,6 +131,27 @@ def test_checkpoints_and_records_of_others(said, folder):
     assert lines.startswith("part.h5.partial: sweep-checkpoint, what responses of a scene over a grid had finished")
     save("own.h5", "own", {}, {"answer": 42})
     assert said("own.h5")[0]["answer"] == 42
+
+
+def test_results_are_read_without_finite_elements(folder, tmp_path):
+    one, none = np.ones(1), np.zeros(1, dtype=int)
+    ring = vd.RingModes(3, np.array([1.0, 0, 0]), np.zeros(3), none, none, one, one, np.ones((1, 3)))
+    ring.save(tmp_path / "ring.h5", *vd.Interference.of(ring).riding())
+    files = [tmp_path / "ring.h5", *(folder / f"{command}.h5" for command in RESULTS)]
+    code = """
+import contextlib, sys
+import vanedamp as vd
+from vanedamp.studies.cli import main
+for file in sys.argv[1:]:
+    assert main(["info", file]) == 0
+    assert main(["export", file, "-o", "it.mat"]) == 0
+    assert main(["report", file, "-o", "report.html"]) == 0
+    with contextlib.suppress(vd.InputError):
+        vd.plot(file)
+"""
+    words = [sys.executable, "-c", code, *map(str, files)]
+    done = subprocess.run(words, cwd=tmp_path, env=bare(), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_foreign_and_broken_files_are_rejected(folder, monkeypatch, capfd):

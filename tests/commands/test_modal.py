@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK, changed
-from vanedamp.modal.eigen import Modes
+from vanedamp.modal.records.modes import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect

@@ -10,7 +10,7 @@ import pytest
 
 from tests.tools.input_files import BLOCK
 from tests.tools.processes import RANKS, ROOT, environment
-from vanedamp.modal.eigen import Modes
+from vanedamp.modal.records.modes import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")

@@ -8,7 +8,7 @@ import pytest
 
 import vanedamp as vd
 from tests.commands.test_export import of_vtk
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 from vanedamp.studies.case.stages import assemble

@@ -8,9 +8,10 @@ from scipy.sparse.linalg import spsolve
 from tests.tools.small_structures import rod
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.base_excitation import BaseExcitationError, base_response
-from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.records.modes import Modes
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 RATIO = 0.01

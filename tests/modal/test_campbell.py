@@ -7,9 +7,10 @@ from scipy.optimize import minimize_scalar
 
 import vanedamp as vd
 from tests.tools.small_structures import truss
-from vanedamp.modal.campbell import Campbell, CampbellError, campbell
+from vanedamp.modal.campbell import CampbellError, campbell
 from vanedamp.modal.gyroscopic import gyroscopic_modes
 from vanedamp.modal.mode_tracking import Tracks
+from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError
 from vanedamp.modal.speed_range import SpeedRange
 

@@ -12,11 +12,12 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.modal.algebra import rotation
 from vanedamp.modal.cyclic import Spring, aliased, cyclic_sector
 from vanedamp.modal.cyclic_faces import CyclicError
-from vanedamp.modal.cyclic_modes import RingModes, ring_modes
+from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
 from vanedamp.modal.eigen import NoModesError, solve_modes
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.modal.records.ring_modes import RingModes
 
 Z = np.array([0.0, 0.0, 1.0])
 MASS, GROUND, LINK = 2.0, 3e4, 5e4

@@ -8,11 +8,12 @@ from scipy.sparse.linalg import eigsh, spsolve
 
 from tests.tools.small_structures import truss
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import Modes, SolverError, count_below, factorize, solve_modes
+from vanedamp.modal.eigen import SolverError, count_below, factorize, solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.participation import effective_masses, first_bending
 from vanedamp.modal.petsc import negative_eigenvalues, one_analysis
+from vanedamp.modal.records.modes import Modes
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.tools.plate_rings import plate_waves
-from vanedamp.modal.campbell import Crossing
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.campbell import Crossing
+from vanedamp.modal.records.interference import Interference
 
 
 @pytest.mark.parametrize("sectors", [8, 9])

@@ -7,10 +7,11 @@ import pytest
 
 from tests.tools.input_files import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import patch_average
 from vanedamp.modal.multiple import rivals, turned
+from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rigid_model import rigid_model
 from vanedamp.studies.cli import main
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tools import small_structures
-from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.participation import (
     ParticipationError,
     effective_mass_shares,
@@ -12,6 +12,7 @@ from vanedamp.modal.participation import (
     first_bending,
     participation_factors,
 )
+from vanedamp.modal.records.modes import Modes
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,10 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rigid_model import CalibrationError, fatigue_amplitude, rigid_model
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)

@@ -18,7 +18,7 @@ from paper.scene_files import scene_file
 from paper.session import PaperSession
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.modal.campbell import Campbell
+from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.curve import curves
 from vanedamp.studies.demo.figure_file import Effort, Structure

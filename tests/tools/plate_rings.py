@@ -3,7 +3,7 @@
 import numpy as np
 
 from vanedamp.files.store import Variable
-from vanedamp.modal.cyclic_modes import RingModes
+from vanedamp.modal.records.ring_modes import RingModes
 
 #: nodes of a sector along the radius, the circumference and the height
 SHAPE = (3, 4, 2)

@@ -14,7 +14,7 @@ def _nastran(path: str) -> Any:
     """Return the package that reads and writes Nastran's files."""
     try:
         from pyyeti import nastran
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise MatrixFileError(f"{path}: files of Nastran need the package pyyeti: pip install pyyeti") from error
     return nastran
 

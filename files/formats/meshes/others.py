@@ -19,7 +19,7 @@ def read(path: Path) -> LabelledMesh:
     """Return the mesh of a file with its groups, labels counted from 1. Raises MeshError in one line."""
     try:
         meshlane = importlib.import_module("meshlane")
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise MeshError(f"{path}: MED and other formats need meshlane: pip install meshlane") from error
     try:
         mesh = apart(path, MeshError, lambda: _read(meshlane, path))

@@ -19,8 +19,8 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.modal.cyclic_modes import RingModes
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
+from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.export.export import INPUT, Option
 from vanedamp.studies.export.record import Record, read_record
 from vanedamp.studies.ring_mesh import whole_ring, with_parts

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from vanedamp.modal.campbell import Campbell
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import RPM, Campbell
 from vanedamp.studies.headline import format_margin
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page

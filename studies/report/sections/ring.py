@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.store import load as load_record
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.headline import format_margin
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result

@@ -7,7 +7,7 @@ import pytest
 
 import vanedamp as vd
 from tests.tools.plate_rings import mesh_variables, plate_waves, sector_mesh
-from vanedamp.modal.interference import Interference
+from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.cli import main
 from vanedamp.studies.report import ring_view as module
 from vanedamp.studies.report.ring_charts import interference_figure, ring_campbell_figure

@@ -18,10 +18,9 @@ import numpy as np
 
 from vanedamp.files import store
 from vanedamp.files.display import Plotted
-from vanedamp.modal.campbell import CROSSINGS, Crossing
 from vanedamp.modal.cyclic import aliased
-from vanedamp.modal.cyclic_modes import RingModes
-from vanedamp.modal.speed_range import RPM
+from vanedamp.modal.records.campbell import CROSSINGS, RPM, Crossing
+from vanedamp.modal.records.ring_modes import RingModes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
