@@ -38,13 +38,15 @@ class FileKind(NamedTuple):
     """A kind of input file.
 
     name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
-    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none.
+    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none;
+    command: that such a file is for in the first place, "": of its name.
     """
 
     name: str
     place: str
     tables: tuple[str, ...] = ()
     completed: str = ""
+    command: str = ""
 
     @property
     def record(self) -> Any:

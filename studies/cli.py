@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
 import threading
@@ -39,9 +40,17 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that rejects a wrong command line in one line."""
+    """A parser that rejects a wrong command line in one line, with the word that may have been meant."""
 
     def error(self, message: str) -> NoReturn:
+        from vanedamp.files.toml_input import nearest  # heavy, as is all that is not for --help
+
+        if choice := re.search(r"(invalid choice: '?([^',\s]*)'?).*\(choose from (.*)\)", message):
+            known = re.findall(r"[^',\s]+", choice[3])
+            message = f"{message[: choice.end(1)]}; {nearest(choice[2], known)}"
+        elif option := re.search(r"unrecognized arguments: (?:[^-]\S* )*(--?\w[\w-]*)", message):
+            known = [name for action in self._actions for name in action.option_strings]
+            message += f"; {nearest(option[1], known)}"
         self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
 
 
@@ -93,7 +102,10 @@ def _run(words: Sequence[str]) -> int:
         with warnings.catch_warnings():
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
-            arguments = _parser(words[0] if words else None).parse_args(words)
+            parser, command = _parsers(words[0] if words else None)
+            arguments, unknown = parser.parse_known_args(words)
+            if unknown:
+                command.error(f"unrecognized arguments: {' '.join(unknown)}")
             input_file = getattr(arguments, "input", None)
             with stages_shown():
                 arguments.run(arguments)
@@ -136,8 +148,8 @@ def _under_mpi() -> bool:
     return any(int(os.environ.get(name, 1)) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
 
 
-def _parser(name: str | None) -> argparse.ArgumentParser:
-    """Return the parser of the command line, with the arguments of the named command only."""
+def _parsers(name: str | None) -> tuple[_Parser, _Parser]:
+    """Return the parser of the command line, with the arguments of the named command only, and that command's."""
     commands = COMMANDS.own()
     if name not in commands:  # --help, a command of another package, or none at all
         commands = COMMANDS.all()
@@ -146,11 +158,12 @@ def _parser(name: str | None) -> argparse.ArgumentParser:
         "forced responses with impacts."
     )  # fmt: skip
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    places = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    named, places = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for other, command in commands.items():
         summary = command.SUMMARY
         place = places.add_parser(other, help=summary, description=summary[0].upper() + summary[1:] + ".")
         if other == name:
             command.add_arguments(place)
             place.set_defaults(run=command.run)
-    return parser
+            named = place
+    return parser, named

@@ -346,7 +346,16 @@ def test_mesh_of_a_case_with_a_mesh(folder, capfd):
     ("arguments", "told"),
     [
         ([], "required: COMMAND"),
-        (["swep"], "invalid choice: 'swep'"),
+        (
+            ["sweeep"],
+            "vanedamp: argument COMMAND: invalid choice: 'sweeep'; did you mean 'sweep'?; see vanedamp",
+        ),
+        (["qqq"], "invalid choice: 'qqq'; known: bench, calibrate, campbell, check, "),
+        (["run", "scene.toml", "--sampels", "3"], "unrecognized arguments: --sampels 3; did you mean '--samples'?"),
+        (["run", "scene.toml", "other.toml"], "vanedamp run: unrecognized arguments: other.toml; see vanedamp run"),
+        (["run", "scene.toml", "b.toml", "--evnets"], "b.toml --evnets; did you mean '--events'?"),
+        (["modal", "case.toml", "--solver", "iteratve"], "'iteratve'; did you mean 'iterative'?"),
+        (["new", "scnee"], "'scnee'; did you mean 'scene'?"),
         (["run"], "required: SCENE.toml"),
         (["reduce", "case.toml", "--modes", "many"], "expected a count, not 'many'"),
         (["sweep", "scene.toml", "--workers", "0"], "expected at least 1"),
