@@ -10,6 +10,7 @@ from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.files.toml_input import tables
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
+from vanedamp.modal.msh import check_file
 from vanedamp.modal.units import size_doubts
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
@@ -48,6 +49,7 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
             header = read_header(mesh.file)
             case.check_groups(header.groups[2], header.groups[3], {"edge": header.groups[1], "point": header.groups[0]})
             yield Fact("groups", {"volumes": header.groups[3], "facets": header.groups[2]})
+            check_file(Path(mesh.file))
             if header.nodes is not None:
                 yield Fact("nodes", header.nodes, "", "of the mesh; degree 2 adds those between two")
             if header.extent is not None:
