@@ -103,8 +103,9 @@ def convert(
 
 def group_names(
     path: str | os.PathLike[str], volumes: Collection[str] = (), facets: Collection[str] = ()
-) -> tuple[dict[int, list[str]], int, float]:
-    """Return the names that `convert` can make groups of by dimension (3: volumes), number of nodes, largest extent.
+) -> tuple[dict[int, list[str]], int, float, dict[str, np.ndarray]]:
+    """Return the names that `convert` can make groups of by dimension (3: volumes), number of nodes, largest extent,
+    and `msh.centres` of `facets`, in the file's unit of length.
 
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
@@ -113,10 +114,11 @@ def group_names(
     _check_disjoint(source.path, groups)
     with msh.session(str(source.path)):
         _fill_model(source, entities, groups, 1.0)
+        centres = msh.centres()
     _, groups = _grouped(source, None, None)
     used = np.unique(source.cells)
     extent = float(np.ptp(source.points[used], axis=0).max())
-    return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent
+    return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent, centres
 
 
 def _grouped(

@@ -195,14 +195,23 @@ def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
     return int(first), int(second)
 
 
-def check_file(path: Path) -> None:
-    """Raise MeshError for a gmsh file whose elements `check_elements` rejects."""
+def checked_file(path: Path) -> dict[str, np.ndarray]:
+    """Return the `centres` of a gmsh file. Raises MeshError where `check_elements` rejects it."""
     with session(str(path)):
         merge(path)
         try:
             check_elements()
         except MeshError as error:
             raise MeshError(f"{path}: {error}") from error
+        return centres()
+
+
+def centres() -> dict[str, np.ndarray]:
+    """Return the mean places (3,) of the nodes of the current model's facet groups by name."""
+    return {
+        name: gmsh.model.mesh.getNodesForPhysicalGroup(2, tag)[1].reshape(-1, 3).mean(axis=0)
+        for name, tag in groups(2).items()
+    }
 
 
 def check_elements() -> None:

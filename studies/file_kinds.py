@@ -94,10 +94,10 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
     if ANY in taken or kind.name in taken or (not own.isdisjoint(tables) and kind.name not in _WITH_SCENE):
         return ""
     shown = next((table for table in kind.tables if table in tables), "[sweep]")  # as a list
-    return f"is {a(kind)} (it has [{shown}]): vanedamp {kind.command or kind.name} {path}"
+    return f"is {a(kind)} ([{shown}]): vanedamp {kind.command or kind.name} {path}"
 
 
 def expected(taken: Collection[str]) -> str:
     """Return the kinds that are taken, in words."""
     others = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
-    return " or ".join(others.get(name) or a(KINDS[name]) for name in taken)
+    return " or ".join(others.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)
