@@ -315,7 +315,7 @@ def test_command(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda data: data.pop("optimise"), "is a scene ([structure]): vanedamp run optimise.toml; `vanedamp optimise`"),
+        (lambda data: data.pop("optimise"), "is a scene ([structure]): vanedamp run optimise.toml; `vanedamp opt"),
         (lambda data: data["optimise"].pop("band"), "optimise.band: missing"),
         (lambda data: data["optimise"].update(band={"start": 2430.0, "stop": 2380.0, "num": 3}), "frequencies that ri"),
         (lambda data: data["optimise"].update(band=[2400.0, 2400.0]), "rise, not 2400 Hz after 2400 Hz"),
