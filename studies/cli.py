@@ -1,5 +1,7 @@
 """The command `vanedamp`: it finds its commands (studies.commands), runs one, and reports errors in one line."""
 
+# PYTHON_ARGCOMPLETE_OK
+
 from __future__ import annotations
 
 import argparse
@@ -65,6 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
+    if "_ARGCOMPLETE" in os.environ:
+        _complete()
     terminated = terminate_as_interrupt() if argv is None else []
     try:
         with swallowed_interrupts_again():
@@ -77,6 +81,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
     return status
+
+
+def _complete() -> None:
+    """Answer a shell that completes the command line it has in COMP_LINE, and exit; return without argcomplete."""
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    named = set(os.environ.get("COMP_LINE", "").split()) & COMMANDS.own().keys()
+    parser, command = _parsers(min(named, default=None))
+    for action in command._actions:
+        endings = re.findall(r"\.(\w+)", str(action.metavar))
+        if endings and not action.choices:
+            action.completer = argcomplete.FilesCompleter(endings)  # type: ignore[attr-defined]
+    argcomplete.autocomplete(parser)
 
 
 def _ignore_interrupts() -> None:
