@@ -40,8 +40,8 @@ def paired(
     worst = int(np.argmax(distances))
     fits = distances[worst] <= tolerance * size
     if not fits or len(order) != len(places) or np.unique(order).size != len(order):
-        centres = [patch.weights @ at / patch.area for patch, at in ((first, places), (second, ends))]
-        check_angle(*centres, sectors, axis, size)
+        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, places), (second, ends)))
+        check_angle(low_centre, high_centre, sectors, axis, size)
         if len(places) != len(ends):
             raise CyclicError(f"ring.low: {low!r} has {len(places)} nodes, {high!r} {len(ends)}; mesh both faces alike")
         x, y, z = matrices.coordinates[second.nodes[worst]]

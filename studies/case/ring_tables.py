@@ -81,9 +81,9 @@ class RingTable:
         from vanedamp.modal.cyclic_faces import check_angle
 
         axis, point = self._axis(rotation)
-        if self.low in centres and self.high in centres:
-            first, second = (centres[face] - point for face in (self.low, self.high))
-            check_angle(first, second, self.sectors, np.array(axis) / np.linalg.norm(axis), size)
+        first, second = (centres.get(face or "") for face in (self.low, self.high))
+        if first is not None and second is not None:
+            check_angle(first - point, second - point, self.sectors, np.array(axis) / np.linalg.norm(axis), size)
 
     def _axis(self, rotation: RotationTable | None) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         own: RingTable | RotationTable = self if rotation is None else rotation
