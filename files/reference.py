@@ -38,13 +38,15 @@ class FileKind(NamedTuple):
     """A kind of input file.
 
     name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
-    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none.
+    completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none;
+    command: that such a file is for in the first place, "": of its name.
     """
 
     name: str
     place: str
     tables: tuple[str, ...] = ()
     completed: str = ""
+    command: str = ""
 
     @property
     def record(self) -> Any:
@@ -81,7 +83,7 @@ def schema(record: Any) -> dict[str, Any]:
 
 
 def field_docstrings(record: type) -> dict[str, str]:
-    """Return the docstrings after the fields of a class, its bases' included, by the names of the fields."""
+    """Return the docstrings after the fields of a class, or members of an Enum, its bases' included, by their names."""
     found: dict[str, str] = {}
     for base in reversed(record.__mro__):
         found |= _literals(base.__module__).get(base.__qualname__, {})
@@ -197,10 +199,12 @@ def _collect(body: list[ast.stmt], prefix: str, found: dict[str, dict[str, str]]
         if isinstance(statement, ast.ClassDef):
             name = f"{prefix}{statement.name}"
             found[name] = {
-                field.target.id: " ".join(cleandoc(text.value.value).split())
+                target.id: " ".join(cleandoc(text.value.value).split())
                 for field, text in zip(statement.body, statement.body[1:], strict=False)
-                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+                if isinstance(field, ast.AnnAssign | ast.Assign)  # a member of an Enum has no annotation
                 and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
                 and isinstance(text.value.value, str)
+                for target in (field.targets if isinstance(field, ast.Assign) else [field.target])
+                if isinstance(target, ast.Name)
             }  # fmt: skip
             _collect(statement.body, f"{name}.", found)

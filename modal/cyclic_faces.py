@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.algebra import rotation
-from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.modal.matrices import SystemMatrices
 
 #: distance of two nodes that are one, over the size of the sector
 TOLERANCE = 1e-6
@@ -40,7 +40,8 @@ def paired(
     worst = int(np.argmax(distances))
     fits = distances[worst] <= tolerance * size
     if not fits or len(order) != len(places) or np.unique(order).size != len(order):
-        _check_angle(places, ends, (first, second), sectors, axis, size)
+        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, places), (second, ends)))
+        check_angle(low_centre, high_centre, sectors, axis, size)
         if len(places) != len(ends):
             raise CyclicError(f"ring.low: {low!r} has {len(places)} nodes, {high!r} {len(ends)}; mesh both faces alike")
         x, y, z = matrices.coordinates[second.nodes[worst]]
@@ -70,11 +71,11 @@ def check_sides(
         )
 
 
-def _check_angle(
-    places: np.ndarray, ends: np.ndarray, patches: tuple[Patch, Patch], sectors: int, axis: np.ndarray, size: float
-) -> None:
-    """Raise CyclicError where the centres of the faces say that the axis or the number of sectors is wrong."""
-    first, second = (patch.weights @ at / patch.area for patch, at in zip(patches, (places, ends), strict=True))
+def check_angle(first: np.ndarray, second: np.ndarray, sectors: int, axis: np.ndarray, size: float) -> None:
+    """Raise CyclicError where the centres (3,) of both faces say that axis or number of sectors is wrong.
+
+    Centres from a point of the axis, a unit vector; size: of the sector; all in one unit of length.
+    """
     heights = [float(axis @ centre) for centre in (first, second)]
     arms = [centre - height * axis for centre, height in zip((first, second), heights, strict=True)]
     radii = [float(np.linalg.norm(arm)) for arm in arms]

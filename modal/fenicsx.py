@@ -316,12 +316,7 @@ def _prepare_groups() -> None:
     rest = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
     if rest:
         gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
-    msh.check_disjoint(2, "facet")
-    msh.check_disjoint(3, "volume")
-    msh.check_points()
-    msh.check_twice()
-    msh.check_volumes()
-    msh.check_connected()
+    msh.check_elements()
     msh.drop_strays()
     gmsh.model.mesh.renumberNodes()
 

@@ -55,6 +55,7 @@ _SHAPES |= dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), _BRICK)
 class _Source:
     """A mesh as read: volume cells of one shape, and named sets of them and of nodes, by index.
 
+    labels  of the cells, in the file
     covers  dimension -> name -> corners (sorted) of the shells, lines and points of a set, of faces of a surface
     absent  name -> the first member of a set that the mesh does not have
     """
@@ -63,6 +64,7 @@ class _Source:
     points: np.ndarray
     shape: _Shape
     cells: np.ndarray
+    labels: np.ndarray
     cell_sets: dict[str, np.ndarray]
     covers: dict[int, dict[str, set[tuple[int, ...]]]]
     node_sets: dict[str, np.ndarray]
@@ -89,22 +91,34 @@ def convert(
     source = _source(Path(path), read_mesh(Path(path)))
     entities, groups = _grouped(source, volumes, facets)
     _check_disjoint(source.path, groups)
-    return _write(source, entities, groups, scale, output)
+    with msh.session(str(source.path)):
+        _fill_model(source, entities, groups, scale)
+        before = gmsh.option.getNumber("Mesh.SaveAll")
+        gmsh.option.setNumber("Mesh.SaveAll", 1)  # cells without a group, too
+        try:
+            return msh.write(output)
+        finally:
+            gmsh.option.setNumber("Mesh.SaveAll", before)
 
 
 def group_names(
     path: str | os.PathLike[str], volumes: Collection[str] = (), facets: Collection[str] = ()
-) -> tuple[dict[int, list[str]], int, float]:
-    """Return the names that `convert` can make groups of by dimension (3: volumes), number of nodes, largest extent.
+) -> tuple[dict[int, list[str]], int, float, dict[str, np.ndarray]]:
+    """Return the names that `convert` can make groups of by dimension (3: volumes), number of nodes, largest extent,
+    and `msh.centres` of `facets`, in the file's unit of length.
 
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
     source = _source(Path(path), read_mesh(Path(path)))
-    _check_disjoint(source.path, _grouped(source, volumes, facets)[1])
+    entities, groups = _grouped(source, volumes, facets)
+    _check_disjoint(source.path, groups)
+    with msh.session(str(source.path)):
+        _fill_model(source, entities, groups, 1.0)
+        centres = msh.centres()
     _, groups = _grouped(source, None, None)
     used = np.unique(source.cells)
     extent = float(np.ptp(source.points[used], axis=0).max())
-    return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent
+    return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent, centres
 
 
 def _grouped(
@@ -137,6 +151,7 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
         points=points,
         shape=shape,
         cells=cells,
+        labels=np.array(list(order)),
         cell_sets=_indexed(mesh.element_sets, order),
         covers=_covers(mesh, place),
         node_sets=_indexed(mesh.node_sets, place),
@@ -288,33 +303,29 @@ def _check_disjoint(path: Path, groups: dict[int, dict[str, np.ndarray]]) -> Non
             )
 
 
-def _write(
-    source: _Source,
-    entities: dict[int, np.ndarray],
-    groups: dict[int, dict[str, np.ndarray]],
-    scale: float,
-    output: str | os.PathLike[str],
-) -> Path:
-    """Write the gmsh file; entities: nodes of cells, facets, edges and points by dimension, which groups number."""
+def _fill_model(
+    source: _Source, entities: dict[int, np.ndarray], groups: dict[int, dict[str, np.ndarray]], scale: float
+) -> None:
+    """Put the mesh into the current model; entities: nodes of cells, facets, edges and points, which groups number.
+
+    Raises MeshError for folded cells, by their labels.
+    """
     rest = np.setdiff1d(np.arange(len(source.cells)), np.concatenate([np.empty(0, int), *groups[3].values()]))
     used = np.unique(source.cells)
     number = np.zeros(len(source.points), dtype=int)
     number[used] = np.arange(1, used.size + 1)
     volumes = groups[3] | ({"": rest} if rest.size else {})
-    with msh.session(str(source.path)):
-        for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
-            nodes = number[entities[dimension]]
-            nodes = nodes[:, source.shape.order] if dimension == 3 else nodes
-            for name, members in named.items():
-                entity = gmsh.model.addDiscreteEntity(dimension)
-                if dimension == 3 and entity == 1:
-                    gmsh.model.mesh.addNodes(3, entity, number[used], (scale * source.points[used]).ravel())
-                gmsh.model.mesh.addElementsByType(entity, source.shape.elements[dimension], [], nodes[members].ravel())
-                if name:
-                    gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
-        before = gmsh.option.getNumber("Mesh.SaveAll")
-        gmsh.option.setNumber("Mesh.SaveAll", 1)  # cells without a group, too
-        try:
-            return msh.write(output)
-        finally:
-            gmsh.option.setNumber("Mesh.SaveAll", before)
+    for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
+        nodes = number[entities[dimension]]
+        nodes = nodes[:, source.shape.order] if dimension == 3 else nodes
+        for name, members in named.items():
+            entity = gmsh.model.addDiscreteEntity(dimension)
+            if dimension == 3 and entity == 1:
+                gmsh.model.mesh.addNodes(3, entity, number[used], (scale * source.points[used]).ravel())
+            gmsh.model.mesh.addElementsByType(entity, source.shape.elements[dimension], [], nodes[members].ravel())
+            if name:
+                gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
+    try:
+        msh.check_volumes(source.labels[np.concatenate(list(volumes.values()))], scale)
+    except MeshError as error:
+        raise MeshError(f"{source.path}: {error}") from error

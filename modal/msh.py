@@ -192,17 +192,52 @@ def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
     return int(first), int(second)
 
 
-def check_volumes() -> None:
+def checked_file(path: Path) -> dict[str, np.ndarray]:
+    """Return the `centres` of a gmsh file. Raises MeshError where `check_elements` rejects it."""
+    with session(str(path)):
+        merge(path)
+        try:
+            check_elements()
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from error
+        return centres()
+
+
+def centres() -> dict[str, np.ndarray]:
+    """Return the mean places (3,) of the nodes of the current model's facet groups by name."""
+    return {
+        name: gmsh.model.mesh.getNodesForPhysicalGroup(2, tag)[1].reshape(-1, 3).mean(axis=0)
+        for name, tag in groups(2).items()
+    }
+
+
+def check_elements() -> None:
+    """Raise MeshError for faults of the current model that neither gmsh nor dolfinx reports."""
+    check_disjoint(2, "facet")
+    check_disjoint(3, "volume")
+    check_points()
+    check_twice()
+    check_volumes()
+    check_connected()
+
+
+def check_volumes(labels: np.ndarray | None = None, scale: float = 1.0) -> None:
     """Raise MeshError for elements of the current model whose Jacobian is not positive everywhere.
 
+    labels: by which the user knows elements 1, 2, ...; default: these numbers; scale: of the model's unit of length to
+    the user's.
     An element turned inside out adds its stiffness as if it were whole, and nothing downstream would notice.
     """
     bad = inverted()
     if bad:
         element, group = next(iter(bad.items()))
+        nodes = gmsh.model.mesh.getElement(element)[1]
+        centre = np.mean([gmsh.model.mesh.getNode(node)[0] for node in nodes], axis=0) / scale
         raise MeshError(
-            f"{len(bad)} elements have a negative volume or are folded, such as element {element} of volume group "
-            f"{group!r}; mesh again, or reorder their nodes (curved elements: optimise them, or use straight ones)"
+            f"{len(bad)} elements have a negative volume or are folded, such as element "
+            f"{element if labels is None else labels[element - 1]} of volume group {group!r} at "
+            f"({', '.join(f'{x:.4g}' for x in centre)}) of the file; mesh again, or reorder their nodes (curved "
+            "elements: optimise them, or use straight ones)"
         )
 
 

@@ -146,13 +146,14 @@ class ReducedModel(Displayed):
                 "interface: expected numbers or rows by label, such as {'tip': 0}; the matrices are "
                 "from_matrices(mass, stiffness, interface, damping=damping)"
             )
+        size = len(np.atleast_1d(mass))
+        mass, stiffness = symmetric("mass", mass, size), symmetric("stiffness", stiffness, size)
+        rows = [shaped(f"row of {label!r}", _row(label, row, size), (size,)) for label, row in interface.items()]
         if (damping is None) == (damping_ratio is None):
             raise ReducedModelError("damping: give either the matrix `damping` or the `damping_ratio` of every mode")
-        size = len(np.atleast_1d(mass))
         if damping_ratio is not None:
-            own = symmetric("mass", mass, size)
-            check_mass(own)
-            damping = modal_damping(own, symmetric("stiffness", stiffness, size), damping_ratio)
+            check_mass(mass)
+            damping = modal_damping(mass, stiffness, damping_ratio)
         known = dict(directions or {})
         unknown = sorted(set(known) - set(interface))
         if unknown:
@@ -164,10 +165,7 @@ class ReducedModel(Displayed):
             damping=np.asarray(damping),
             stiffness=stiffness,
             interface=tuple(interface),
-            selection=np.reshape(
-                [shaped(f"row of {label!r}", _row(label, row, size), (size,)) for label, row in interface.items()],
-                (-1, size),
-            ),
+            selection=np.reshape(rows, (-1, size)),
             directions=np.array([known.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
             base_load=np.zeros((size, 3)) if base_load is None else base_load,
             damping_ratio=damping_ratio,

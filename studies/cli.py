@@ -1,9 +1,12 @@
 """The command `vanedamp`: it finds its commands (studies.commands), runs one, and reports errors in one line."""
 
+# PYTHON_ARGCOMPLETE_OK
+
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
 import threading
@@ -34,9 +37,17 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that rejects a wrong command line in one line."""
+    """A parser that rejects a wrong command line in one line, with the word that may have been meant."""
 
     def error(self, message: str) -> NoReturn:
+        from vanedamp.files.toml_input import nearest  # heavy, as is all that is not for --help
+
+        if choice := re.search(r"(invalid choice: '?([^',\s]*)'?).*\(choose from (.*)\)", message):
+            known = re.findall(r"[^',\s]+", choice[3])
+            message = f"{message[: choice.end(1)]}; {nearest(choice[2], known)}"
+        elif option := re.search(r"unrecognized arguments: (?:[^-]\S* )*(--?\w[\w-]*)", message):
+            known = [name for action in self._actions for name in action.option_strings]
+            message += f"; {nearest(option[1], known)}"
         self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
 
 
@@ -51,6 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
+    if "_ARGCOMPLETE" in os.environ:
+        _complete()
     terminated = terminate_as_interrupt() if argv is None else []
     try:
         with swallowed_interrupts_again():
@@ -67,6 +80,21 @@ def main(argv: Sequence[str] | None = None) -> int:
             os._exit(BAD_INPUT)
         return BAD_INPUT
     return status
+
+
+def _complete() -> None:
+    """Answer a shell that completes the command line it has in COMP_LINE, and exit; return without argcomplete."""
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    named = set(os.environ.get("COMP_LINE", "").split()) & COMMANDS.own().keys()
+    parser, command = _parsers(min(named, default=None))
+    for action in command._actions:
+        endings = re.findall(r"\.(\w+)", str(action.metavar))
+        if endings and not action.choices:
+            action.completer = argcomplete.FilesCompleter(endings)  # type: ignore[attr-defined]
+    argcomplete.autocomplete(parser)
 
 
 def _ignore_interrupts() -> None:
@@ -94,7 +122,10 @@ def _run(words: Sequence[str]) -> int:
         with warnings.catch_warnings():
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
-            arguments = _parser(words[0] if words else None).parse_args(words)
+            parser, command = _parsers(words[0] if words else None)
+            arguments, unknown = parser.parse_known_args(words)
+            if unknown:
+                command.error(f"unrecognized arguments: {' '.join(unknown)}")
             input_file = getattr(arguments, "input", None)
             with stages_shown():
                 arguments.run(arguments)
@@ -144,8 +175,8 @@ def _under_mpi() -> bool:
     return any(int(os.environ.get(name, 1)) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
 
 
-def _parser(name: str | None) -> argparse.ArgumentParser:
-    """Return the parser of the command line, with the arguments of the named command only."""
+def _parsers(name: str | None) -> tuple[_Parser, _Parser]:
+    """Return the parser of the command line, with the arguments of the named command only, and that command's."""
     commands = COMMANDS.own()
     if name not in commands:  # --help, a command of another package, or none at all
         commands = COMMANDS.all()
@@ -154,11 +185,12 @@ def _parser(name: str | None) -> argparse.ArgumentParser:
         "forced responses with impacts."
     )  # fmt: skip
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    places = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    named, places = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for other, command in commands.items():
         summary = command.SUMMARY
         place = places.add_parser(other, help=summary, description=summary[0].upper() + summary[1:] + ".")
         if other == name:
             command.add_arguments(place)
             place.set_defaults(run=command.run)
-    return parser
+            named = place
+    return parser, named

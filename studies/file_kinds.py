@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.reference import FileKind
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.store import kind_of as kind_of_record
+from vanedamp.files.toml_input import InputError, read_toml
 
 #: in the order in which a file is recognised by its tables
 KINDS = {
@@ -17,25 +20,41 @@ KINDS = {
             "vanedamp.studies.pipeline.tables:PipelineFile",
             ("calibrate", "modal", "reduce", "identify", "report", "folder"),
         ),
-        FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
+        FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",), command="import"),
         FileKind(
             "identification",
             "vanedamp.studies.identification.tables:IdentificationFile",
             ("numbers", "forced", "decay", "impacts"),
+            command="identify",
         ),
-        FileKind("deviations", "vanedamp.studies.identification.deviations:DeviationsFile", ("deviations",)),
+        FileKind(
+            "deviations",
+            "vanedamp.studies.identification.deviations:DeviationsFile",
+            ("deviations",),
+            command="identify",
+        ),
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
-        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",), command="optimise"),
         FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),
-        FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
+        FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support"), command="modal"),
         FileKind(
             "scene",
             "vanedamp.coupling.scene.scene:Scene",
             ("structure", "excitation", "cavity", "damper"),
             "vanedamp.coupling.scene.ranges:with_ranges",
+            "run",
         ),
     )
 }
+#: kinds that have the tables of a scene as well
+_WITH_SCENE = ("identification", "life", "study")
+#: what commands take besides: HDF5, and TOML of every kind
+RESULT, ANY = "result", "input"
+_MESH = "a mesh, which a case names in [mesh] file"
+#: files of no kind, by their endings
+_OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a page"} | dict.fromkeys(
+    (".msh", ".inp", ".bdf", ".nas", ".unv"), _MESH
+)
 
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
@@ -50,5 +69,35 @@ def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
 
 
 def a(kind: FileKind) -> str:
-    """Return a kind with its article: "an external", "a case"."""
-    return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
+    """Return a kind with its article: "an external", "a case", "deviations"."""
+    return kind.name if kind.name.endswith("s") else f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
+
+
+def another_kind(path: str | Path, taken: Collection[str]) -> str:
+    """Return what a file is, and which command takes it, in words; "" if it is, or may be, of a kind that is taken.
+
+    taken: names of KINDS, RESULT, ANY.
+    """
+    file = Path(path)
+    if not file.is_file() or file.name.endswith(".claims.json"):
+        return ""
+    with file.open("rb") as stream:
+        is_record = stream.read(8) == b"\x89HDF\r\n\x1a\n"
+    if is_record:
+        return "" if RESULT in taken else f"is HDF5 of the kind {kind_of_record(file)}: vanedamp info {path}"
+    try:
+        tables = read_toml(file)
+        kind = kind_of(tables, str(path))
+    except VanedampError:
+        return f"is {_OTHERS[file.suffix]}" if file.suffix in _OTHERS else ""
+    own = {table for name in taken if name in KINDS for table in KINDS[name].tables}
+    if ANY in taken or kind.name in taken or (not own.isdisjoint(tables) and kind.name not in _WITH_SCENE):
+        return ""
+    shown = next((table for table in kind.tables if table in tables), "[sweep]")  # as a list
+    return f"is {a(kind)} ([{shown}]): vanedamp {kind.command or kind.name} {path}"
+
+
+def expected(taken: Collection[str]) -> str:
+    """Return the kinds that are taken, in words."""
+    others = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
+    return " or ".join(others.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)

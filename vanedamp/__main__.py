@@ -1,5 +1,6 @@
 """`python -m vanedamp` is the command `vanedamp`."""
 
+# PYTHON_ARGCOMPLETE_OK
 import sys
 
 from vanedamp.studies.cli import main

@@ -10,7 +10,7 @@ body in free flight, are neutral and do not count.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -25,6 +25,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import LEAST_EXPONENTS, Scene, loaded
 from vanedamp.coupling.simulation import simulate
+from vanedamp.files.display import Displayed
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -52,8 +53,8 @@ class Motion(StrEnum):
     """the interval is too wide, the motion is leaving an unstable orbit, or there is no exponent"""
 
 
-@dataclass(frozen=True, eq=False)
-class Exponents:
+@dataclass(frozen=True, eq=False, repr=False)
+class Exponents(Displayed):
     """Lyapunov exponents of a motion; m of them, without neutral ones, the largest first.
 
     status      "ok", or why there is none (PassageStatus): the worst that a period met
@@ -90,6 +91,10 @@ class Exponents:
     def per_period(self) -> float:
         """The largest exponent per excitation period."""
         return self.largest * self.period
+
+    def printed_units(self) -> Mapping[str, str]:
+        """Return the units of the results that have one, by name."""
+        return {"exponents": "1/s", "confidence": "1/s", "period": "s"}
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.orbits.border import Border, borders_of
 from vanedamp.coupling.orbits.border import variables as border_variables
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.newton import MEASURES, Orbit
 from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.scene import Scene
@@ -18,8 +18,6 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
 from vanedamp.files.store import Variable, frozen
 
-#: measures of an orbit and their units, each an array over the points of a branch
-MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
 FLAGS = ("stable", "symmetric", "undetermined")
 #: types of the arrays over the points of a branch; others are floats
 _TYPES = {"multipliers": complex, "neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)

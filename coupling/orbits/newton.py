@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -21,8 +22,14 @@ from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.scene.units import unit_of
+from vanedamp.files.display import Displayed
 from vanedamp.files.toml_input import InputError
 
+#: measures of an orbit and their units
+MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
+#: coordinates of a state that are printed one by one
+_PRINTED = 12
 #: scaled length of a Newton step after which the orbit is known to round-off, because its square is
 _SMALL = 1e-8
 #: scaled residual of an orbit, over the size of its map's derivative, which is what round-off of the state grows by
@@ -49,8 +56,8 @@ class OrbitStatus(StrEnum):
     STOPPED = "engine_stopped"
 
 
-@dataclass(frozen=True, eq=False)
-class Orbit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit(Displayed):
     """A periodic orbit, or the last state of a search for one.
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
@@ -69,6 +76,31 @@ class Orbit:
     iterations: int
     symmetric: bool = False
     map: PeriodMap | None = field(default=None, repr=False)
+
+    def shown(self) -> dict[str, Any]:
+        """Return the results that are printed, by name: of an orbit that was not found, how the search ended."""
+        names = ["status", "parameter", "periods", "residual", "iterations"]
+        if self.status is OrbitStatus.OK:
+            names += ["stable", "multipliers", "neutral", "symmetric", *MEASURES]
+        values = {name: getattr(self, name) for name in names} | {"state": self.state}
+        if self.map is None:
+            return values
+        values["parameter"] = f"{self.map.parameter} = {self.parameter:.6g} {unit_of(self.map.parameter)}".removesuffix(
+            " 1"
+        )
+        if len(self.state) <= _PRINTED:
+            values |= dict(zip(self.map.names, self.state.tolist(), strict=True)) | {"state": None}
+        return values
+
+    def printed_units(self) -> Mapping[str, str]:
+        """Return the units of the results that have one, by name."""
+        units = {name: unit for name, unit in MEASURES.items() if unit != "1"}
+        if self.map is not None:
+            mode = "m" if self.map.scene.structure.model == "rigid" else "kg^0.5 m"
+            for name in self.map.names:
+                unit = "rad" if " tilt" in name else mode if name.startswith("mode") else "m"
+                units[name] = f"{unit}/s" if name.endswith(" rate") else unit
+        return units
 
     @cached_property
     def derivative(self) -> np.ndarray:

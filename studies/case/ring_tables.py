@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -71,13 +73,27 @@ class RingTable:
             faces |= {f"spring[{number}].low": spring.low, f"spring[{number}].high": spring.high}
         return faces
 
+    def check_faces(self, centres: Mapping[str, np.ndarray], size: float, rotation: RotationTable | None) -> None:
+        """Raise CyclicError where the centres (3,), m, of facet groups contradict the number of sectors.
+
+        size: of the sector, m; rotation: has the axis unless the table does.
+        """
+        from vanedamp.modal.cyclic_faces import check_angle
+
+        axis, point = self._axis(rotation)
+        first, second = (centres.get(face or "") for face in (self.low, self.high))
+        if first is not None and second is not None:
+            check_angle(first - point, second - point, self.sectors, np.array(axis) / np.linalg.norm(axis), size)
+
+    def _axis(self, rotation: RotationTable | None) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        own: RingTable | RotationTable = self if rotation is None else rotation
+        return own.axis or (0.0, 0.0, 1.0), own.point or (0.0, 0.0, 0.0)
+
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
         """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""
         from vanedamp.modal.cyclic import Spring, cyclic_sector
 
-        own: RingTable | RotationTable = self if rotation is None else rotation
         springs = [Spring(spring.low, spring.high, spring.stiffness) for spring in self.spring]
         return cyclic_sector(
-            matrices, self.low, self.high, self.sectors, own.axis or (0.0, 0.0, 1.0), own.point or (0.0, 0.0, 0.0),
-            springs, self.tolerance,
-        )  # fmt: skip
+            matrices, self.low, self.high, self.sectors, *self._axis(rotation), springs, self.tolerance
+        )

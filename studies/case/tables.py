@@ -462,6 +462,9 @@ class Case:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
         if self.ring is not None and self.rotation is not None and (self.ring.axis or self.ring.point):
             raise ValueError("ring.axis: a ring that rotates has the axis of [rotation]; leave out axis and point")
+        meshed = self.mesh.parameters.sectors if isinstance(self.mesh, SectorMesh) else None
+        if self.ring is not None and meshed not in (None, self.ring.sectors):
+            raise ValueError(f"ring.sectors: the mesh is a sector of {meshed}, not of {self.ring.sectors}")
         if self.mistuning is not None and self.ring is None:
             raise ValueError("mistuning: deviations are those of sectors; give [ring] with sectors, low and high")
         if self.ring is not None and self.modes.min_frequency:

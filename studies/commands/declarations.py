@@ -45,6 +45,7 @@ COMMANDS = (
     Command(
         "check", "say what an input file means, without running it", 4,
         (input_file("FILE.toml"), json_file),
+        takes=("input",),
     ),
     Command(
         "info", "say what a result is: how it was made, and its main figures", 5,
@@ -52,6 +53,7 @@ COMMANDS = (
             argument("input", metavar="RESULT.h5", help="result of any command, or its checkpoint (.partial)"),
             json_file,
         ),
+        takes=("result",),
     ),
     Command(
         "schema", "JSON Schema of a kind of input file, for editors", 5,
@@ -60,7 +62,7 @@ COMMANDS = (
     Command(
         "mesh", "write the mesh of a case that names a generator", 10,
         (input_file("CASE.toml"), output_file("MESH.msh", required=True)),
-        writes={"output": (".msh",)}, reads=_CASE,
+        writes={"output": (".msh",)}, reads=_CASE, takes=("case",),
     ),
     Command(
         "modal", "natural frequencies, effective masses, rigid model of the first bending", 20,
@@ -72,7 +74,7 @@ COMMANDS = (
                 help="by factors of the stiffness, without, or as the memory allows (default: the case's, else auto)",
             ),
         ),
-        writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE,
+        writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE, takes=("case",),
     ),
     Command(
         "campbell", "natural frequencies versus the speed of rotation, and their crossings with engine orders", 25,
@@ -82,7 +84,7 @@ COMMANDS = (
             resume,
         ),
         writes={"output": _RECORD, "picture": (".png",)}, checkpoint=True,
-        reads=Function("support.cases:read_campbell_case"),
+        reads=Function("support.cases:read_campbell_case"), takes=("case",),
     ),
     Command(
         "ring", "modes of a ring of equal sectors by nodal diameter, and the engine orders that meet them", 27,
@@ -109,7 +111,7 @@ COMMANDS = (
             ),
         ),
         writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",), "mistuning": _RECORD},
-        reads=Function("support.cases:read_ring_case"),
+        reads=Function("support.cases:read_ring_case"), takes=("case",),
     ),
     Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,
@@ -120,11 +122,12 @@ COMMANDS = (
             json_file, resume,
         ),
         writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, checkpoint=True, reads=_CASE,
+        takes=("case",),
     ),
     Command(
         "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", 40,
         (input_file("CASE.toml"), output_file("DIR", required=True)),
-        writes={"output": _FOLDER}, reads=_CASE,
+        writes={"output": _FOLDER}, reads=_CASE, takes=("case",),
     ),
     Command(
         "reduce", "reduced model at the case's interface", 50,
@@ -159,12 +162,12 @@ COMMANDS = (
                 help="keep the basis, so that `vanedamp export` can show responses on the mesh",
             ),
         ),
-        writes={"output": _RECORD}, reads=Function("support.cases:read_reducible_case"),
+        writes={"output": _RECORD}, reads=Function("support.cases:read_reducible_case"), takes=("case",),
     ),
     Command(
         "import", "reduced model of another code: dense matrices with a meaning", 60,
         (input_file("EXTERNAL.toml"), output_file("ROM.h5"), json_file),
-        writes={"output": _RECORD}, module="import_model",
+        writes={"output": _RECORD}, module="import_model", takes=("external",),
     ),
     Command(
         "run", "one scene at one excitation frequency", 70,
@@ -178,7 +181,7 @@ COMMANDS = (
             ),
             moved_start,
         ),
-        writes={"output": _RECORD}, reads=_RANGES,
+        writes={"output": _RECORD}, reads=_RANGES, takes=("scene",),
     ),
     Command(
         "sweep", "a run at every point of the scene's [sweep] grid", 80,
@@ -190,7 +193,7 @@ COMMANDS = (
             ),
             moved_start, resume,
         ),
-        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
+        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES, takes=("scene",),
     ),
     Command(
         "explore", "sliders, and a forced response or the modes of a ring that follow them, in the browser", 85,
@@ -205,29 +208,29 @@ COMMANDS = (
             argument("--no-browser", action="store_true", help="only print the address"),
             workers,
         ),
-        writes={"output": (".toml", ".html")},
+        writes={"output": (".toml", ".html")}, takes=("scene", "result"),
     ),
     Command(
         "orbits",
         "branches of periodic orbits, their stability and bifurcations, as the scene's [orbit] table says", 85,
         (input_file("SCENE.toml"), output_file("BRANCH.h5"), json_file, resume),
-        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE,
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, takes=("scene",),
     ),
     Command(
         "ramp", "run-up and run-down through resonance, as the scene's [ramp] table says", 87,
         (input_file("SCENE.toml"), output_file("RAMP.h5"), json_file, resume),
-        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE,
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, takes=("scene",),
     ),
     Command(
         "ringdown",
         "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping versus amplitude", 88,
         (input_file("SCENE.toml"), output_file("RINGDOWN.h5"), json_file),
-        writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"),
+        writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"), takes=("scene",),
     ),
     Command(
         "optimise", "mass, gap and number of bodies that reduce most", 90,
         (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers, resume),
-        writes={"output": _RECORD}, checkpoint=True,
+        writes={"output": _RECORD}, checkpoint=True, takes=("study",),
     ),
     Command(
         "contact", "numbers of a contact from geometry and materials: stiffness, yield, restitution over speed", 97,
@@ -242,12 +245,12 @@ COMMANDS = (
             argument("--preload", type=newtons, metavar="N", help="force at which the tangent stiffness is wanted"),
             json_file,
         ),
-        writes={"output": (".csv",), "picture": (".png",)},
+        writes={"output": (".csv",), "picture": (".png",)}, takes=("contact", "scene"),
     ),
     Command(
         "life", "how long a damper damps: wear over hours, and the response with the gaps that it opens", 92,
         (input_file("STUDY.toml"), output_file("LIFE.h5"), json_file, workers, resume),
-        writes={"output": _RECORD}, checkpoint=True,
+        writes={"output": _RECORD}, checkpoint=True, takes=("life",),
     ),
     Command(
         "identify", "numbers of a scene, or deviations of a ring's sectors, from measurements", 95,
@@ -257,7 +260,7 @@ COMMANDS = (
             argument("--csv", metavar="FILE.csv", help="deviations by sector, as [mistuning.stiffness] reads them"),
             json_file, workers,
         ),
-        writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)},
+        writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)}, takes=("identification", "deviations"),
     ),
     Command(
         "report", "one HTML page of results", 100,
@@ -269,7 +272,7 @@ COMMANDS = (
             ),
             argument("--title", help="title of the page"),
         ),
-        writes={"output": (".html", ".htm")},
+        writes={"output": (".html", ".htm")}, takes=("result",),
     ),
     Command(
         "pipeline", "case, calibration, reduction, sweeps and report; redoes only what changed", 105,
@@ -278,12 +281,12 @@ COMMANDS = (
             output_file("DIR"), json_file, workers,
             argument("--dry-run", action="store_true", help="say what would run and why, and run nothing"),
         ),
-        writes=None,
+        writes=None, takes=("pipeline",),
     ),
     Command(
         "export", "a result in a file of another program: ParaView, MATLAB, test systems, Abaqus, Nastran, tables", 110,
         (Function("export:add_arguments"),),
-        writes=None,
+        writes=None, takes=("result",),
     ),
     Command(
         "demo", "the whole pipeline on the shipped mesh", 120,

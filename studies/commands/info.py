@@ -27,6 +27,7 @@ from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
+from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.designs import designs
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -259,6 +260,7 @@ def _optimisation(record: _Record) -> Iterator[Fact]:
     yield Fact("answer", attributes["sentence"])
     yield Fact("nominal", attributes["nominal"], "", "best as designed")
     yield Fact("robust", attributes["robust"], "", "best within the tolerances")
+    yield Fact("remarks", Optimisation.load(record.path).remarks)
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")
 
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from vanedamp.coupling.exponents.lyapunov import lyapunov
-from vanedamp.coupling.response.response import UNITS, Response
+from vanedamp.coupling.response.response import UNITS, Response, Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
+from vanedamp.files.reference import field_docstrings
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import wear_lines, write_result
@@ -55,6 +56,8 @@ def run(arguments: Namespace, scene: Scene) -> None:
         lines.append(f"{'sectors':26} {response.sectors.sentence}")
     lines += [f"{'contact':26} {contact.sentence}" for contact in response.contacts or ()]
     lines += wear_lines(response)
+    if response.status is not Status.OK:  # last, where a reader looks
+        lines.append(f"status {response.status}: {field_docstrings(Status)[response.status.name]}")
 
     def save(path: str) -> None:
         response.save(path, {"versions": versions(), "scene": scene.to_dict()})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.store import Variable, frozen, load, reader, save
+from vanedamp.studies.machining import fine_gap
 from vanedamp.studies.optimisation.study import Design
 
 _KIND = "optimisation"
+#: distance from a bound, over the range, at which a search has run into it
+_AT_BOUND = 0.01
 _PLAIN = (
     "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
 )  # fmt: skip
@@ -130,7 +133,7 @@ class Optimisation:
 
     @property
     def remarks(self) -> list[str]:
-        """What derivatives led to, and what they say of the tolerances, in words."""
+        """What derivatives led to, what they say of the tolerances, and what speaks against the optima, in words."""
         remarks, found = [], self.gradient
         if found.get("taken"):
             remarks.append(
@@ -138,10 +141,31 @@ class Optimisation:
                 f"bodies in {found['taken']} steps, which runs confirm"
             )
         elif found.get("without"):
-            counted = ", ".join(f"{count} {_words(reason)}" for reason, count in found["without"].items())
+            most = sorted(found["without"].items(), key=lambda item: (-item[1], item[0]))
+            counted = ", ".join(f"{count} {_words(reason)}" for reason, count in most)
             remarks.append(f"the gradient leads no further; responses that count without derivatives: {counted}")
         optima = {"as designed": self.nominal} if self.robust == self.nominal else self.optima
-        return remarks + [f"{name}, {text}" for name, optimum in optima.items() if (text := optimum.to_first_order)]
+        return remarks + [
+            f"{name}, {text}"
+            for name, optimum in optima.items()
+            for text in (optimum.to_first_order, *self._doubts(optimum.design))
+            if text
+        ]
+
+    def _doubts(self, design: Design) -> Iterator[str]:
+        """Yield that a design lies at a bound of its range, or has a gap that no machine cuts, in words."""
+        table = self.study["optimise"]
+        for name, value in design._asdict().items():
+            low, high = table["variables"][name]
+            near = _AT_BOUND * (high - low)
+            at_low = value - low <= near and (name, low) != ("bodies", 1)  # no design has fewer
+            if low < high and (at_low or high - value <= near):
+                yield (
+                    f"{name} = {value:.4g} is at the {'lower' if at_low else 'upper'} bound of its range, {low:g} to "
+                    f"{high:g}: better designs may lie beyond it"
+                )
+        gap = design.gap_ratio * self.amplitude
+        yield fine_gap(gap, table["tolerances"]["gap"] * gap or None)
 
     @property
     def optima(self) -> dict[str, Optimum]:
@@ -152,7 +176,7 @@ class Optimisation:
         """Return plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
         given = {name: dict(getattr(self, name)) for name in _TABLES if name != "provenance"}
-        return self._plain() | given | arrays
+        return self._plain() | {"remarks": self.remarks} | given | arrays
 
     def _plain(self) -> dict[str, Any]:
         optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}

@@ -24,6 +24,7 @@ from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, ends, file_in, placed, reference_amplitude, scene_in
+from vanedamp.studies.machining import fine_gap
 from vanedamp.studies.optimisation.measures import SERVICE, Limits, Measure, check_measured, reference_stress
 
 #: longest transient that is proposed, in periods
@@ -199,7 +200,7 @@ class Study(NamedTuple):
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
         study = cls(
             replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, reference,
-            tuple(_doubts(scene, tables["optimise"])),
+            tuple(_doubts(scene, tables["optimise"], table, force * resonance.flexibility)),
         )  # fmt: skip
         try:
             study._check_corners()
@@ -274,11 +275,17 @@ def _reference(scene: Scene, band: np.ndarray, table: Optimise, resonance: Reson
     return (amplitude if table.measure == "wear" else 1.0) / SERVICE
 
 
-def _doubts(scene: Scene, given: Mapping[str, Any]) -> Iterator[str]:
-    """Yield that designs of one body, by default, take the place of the scene's several."""
+def _doubts(scene: Scene, given: Mapping[str, Any], table: Optimise, amplitude: float) -> Iterator[str]:
+    """Yield that designs of one body, by default, take the place of the scene's several, and gaps that no machine cuts.
+
+    amplitude: X, m.
+    """
     count = len(scene.damper)
     if count > 1 and "bodies" not in given.get("variables", {}):
         yield f"optimise.variables.bodies: missing, so that designs have 1 body, the scene {count}: bodies = {count}"
+    gap = table.variables.gap_ratio[0] * amplitude
+    if told := fine_gap(gap, table.tolerances.gap * gap or None):
+        yield f"optimise.variables.gap_ratio: at its lower bound, {told}"
 
 
 def _check_settled(scene: Scene, band: np.ndarray) -> None:

@@ -250,7 +250,8 @@ def case_of(folder, name, text):
 @pytest.mark.parametrize(("name", "text"), [("m.msh", MESH), ("m.MSH", MESH), ("m.INP", DECK), ("m.bdf", BULK)])
 def test_two_tetrahedra_pass(folder, name, text, capfd):
     """The meshes that the next test spoils; capitals in the name change nothing."""
-    assert main(case_of(folder, name, text)) == 0
+    words = case_of(folder, name, text)
+    assert main(words) == main(["check", *words[1:]]) == 0
 
 
 @pytest.mark.parametrize(
@@ -262,9 +263,12 @@ def test_two_tetrahedra_pass(folder, name, text, capfd):
             "m.msh", MESH, "$Elements\n4\n", f"$Elements\n5\n{ELEMENTS[3].replace('4', '9', 1)}\n",
             "have the same nodes; remove one of them",
         ),
-        ("m.msh", MESH, "$MeshFormat", "$MESHFORMAT", "not a gmsh mesh (a .msh file starts with $MeshFormat)"),
+        ("m.msh", MESH, "1 2 3 4 5", "1 3 2 4 5", "1 elements have a negative volume or are folded, such as element 4"),
+        ("m.msh", MESH, "$MeshFormat", "$MESHFORMAT", "$MeshFormat"),
         ("m.inp", DECK, "2,2,3,4,5", "1,2,3,4,5", "line 9: *ELEMENT element 1 is given twice"),
         ("m.inp", DECK, "2,2,3,4,5", "2,2,3,4,5\n3,5,4,3,2", "volume elements 2 and 3 have the same nodes"),
+        ("m.inp", DECK, "2,2,3,4,5", "2,3,2,4,5", "element 2 of volume group 'none' at (0.05, 0.05, 0.05) of the file"),
+        ("m.bdf", BULK, "2,3,4,5", "3,2,4,5", "negative volume or are folded, such as element 2 "),
         ("m.bdf", BULK, "GRID,5,,.1", "GRID,5,,nan", "the coordinates of node 5 are not finite"),
         ("m.bdf", BULK, "CTETRA,2", "CTETRA,1", "line 8: CTETRA: element 1 is given twice"),
         ("m.bdf", BULK, "2,3,4,5", "2,3,4,9", "line 8: CTETRA: there is no grid point 9"),
@@ -274,9 +278,11 @@ def test_two_tetrahedra_pass(folder, name, text, capfd):
 )  # fmt: skip
 def test_meshes_that_are_refused(folder, name, text, old, new, told, capfd):
     assert text.count(old) == 1
-    error = refused(case_of(folder, name, text.replace(old, new)), capfd)
-    assert f"case.toml: {name}: " in error
-    assert told in error
+    words = case_of(folder, name, text.replace(old, new))
+    for command in ("check", "modal"):
+        error = refused([command, *words[1:]], capfd)
+        assert f"case.toml: {name}: " in error
+        assert told in error
 
 
 def test_tables_in_capitals_are_told(folder, capfd):

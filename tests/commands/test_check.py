@@ -369,6 +369,40 @@ def test_slips_of_units_in_gap_and_stiffness(tmp_path, capfd):
         assert bool(warned(tmp_path, capfd, soft, "contact.stiffness")) is told
 
 
+@pytest.mark.parametrize(
+    ("table", "key", "fine", "rough", "told"),
+    [
+        ("damper", "friction", 1.9, 40.0, "damper[0].friction: 40 is implausible: dry metals have 0.1 to 1"),
+        ("damper", "mass", 0.156, 20 * MASS, "damper.mass: the bodies have 3.14 kg, 20 times the modal mass 0.157 kg"),
+        ("cavity", "gap", 1e-5, 9.9e-6, "cavity[0].gap: a gap of 9.9 um is below 10 um, what two ground parts of IT5"),
+    ],
+)
+def test_parts_that_nobody_makes(tmp_path, capfd, table, key, fine, rough, told):
+    for value, expected in ((fine, []), (rough, [told])):
+        changed_scene = DAMPED | {table: [DAMPED[table][0] | {key: value}]}
+        found = [text[: len(told)] for text in checked(tmp_path, capfd, changed_scene)["warnings"]]
+        assert [text for text in found if text == told] == expected
+
+
+def test_a_casing_of_implausible_friction(tmp_path, capfd):
+    tables = DAMPED | {"friction_damper": [{"normal_force": 1.0, "friction": 3.0}]}
+    assert warned(tmp_path, capfd, tables, "friction_damper[0].friction: 3 is implausible")
+
+
+def test_gaps_of_a_study_that_no_machine_cuts(tmp_path, capfd):
+    study = DAMPED | {"time": {"periods": 1500, "transient": 700}}
+    amplitude = checked(tmp_path, capfd, DAMPED)["resonance_amplitude"]
+    for gap, width, told in (
+        (9e-6, 0.0, "a gap of 9 um is below 10 um, what"), (3e-5, 0.0, ""), (3e-5, 0.2, ""),
+        (3e-5, 0.1, "at its lower bound, a tolerance of +-3 um is below +-5 um, what"),
+    ):  # fmt: skip
+        table = {
+            "band": [2380.0, 2400.0], "variables": {"gap_ratio": [gap / amplitude, 9.0]}, "tolerances": {"gap": width},
+        }  # fmt: skip
+        found = warned(tmp_path, capfd, study | {"optimise": table}, "optimise.variables.gap_ratio: at its lower")
+        assert bool(found) is bool(told) and all(told in text for text in found)
+
+
 @pytest.mark.parametrize(("scale", "told"), [(1.0, False), (1e3, True)])
 def test_a_mesh_in_millimetres(tmp_path, capfd, scale, told):
     case = changed(CLUSTER, ("degree = 2", f"degree = 2\nscale = {scale}"))

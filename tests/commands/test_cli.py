@@ -144,6 +144,18 @@ def test_run_prints_a_summary(folder, capsys):
     assert sorted(path.name for path in folder.iterdir()) == ["case.toml", "scene.toml"]
 
 
+def test_a_run_that_is_not_steady_says_so_last(folder, capsys):
+    short = changed(
+        SCENE, ("transient = 80", "transient = 3"), ("damping_ratio = 0.01", "damping_ratio = 0.001"),
+        ("resonance_amplitude = 1e-3", "force = 1.0"), ("periods = 90", "periods = 30"),
+    )  # fmt: skip
+    for text, last in ((SCENE, "penetration"), (short, "status not_steady: no end of the transient in sight, or")):
+        (folder / "scene.toml").write_text(text)
+        assert main(["run", "scene.toml"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[-1].startswith(last) and not any(line.startswith("status not") for line in lines[:-1])
+
+
 def test_run_without_bodies_writes_null(folder):
     text = SCENE.split("[[cavity]]")[0] + "[time]\nperiods = 4\ntransient = 1\n"
     (folder / "scene.toml").write_text(text)
@@ -346,7 +358,16 @@ def test_mesh_of_a_case_with_a_mesh(folder, capfd):
     ("arguments", "told"),
     [
         ([], "required: COMMAND"),
-        (["swep"], "invalid choice: 'swep'"),
+        (
+            ["sweeep"],
+            "vanedamp: argument COMMAND: invalid choice: 'sweeep'; did you mean 'sweep'?; see vanedamp",
+        ),
+        (["qqq"], "invalid choice: 'qqq'; known: bench, calibrate, campbell, check, "),
+        (["run", "scene.toml", "--sampels", "3"], "unrecognized arguments: --sampels 3; did you mean '--samples'?"),
+        (["run", "scene.toml", "other.toml"], "vanedamp run: unrecognized arguments: other.toml; see vanedamp run"),
+        (["run", "scene.toml", "b.toml", "--evnets"], "b.toml --evnets; did you mean '--events'?"),
+        (["modal", "case.toml", "--solver", "iteratve"], "'iteratve'; did you mean 'iterative'?"),
+        (["new", "scnee"], "'scnee'; did you mean 'scene'?"),
         (["run"], "required: SCENE.toml"),
         (["reduce", "case.toml", "--modes", "many"], "expected a count, not 'many'"),
         (["sweep", "scene.toml", "--workers", "0"], "expected at least 1"),
@@ -437,6 +458,30 @@ def test_process_writes_json_alone(folder):
     assert finished.returncode == 0
     assert finished.stderr == ""
     assert json.loads(finished.stdout)["first_bending"] == 0
+
+
+def completions(line, cwd, **variables):
+    """What a shell is offered after a line, by argcomplete's protocol: words at descriptor 8."""
+    asked = {"COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n"}
+    call = '"$0" -m vanedamp 8>&1 9>/dev/null 1>/dev/null 2>/dev/null'
+    words = ["sh", "-c", call, sys.executable]
+    done = subprocess.run(
+        words, cwd=cwd, capture_output=True, text=True, check=False, env=environment(**asked, **variables)
+    )
+    return {word.strip() for word in done.stdout.split("\n")}
+
+
+def test_shells_complete_command_lines(folder):
+    pytest.importorskip("argcomplete", reason="needs argcomplete: make setup")
+    (folder / "sweep.h5").touch()
+    assert completions("vanedamp sw", folder) == {"sweep"}
+    assert completions("vanedamp run --e", folder) == {"--events", "--exponents"}
+    assert completions("vanedamp modal --solver i", folder) == {"iterative"}
+    for line, file, other in (("run ", "scene.toml", "sweep.h5"), ("info ", "sweep.h5", "scene.toml")):
+        found = completions(f"vanedamp {line}", folder)
+        assert file in found and other not in found
+    (folder / "argcomplete.py").write_text("raise ImportError")  # it is not installed
+    assert completions("vanedamp sw", folder, PYTHONPATH=f"{folder}{os.pathsep}{ROOT}") == {""}
 
 
 def test_packages_with_the_names_of_parts_do_not_matter(folder):

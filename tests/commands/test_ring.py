@@ -8,6 +8,7 @@ import pytest
 
 import vanedamp as vd
 from tests.commands.test_export import of_vtk
+from tests.tools.input_files import changed
 from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
@@ -276,3 +277,30 @@ def test_pages_are_of_rings_only(tmp_path, capsys):
     """`vanedamp explore` writes a page of a ring's modes; of scenes it serves one."""
     assert main(["explore", "-o", str(tmp_path / "page.html"), "--no-browser"]) == BAD_INPUT
     assert "is written of a ring's modes" in capsys.readouterr().err and not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("meshed", "old", "new", "told"),
+    [
+        (False, "[ring]\nsectors = 6", "[ring]\nsectors = 7", "ring.sectors: the mesh is a sector of 6, not of 7"),
+        (
+            True,
+            "[ring]\nsectors = 6",
+            "[ring]\nsectors = 7",
+            "the faces are 60 degrees apart: sectors = 6",
+        ),
+        (True, 'low = "low"\nhigh = "high"', 'low = "high"\nhigh = "low"', "ring.low: low and high are swapped"),
+    ],
+)
+def test_check_compares_the_sectors_with_the_mesh(tmp_path, monkeypatch, capfd, meshed, old, new, told):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(DISK)
+    if meshed:
+        assert main(["mesh", "case.toml", "-o", "disk.msh"]) == 0
+        (tmp_path / "case.toml").write_text('[mesh]\nfile = "disk.msh"\n' + DISK[DISK.index("[material") :])
+    assert main(["check", "case.toml"]) == 0
+    (tmp_path / "bad.toml").write_text(changed((tmp_path / "case.toml").read_text(), (old, new)))
+    capfd.readouterr()
+    for command in ("check", "ring"):
+        assert main([command, "bad.toml"]) == BAD_INPUT
+        assert told in capfd.readouterr().err

@@ -111,3 +111,14 @@ def test_bad_input_is_one_line(folder, monkeypatch, capsys, old, new, message):
     assert main(["run", "bad.toml"]) == BAD_INPUT
     found = capsys.readouterr().err.strip().splitlines()[-1]
     assert message in found
+
+
+def test_check_estimates_a_sweep_and_warns_of_sectors_that_cannot_alternate(capfd, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for sectors, told in ((6, 0), (5, 1)):
+        Chain(sectors=sectors, damping_ratio=0.01).ring().save("ring.h5")
+        (tmp_path / "scene.toml").write_text((SCENE + SWEEP).replace('sectors = "all"', 'sectors = "alternate"'))
+        assert main(["check", "scene.toml", "--json", "-"]) == 0
+        found = json.loads(capfd.readouterr().out)
+        assert found["sweep_seconds"] > 0.0 and found["run_seconds"] > 0.0
+        assert sum("sectors: 5 sectors cannot alternate" in text for text in found["warnings"]) == told

@@ -1,6 +1,7 @@
 """A session in a notebook: records that print in a few lines, become xarray datasets and take numpy's numbers."""
 
 import inspect
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -60,6 +61,19 @@ def test_notebooks_show_tables_and_figures(scene):
     rows, notes = table(swept)
     assert len(rows) == 21 and notes == ["and 5 further points"]
     assert len(swept.plot().data[0].x) >= 25
+
+
+def test_orbits_and_exponents_print_tables_with_units(scene):
+    orbit = vd.find_orbit(scene.replace({"orbit": {"periods": 1, "start": "linear"}, "damper": []}))
+    assert ["status", "ok"] in table(orbit)[0]
+    assert f"parameter: excitation.frequency = {orbit.parameter:.6g} Hz\n" in repr(orbit)
+    assert f"amplitude_mean: {orbit.amplitude_mean:.6g} m\n" in repr(orbit)
+    assert f"mode 0 rate: {orbit.state[1]:.6g} m/s" in repr(orbit)
+    lost = replace(orbit, status="engine_stopped", map=None)
+    assert "status: engine_stopped" in repr(lost) and "stable" not in repr(lost)
+    found = vd.lyapunov(scene.replace({"damper": []}), 32)
+    (rate,) = [row[1] for row in table(found)[0] if row[0] == "exponents"]
+    assert rate.endswith("1/s") and f"period: {found.period:.6g} s" in repr(found)
 
 
 def test_a_model_prints_its_frequencies():

@@ -162,6 +162,10 @@ def test_arrays_are_read_only_copies():
         ({"damping_ratio": 1.0}, "damping_ratio: expected 0 <= ratio < 1"),
         ({"damping": STIFFNESS}, "damping: give either"),
         ({"damping_ratio": None}, "damping: give either"),
+        # a wrong shape is told first
+        ({"damping_ratio": None, "mass": np.ones((3, 2))}, r"mass: expected shape \(3, 3\), not \(3, 2\)"),
+        ({"damping_ratio": None, "stiffness": np.eye(2)}, r"stiffness: expected shape \(3, 3\), not \(2, 2\)"),
+        ({"damping_ratio": None, "interface": {"end": [1.0]}}, r"row of 'end': expected shape \(3,\), not \(1,\)"),
         ({"fixed_interface_modes": 1}, "the last coordinates are fixed-interface modes"),
         ({"fixed_interface_modes": 4}, "fixed_interface_modes: expected 0 to 3"),
         ({"recovery": np.zeros((4, 3))}, r"recovery: expected shape \(3, 3\)"),

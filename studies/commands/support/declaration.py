@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
+from vanedamp.files.errors import VanedampError
+
 #: an argument: a function that declares it to a parser
 Argument = Callable[[ArgumentParser], object]
 
@@ -47,6 +49,7 @@ class Command:
                           None: the work checks
     checkpoint            whether the result has a checkpoint, from which `--resume` continues
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
+    takes                 kinds of its input files, by their names in `studies.file_kinds`
     module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
     """
 
@@ -58,6 +61,7 @@ class Command:
     checkpoint: bool = False
     reads: Callable[[Namespace], Any] | None = None
     module: str = ""
+    takes: tuple[str, ...] = ()
 
     @property
     def work(self) -> Function:
@@ -74,7 +78,24 @@ class Command:
 
         The arguments get `outputs`, the files that are written, and `checkpoint`, one of them or None.
         """
+        try:
+            self._run(arguments)
+        except VanedampError:
+            self._refuse_other_kinds(arguments)
+            raise
+
+    def _run(self, arguments: Namespace) -> None:
         if self.writes is not None:
             Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
         given = () if self.reads is None else (self.reads(arguments),)
         self.work(arguments, *given)
+
+    def _refuse_other_kinds(self, arguments: Namespace) -> None:
+        """Raise InputError for an input file that another command takes."""
+        from vanedamp.files.toml_input import InputError
+        from vanedamp.studies.file_kinds import another_kind, expected
+
+        given = [getattr(arguments, name, None) for name in ("input", "pipeline")]
+        for path in filter(None, (*given, *getattr(arguments, "inputs", ()))) if self.takes else ():
+            if told := another_kind(path, self.takes):
+                raise InputError(f"{path}: {told}; `vanedamp {self.NAME}` takes {expected(self.takes)}") from None

@@ -3,6 +3,7 @@
 import html
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,6 +145,31 @@ def test_file_round_trip(found, tmp_path):
     with xarray.open_dataset(tmp_path / "optimum.h5", engine="h5netcdf") as data:
         assert data.map_amplitude.dims == ("map_mass_ratio", "map_gap_ratio")
         assert data.frequency.attrs["units"] == "Hz"
+
+
+@pytest.mark.parametrize(
+    ("design", "told"),
+    [
+        (
+            {"mass_ratio": 0.05},
+            "as designed, mass_ratio = 0.05 is at the upper bound of its range, 0.005 to 0.05: b",
+        ),
+        ({"gap_ratio": 0.21}, "as designed, gap_ratio = 0.21 is at the lower bound of its range, 0.2 to 1.2: better"),
+        ({"gap_ratio": 1e-4}, "as designed, a gap of 0.1 um is below 10 um, what"),
+        ({"bodies": 2}, "as designed, bodies = 2 is at the upper bound of its range, 1 to 2: better designs may lie"),
+        ({"bodies": 1}, ""),  # no design has fewer
+    ],
+)
+def test_what_speaks_against_an_optimum(found, design, told):
+    record, middle = found[0], Design(0.02, 0.7, 1)
+    ranges = {"mass_ratio": [0.005, 0.05], "gap_ratio": [0.2, 1.2], "bodies": [1, 2]}
+    table = record.study["optimise"] | {"variables": ranges, "tolerances": {"gap": 0.0}}
+    record = replace(record, study=record.study | {"optimise": table}, amplitude=1e-3, gradient={})
+    plain = replace(record.nominal, design=middle, estimate={})
+    assert replace(record, nominal=plain, robust=plain).remarks == []
+    moved = replace(plain, design=middle._replace(**design))
+    remarks = replace(record, nominal=moved, robust=plain).to_json()["remarks"]
+    assert all(told in text for text in remarks[-1:]) and bool(remarks) is bool(told)
 
 
 def test_sample_of_the_tolerances(tmp_path):
@@ -289,7 +315,7 @@ def test_command(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda data: data.pop("optimise"), "optimise: missing"),
+        (lambda data: data.pop("optimise"), "is a scene ([structure]): vanedamp run optimise.toml; `vanedamp opt"),
         (lambda data: data["optimise"].pop("band"), "optimise.band: missing"),
         (lambda data: data["optimise"].update(band={"start": 2430.0, "stop": 2380.0, "num": 3}), "frequencies that ri"),
         (lambda data: data["optimise"].update(band=[2400.0, 2400.0]), "rise, not 2400 Hz after 2400 Hz"),

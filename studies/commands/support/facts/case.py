@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.files.toml_input import tables
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
+from vanedamp.modal.msh import checked_file
 from vanedamp.modal.units import size_doubts
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
@@ -39,15 +42,17 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
     if isinstance(mesh, MeshFile):
         yield Fact("mesh", mesh.file, "", f"{Path(mesh.file).stat().st_size / 1e6:.3g} MB")
         if mesh.foreign:
-            groups, nodes, extent = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
+            groups, nodes, extent, centres = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
             kinds = {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]}
             yield Fact("groups", {kind: names for kind, names in kinds.items() if names})
+            _check_ring(case, mesh, centres, extent)
             yield Fact("nodes", nodes, "", "of the mesh; degree 2 adds those between two")
             yield Fact("extent", mesh.scale * extent, "m", "largest, along an axis")
         else:
             header = read_header(mesh.file)
             case.check_groups(header.groups[2], header.groups[3], {"edge": header.groups[1], "point": header.groups[0]})
             yield Fact("groups", {"volumes": header.groups[3], "facets": header.groups[2]})
+            _check_ring(case, mesh, checked_file(Path(mesh.file)), header.extent)
             if header.nodes is not None:
                 yield Fact("nodes", header.nodes, "", "of the mesh; degree 2 adds those between two")
             if header.extent is not None:
@@ -63,6 +68,13 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
     if case.modes.max_frequency is not None:
         largest = slowest / (_IN_A_WAVE * case.modes.max_frequency)
         yield Fact("largest_element", largest, "m", f"{_IN_A_WAVE} in a shear wave of the highest frequency")
+
+
+def _check_ring(case: Case, mesh: MeshFile, centres: Mapping[str, np.ndarray], extent: float | None) -> None:
+    """Raise CyclicError where the mesh contradicts the number of sectors; extent: of the file, None: not known."""
+    if case.ring is not None:
+        scaled = {name: mesh.scale * centre for name, centre in centres.items()}
+        case.ring.check_faces(scaled, mesh.scale * (extent or 1.0), case.rotation)
 
 
 def _of_materials(case: Case) -> Iterator[Fact]:

@@ -27,7 +27,7 @@ from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import beginning, check_run, check_sweep, exponent_seconds, points_of
 from vanedamp.studies.commands.support.facts import Fact
-from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, sweep_doubts
+from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, part_doubts, sweep_doubts
 from vanedamp.studies.commands.support.trial import mean_cost, tried
 from vanedamp.studies.scene_checks import load_scene
 from vanedamp.studies.workers import available_cores
@@ -74,6 +74,7 @@ def facts_of(scene: Scene) -> list[Fact]:
     if scene.excitation.signal is not None:
         warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
     resonance = _resonance(scene)
+    warnings += part_doubts(replace(whole, sweep={}), None if resonance is None else resonance.mass)
     if resonance is not None and scene.excitation.signal is None:
         warnings += gap_doubts(scene, _top(scene, resonance))
     if whole.axes:
@@ -191,4 +192,4 @@ def _some_points(scene: Scene) -> Iterator[Scene]:
         places = np.unravel_index(number, [len(values) for values in axes.values()])
         values = {path: axes[path][int(place)] for path, place in zip(axes, places, strict=True)}
         with suppress(InputError):  # is the status of that point
-            yield timed(_closed(points.raw(values)))
+            yield timed(unrolled(_closed(points.raw(values))))

@@ -14,11 +14,16 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import Points, grid, resonance_axis
 from vanedamp.coupling.sweep.sweep import linear_tops
 from vanedamp.coupling.system.linear_response import linear_amplitudes
+from vanedamp.coupling.system.reduced_model_file import ring_in_file
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import headline
+from vanedamp.studies.machining import fine_gap
 
 #: gaps beyond this many amplitudes are slips of units, as a rule
 _WIDE = 20.0
+#: friction beyond this is none of two dry solids: clean metals in air are below 1.5
+_ROUGH = 2.0
 
 
 def sweep_doubts(scene: Scene) -> Iterator[str]:
@@ -47,6 +52,36 @@ def sweep_doubts(scene: Scene) -> Iterator[str]:
     unit = "Hz" if swept == FREQUENCY else unit_of(swept)
     for remark in found.remarks_in(unit):
         yield f"sweep.{swept}: by the linear curves, {remark}"
+
+
+def part_doubts(scene: Scene, mass: float | None) -> Iterator[str]:
+    """Yield friction, masses and gaps that no parts have, and sectors that cannot alternate.
+
+    scene: as its file has it; mass: of the structure, modal, kg; None where it is not known.
+    """
+    for table in ("damper", "friction_damper"):
+        for number, one in enumerate(getattr(scene, table)):
+            if one.friction > _ROUGH:
+                yield (
+                    f"{table}[{number}].friction: {one.friction:g} is implausible: dry metals have 0.1 to 1, and none "
+                    f"more than {_ROUGH:g}"
+                )
+    for number, cavity in enumerate(scene.cavity):
+        if told := fine_gap(cavity.gap):
+            yield f"cavity[{number}].gap: {told}"
+    bodies = sum(body.mass for body in unrolled(scene).damper)
+    if mass is not None and bodies > mass:
+        yield (
+            f"damper.mass: the bodies have {bodies:.3g} kg, {bodies / mass:.3g} times the modal mass {mass:.3g} kg of "
+            "the structure; masses are in kg, not in g"
+        )
+    alternating = [f"cavity[{number}]" for number, one in enumerate(scene.cavity) if one.sectors == "alternate"]
+    ring = ring_in_file(scene.structure) if alternating else None
+    if ring is not None and ring.sectors % 2:
+        yield (
+            f"{alternating[0]}.sectors: {ring.sectors} sectors cannot alternate: sectors {ring.sectors - 1} and 0 are "
+            "neighbours, and both have a cavity"
+        )
 
 
 def gap_doubts(scene: Scene, amplitude: float) -> Iterator[str]:

@@ -1,0 +1,24 @@
+"""What machines cut: gaps and tolerances of gaps below it are no designs as they are.
+
+Cavity and body are two ground parts. At ISO 286-1's grade IT5 a length of 3 to 6 mm is held within 5 um, so that the
+gap between both is held within 10 um, 5 um to each side.
+"""
+
+from __future__ import annotations
+
+#: m: smallest gap, and half width of its tolerance
+GAP, TOLERANCE = 10e-6, 5e-6
+_BASIS = "two ground parts of IT5 (ISO 286-1, 3 to 6 mm)"
+
+
+def fine_gap(gap: float, half_width: float | None = None) -> str:
+    """Return what speaks against cutting a gap, m, with the half width of its tolerance, m, in words; "": nothing.
+
+    half_width: None where no tolerance is named.
+    """
+    found = [f"a gap of {1e6 * gap:.3g} um is below {1e6 * GAP:g} um"] if gap < GAP else []
+    if half_width is not None and half_width < TOLERANCE:
+        found.append(f"a tolerance of +-{1e6 * half_width:.2g} um is below +-{1e6 * TOLERANCE:g} um")
+    return (
+        f"{' and '.join(found)}, what {_BASIS} can hold; sort the parts by size, or take a larger gap" if found else ""
+    )
