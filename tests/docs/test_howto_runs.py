@@ -67,11 +67,15 @@ def test_program_of_mpi_is_that_of_the_sweeps():
     assert program("supercomputer.md", "mpi4py") == program("sweeps.md", "mpi4py")
 
 
+#: what keeps parts of one kind
+PLACES = ("ExtensionPoint", "Registry", "Variants")
+
+
 def groups_in_the_code():
     """Groups of entry points: words "vanedamp.NAME" in the calls that make the places of parts."""
     for path in (path for part in PARTS for path in (ROOT / part).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("ExtensionPoint", "Registry", "Variants"):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in PLACES:
                 words = [word.value for word in node.args if isinstance(word, ast.Constant)]
                 yield from (word for word in words if re.fullmatch(r"vanedamp\.[a-z_]+", str(word)))
 
