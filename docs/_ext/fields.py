@@ -52,7 +52,7 @@ class ResultKinds(Directive):
             # by address: labels of a page that Markdown nests are not known to other pages
             commands = [nodes.reference("", each, refuri=f"commands.html#command-{each}") for each in kind.commands]
             joined = [part for each in commands for part in (nodes.Text(", "), each)][1:]
-            short = str(kind.record).removeprefix("vanedamp.")
+            short = str(kind.record).rpartition(".")[2]
             record = pending_xref(
                 "", nodes.literal(short, short), refdomain="py", reftype="obj", reftarget=kind.record,
                 refexplicit=True, refwarn=True,
