@@ -47,6 +47,7 @@ html_show_sourcelink = False
 html_sidebars = {"tutorial/index": []}
 html_theme_options = {
     "show_prev_next": True,
+    "collapse_navigation": True,
     "secondary_sidebar_items": ["page-toc"],
     "header_links_before_dropdown": 5,
     "footer_start": ["copyright"],

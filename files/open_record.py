@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import GetJsonSchemaHandler, TypeAdapter, model_serializer, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, SchemaValidator, core_schema
+from pydantic_core import ArgsKwargs, CoreSchema, SchemaValidator, core_schema
 
 from vanedamp.files.toml_input import STRICT
 
@@ -31,18 +31,22 @@ class OpenRecord:
     @model_validator(mode="before")
     @classmethod
     def _read(cls, table: Any) -> Any:
-        if not isinstance(table, Mapping):
+        called = isinstance(table, ArgsKwargs)  # the constructor, not a file
+        keys = (table.kwargs or {}) if called else table
+        if not isinstance(keys, Mapping):
             return table
-        if "added" in table:
+        if "added" in keys and not called:
             raise ValueError("added: unknown key")
-        further = [key for key in table if key not in cls.__dataclass_fields__]
+        further = [key for key in keys if key not in cls.__dataclass_fields__]
         types = cls.keys_added() if further else {}
         schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in further if key in types}
         if not schemas:
             return table
-        own = {key: table[key] for key in schemas}
+        own = {key: keys[key] for key in schemas}
         values = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(own)
-        return {key: value for key, value in table.items() if key not in own} | {"added": values}
+        rest = {key: value for key, value in keys.items() if key not in own}
+        rest["added"] = (rest.get("added") or {}) | values
+        return ArgsKwargs(table.args, rest) if called else rest
 
     @model_serializer(mode="wrap")
     def _write(self, handler: Any) -> dict[str, Any]:

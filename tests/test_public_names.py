@@ -2,6 +2,7 @@
 
 import ast
 import pydoc
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -45,9 +46,15 @@ def test_a_name_is_that_of_its_module_with_a_docstring(name):
     assert pydoc.getdoc(value)
 
 
-def test_every_name_is_on_the_page():
-    page = dict(python_api.pages())["vanedamp"]
-    assert [name for name in vd.__all__ if f":: vanedamp.{name}\n" not in page] == []
+def test_every_name_stands_in_one_group_that_help_and_reference_show():
+    groups = re.findall(r"\n([A-Z][a-z ]+): [a-z].+\n\n((?:    .+\n)+)", vd.__doc__)
+    shown = [name for _, names in groups for name in re.split(r",\s+", names.strip())]
+    assert sorted(shown) == sorted(IMPORTS) and len(groups) == STUB.read_text(encoding="utf-8").count("\n\n# ") - 1 > 9
+    pages = dict(python_api.pages())
+    for title, names in groups[1:]:  # the first is that of the parts
+        page = pages[f"names-{title.lower().replace(' ', '-')}"]
+        assert re.findall(r":: vanedamp\.(\w+)$", page, re.M) == re.split(r",\s+", names.strip())
+    assert sorted(re.findall(r"^- :py:obj:`~vanedamp\.(\w+)`: \S", pages["vanedamp"], re.M)) == sorted(vd.__all__)
 
 
 def test_names_are_loaded_when_they_are_used():

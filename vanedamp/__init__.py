@@ -1,29 +1,43 @@
 """Vibration damping of vane clusters by loose bodies in cavities.
 
-The parts, in the order of the pipeline: `modal` (finite elements: mesh to matrices, modes, rigid model), `rom` (reduced
-models), `coupling` (scenes of a structure and its bodies, run by the exact event engine and other methods), `studies`
-(cases, sweeps' pictures, reports, the command line); `meshes` has meshes by parameters, `files` what all stand on.
-
-The names below are loaded when they are first used, so that `import vanedamp` takes no time.
+`import vanedamp as vd` takes no time: a name is loaded when it is first used. The names, by groups:
 """
 
 from __future__ import annotations
 
-import ast
+import re
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from textwrap import fill, indent
+from typing import Any, NamedTuple
 
 
-def _public() -> dict[str, str]:
-    """Return the modules of the public names, "" of a part: as the stub has them, which is their only place."""
-    stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return {name.name: (node.module or "").partition(".")[2] for node in imports for name in node.names}
+class _Group(NamedTuple):
+    """Public names that belong together, with their modules, "" of a part."""
+
+    title: str
+    about: str
+    homes: dict[str, str]
+
+    def __str__(self) -> str:
+        return f"\n{self.title}: {self.about}\n\n{indent(fill(', '.join(self.homes), 100), '    ')}\n"
 
 
-_HOMES = _public()
-__all__ = sorted(name for name, home in _HOMES.items() if home)
+def _read() -> list[_Group]:
+    """Return the groups as the stub has them, which is their only place."""
+    groups = []
+    for line in Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8").splitlines():
+        if found := re.fullmatch(r"# ([A-Z][\w ]*): (.+)", line):
+            groups.append(_Group(found[1], found[2], {}))
+        elif found := re.match(r"from vanedamp\.?(\S*) import (\w+)", line):
+            groups[-1].homes[found[2]] = found[1]
+    return groups
+
+
+_GROUPS = _read()
+_HOMES = {name: home for group in _GROUPS for name, home in group.homes.items()}
+__all__ = [name for name, home in _HOMES.items() if home]
+__doc__ = (__doc__ or "") + "".join(map(str, _GROUPS))
 
 
 def __getattr__(name: str) -> Any:

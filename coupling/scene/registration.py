@@ -72,8 +72,8 @@ def register(part: type[Part], name: str | None = None) -> type[Part]:
 
     part: a class derived from `ContactLaw`, `Waveform`, `Shape` or `SceneElement`, whose docstrings are the contract;
     it is returned. name: of a shape or of an element's table, by default the class's own in small letters. An installed
-    package adds one without a call, by an entry point (CONTRIBUTING.md). Raises ExtensionError for any other class, and
-    for a name that is taken.
+    package adds one without a call, by an entry point (docs/howto/own_parts.md). Raises ExtensionError for any other
+    class, and for a name that is taken.
     """
     kinds: dict[type, Variants[Any] | Registry] = {
         ContactLaw: LAWS,

@@ -1,4 +1,4 @@
-"""Tables of the fields of a record or of the values of an enumeration, from the docstrings after them: `fields`."""
+"""Tables from the code: `fields` of a record or an enumeration, with the docstrings after them; `result-kinds`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from typing import Any
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
+from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
 from vanedamp.files.reference import unit_in
+from vanedamp.studies.file_kinds import RESULT_KINDS
 
 
 class Fields(Directive):
@@ -41,10 +43,29 @@ class Fields(Directive):
         return [table_node(("Name", "Unit", "Meaning"), rows, (25, 10, 65))]
 
 
+class ResultKinds(Directive):
+    """`{result-kinds}`: the kinds of result files, the commands that write them, the classes of their content."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = []
+        for name, kind in RESULT_KINDS.items():
+            # by address: labels of a page that Markdown nests are not known to other pages
+            commands = [nodes.reference("", each, refuri=f"commands.html#command-{each}") for each in kind.commands]
+            joined = [part for each in commands for part in (nodes.Text(", "), each)][1:]
+            short = str(kind.record).rpartition(".")[2]
+            record = pending_xref(
+                "", nodes.literal(short, short), refdomain="py", reftype="obj", reftarget=kind.record,
+                refexplicit=True, refwarn=True,
+            )  # fmt: skip
+            rows.append([_code(name), [nodes.Text(kind.about)], joined, [record]])
+        return [table_node(("Kind", "Content", "Written by", "In Python"), rows, (15, 40, 15, 30))]
+
+
 def _code(text: str) -> list[nodes.Node]:
     return [nodes.literal(text, text)]
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("fields", Fields)
+    app.add_directive("result-kinds", ResultKinds)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

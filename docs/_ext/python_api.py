@@ -1,4 +1,4 @@
-"""Reference of the Python modules: one page for the names of `vanedamp`, one for each public module of its parts.
+"""Reference of the Python modules: a page for each group of public names and each public module of the parts.
 
 Docstrings of the project are plain text: paragraphs, indented examples, and lists of "name  meaning" or of
 "name: meaning; name: meaning". They are turned into reStructuredText here.
@@ -49,6 +49,8 @@ PARTS = (
     Part("vanedamp.coupling.contacts"),
     Part("vanedamp.coupling.scene"),
     Part("vanedamp.coupling.scene.contact_laws"),
+    Part("vanedamp.coupling.scene.elements"),
+    Part("vanedamp.coupling.scene.shapes"),
     Part("vanedamp.coupling.scene.waveforms"),
     Part("vanedamp.coupling.response", ("response", "restart_state", "sector_response", "spot_stress", "steady_state")),
     Part("vanedamp.coupling.sweep", ("sweep", "record", "steady_states")),
@@ -59,9 +61,12 @@ PARTS = (
     Part("vanedamp.coupling.exponents"),
     Part("vanedamp.coupling.strength"),
     Part("vanedamp.coupling.transients", ("ramp", "ramp_record", "ring_down", "ring_down_record", "lewis")),
+    Part("vanedamp.studies", ("parallel_sweep",)),
     Part("vanedamp.studies.case"),
     Part("vanedamp.studies.optimisation"),
     Part("vanedamp.studies.life", ("study", "life", "record", "slow")),
+    Part("vanedamp.studies.report", ("page", "results")),
+    Part("vanedamp.studies.export", ("export", "record")),
     Part("vanedamp.studies.identification", ("study", "tables", "data", "search", "record", "density", "deviations")),
 )
 
@@ -85,13 +90,23 @@ def members(module: ModuleType) -> list[str]:
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """Yield name and text of the pages."""
-    names = "".join(_entry(name, getattr(vanedamp, name)) for name in vanedamp.__all__)
-    yield "vanedamp", _titled("vanedamp") + ".. automodule:: vanedamp\n   :no-members:\n\n" + names
+    """Yield name and text of the pages: indices of the public names and of parts, and what they lead to."""
+    groups = [group for group in vanedamp._GROUPS if all(group.homes.values())]  # not that of the parts
+    lists = "".join(
+        f":doc:`{group.title} <{_page_of(group)}>`: {group.about}\n\n"
+        + "".join(_line(f":py:obj:`~vanedamp.{name}`", getattr(vanedamp, name)) for name in group.homes)
+        + "\n"
+        for group in groups
+    )
+    yield "vanedamp", _titled("vanedamp") + ".. py:module:: vanedamp\n\n" + lists + _toctree(map(_page_of, groups))
+    for group in groups:
+        entries = "".join(_entry(name, getattr(vanedamp, name)) for name in group.homes)
+        yield _page_of(group), _titled(group.title) + f"{group.about[0].upper()}{group.about[1:]}.\n\n" + entries
     for part in PARTS:
-        entries = "".join(f"   {name}\n" for name in modules(part))
+        inner = [each.package for each in PARTS if each.package.rpartition(".")[0] == part.package]
+        lines = "".join(_line(f":doc:`{name}`", import_module(name)) for name in (*inner, *modules(part)))
         about = f".. automodule:: {part.package}\n   :no-members:\n\n"
-        yield part.package, _titled(part.package) + about + ".. toctree::\n   :maxdepth: 1\n\n" + entries
+        yield part.package, _titled(part.package) + about + lines + "\n" + _toctree([*inner, *modules(part)])
         for name in modules(part):
             text = f".. automodule:: {name}\n   :member-order: bysource\n"
             listed = members(import_module(name))
@@ -99,6 +114,20 @@ def pages() -> Iterator[tuple[str, str]]:
                 name,
                 _titled(name) + text + (f"   :members: {', '.join(listed)}\n" if listed else "   :no-members:\n"),
             )
+
+
+def _page_of(group: Any) -> str:
+    return f"names-{group.title.lower().replace(' ', '-')}"
+
+
+def _line(link: str, value: Any) -> str:
+    """Return an item of a list: a link and the first paragraph of a docstring."""
+    text = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
+    return f"- {link}: {_inline(text)}\n"
+
+
+def _toctree(names: Iterable[str]) -> str:
+    return ".. toctree::\n   :hidden:\n\n" + "".join(f"   {name}\n" for name in names)
 
 
 def _entry(name: str, value: Any) -> str:

@@ -26,6 +26,7 @@ from vanedamp.rom.ring.sector_ring import load_ring
 from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.file_kinds import RESULT_KINDS, ResultKind
 from vanedamp.studies.hot_spots import spot_lines
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.designs import designs
@@ -55,15 +56,26 @@ def run(arguments: Namespace) -> None:
     kind, variables, attributes = load_any(path)
     record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
     checkpoint = kind.endswith(_CHECKPOINT)
-    what, command, figures = _KINDS.get(kind.removesuffix(_CHECKPOINT), (kind, None, _any))
-    what = f"what {what} had finished" if checkpoint else what
-    found = [Fact("command", f"vanedamp {command}" if command else None), *_origin(record)]
+    known = _kind(kind.removesuffix(_CHECKPOINT))
+    what = f"what {known.about} had finished" if checkpoint else known.about
+    found = [
+        Fact("command", f"vanedamp {' or '.join(known.commands)}" if known.commands else None),
+        Fact("record", known.record, "", "in Python"),
+        *_origin(record),
+    ]
     with decoding(path):
+        figures = _FIGURES.get(kind, _any)
         found += [Fact("finished", record.attributes.get("finished"))] if checkpoint else figures(record)
     sizes = {} if checkpoint else _sizes(variables)
     found += [Fact("sizes", sizes), Fact("warnings", _warnings(record))]
     result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
     write_result(arguments, result, fact_lines(f"{path}: {kind}, {what}", found))
+
+
+def _kind(name: str) -> ResultKind:
+    """Return a kind of results; of a checkpoint, whose kind has the name of its command, that of the command."""
+    of_command = (kind for kind in RESULT_KINDS.values() if name in kind.commands)
+    return RESULT_KINDS.get(name) or next(of_command, ResultKind(name, (), None))
 
 
 def _nested(value: Any) -> Any:
@@ -302,27 +314,10 @@ def _warnings(record: _Record) -> list[str]:
     return list(found)
 
 
-#: kinds of records: in words, the command that writes them, and their figures
-_KINDS: dict[str, tuple[str, str | None, Callable[[_Record], Iterator[Fact]]]] = {
-    "modes": ("a modal analysis", "modal", _modes),
-    "calibration": ("a case calibrated with measurements", "calibrate", _calibration),
-    "campbell": ("a Campbell diagram", "campbell", _campbell),
-    "ring-modes": ("the modes of a ring", "ring", _ring),
-    "reduced-model": ("the reduced model of a structure", "reduce or import", _reduced),
-    "ring-model": ("the reduced model of a ring", "reduce", _ring_model),
-    "ring-sectors": ("the reduced model of a ring, by sectors", "reduce", _ring_model),
-    "mistuning": ("amplification of a mistuned ring", "ring", _mistuning),
-    "response": ("the response of a scene", "run", _response),
-    "sweep": ("responses of a scene over a grid", "sweep", _sweep),
-    "ensemble": ("responses of a scene over samples of its ranges", "run or sweep", _ensemble),
-    "orbits": ("branches of periodic orbits", "orbits", _orbits),
-    "ramp": ("run-ups and run-downs", "ramp", _ramp),
-    "ring_down": ("a ring-down", "ringdown", _ring_down),
-    "optimisation": ("an optimisation", "optimise", _optimisation),
-    "life": ("the life of a damper", "life", _life),
-    "identification": ("numbers of a scene from measurements", "identify", _identification),
-    "deviations": ("deviations of a ring's sectors from measurements", "identify", _any),
-    "optimise": ("an optimisation", "optimise", _any),
-    "calibrate": ("a calibration", "calibrate", _any),
-    "system-matrices": ("matrices of finite elements", None, _any),
-}
+#: figures of the kinds of records that have some of their own
+_FIGURES: dict[str, Callable[[_Record], Iterator[Fact]]] = {
+    "modes": _modes, "calibration": _calibration, "campbell": _campbell, "ring-modes": _ring,
+    "reduced-model": _reduced, "ring-model": _ring_model, "ring-sectors": _ring_model, "mistuning": _mistuning,
+    "response": _response, "sweep": _sweep, "ensemble": _ensemble, "orbits": _orbits, "ramp": _ramp,
+    "ring_down": _ring_down, "optimisation": _optimisation, "life": _life, "identification": _identification,
+}  # fmt: skip

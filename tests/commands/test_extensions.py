@@ -9,75 +9,18 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
+from tests.docs.test_examples import examples_of
 from tests.tools.processes import ROOT, environment, without_stages
 from vanedamp.studies.cli import BAD_INPUT, main
 
-#: a command that writes a record of its own kind
-COMMAND = '''
-"""Masses of the bodies of a scene over that of the structure."""
-
-from vanedamp.studies.commands.support.arguments import input_file, output_file
-
-SUMMARY = "masses of the bodies over that of the structure"
-
-
-def add_arguments(parser):
-    input_file("SCENE.toml")(parser)
-    output_file("MASSES.h5")(parser)
-    parser.add_argument("--table", metavar="FILE.csv", help="the ratios as a table")
-
-
-def run(arguments):
-    from vanedamp import Scene
-    from vanedamp.files.store import Variable, save, write_csv
-    from vanedamp.studies.commands.support.outputs import check_outputs
-
-    outputs = check_outputs(arguments, table=(".csv",))
-    scene = Scene.load(arguments.input)
-    outputs.keep(scene.files)
-    ratios = [damper.mass / scene.structure.mass for damper in scene.damper]
-    save(arguments.output, "body-masses", {"ratio": Variable(ratios, ("body",))}, {"provenance": {"by": "acme 1.0"}})
-    if arguments.table:
-        write_csv(arguments.table, ("ratio",), [[ratio] for ratio in ratios])
-    print(f"bodies of {sum(ratios):.4f} of the mass")
-'''
-#: the section that shows it, and its template
-SECTION = '''
-"""The masses of bodies."""
-
-import json
-
-import plotly.graph_objects as go
-
-from vanedamp.files.store import load as load_record
-from vanedamp.studies.report.results import Result
-
-KIND = "body-masses"
-
-
-def load(path):
-    values, attributes = load_record(path, KIND)
-    return Result(values["ratio"], json.loads(attributes["provenance"]))
-
-
-def section(results, page):
-    return [entry(file, result.record, page) for file, result in results.items()]
-
-
-def entry(file, ratios, page):
-    figure, rows = go.Figure(go.Bar(y=ratios)), [[ratio] for ratio in ratios]
-    return {"file": file, "total": ratios.sum(), "chart": page.chart("masses", figure, ("ratio",), rows, [file])}
-'''
-TEMPLATE = """
-{% for entry in section %}
-<h2>Masses of the bodies</h2>
-<p>{{ entry.file | name }}: together {{ "%.4f" | format(entry.total) }} of the structure{{ " in " ~ study if study }}.
-</p>
-{{ plot(entry.chart) }}
-{% endfor %}
-"""
+#: a command that writes a record of its own kind, the section that shows it and its template, and a format
+COMMAND, SECTION, TEMPLATE, FORMAT = (
+    next(example.text for example in examples_of(ROOT / "docs" / "howto" / "own_commands.md") if word in example.text)
+    for word in ("add_arguments(parser)", "KIND =", "endfor", "ENDINGS =")
+)
 BENCHMARK = '''
 """Time of a sum."""
 
@@ -163,6 +106,9 @@ body-masses = acme.command
 [vanedamp.report_sections]
 masses = acme.section
 
+[vanedamp.export_formats]
+npz = acme.npz_format
+
 [vanedamp.benchmarks]
 sum = acme.benchmark
 
@@ -210,9 +156,10 @@ def install(folder, package, entry_points, **files):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder of packages with the one that adds all four."""
+    """A folder of packages with the one that adds all."""
     folder = tmp_path_factory.mktemp("site")
     parts = {"command__py": COMMAND, "section__py": SECTION, "section__html": TEMPLATE, "benchmark__py": BENCHMARK}
+    parts |= {"npz_format__py": FORMAT}
     parts |= {"law__py": LAW, "element__py": ELEMENT, "shape__py": SHAPE}
     install(folder, "acme", ENTRY_POINTS, **parts)
     return folder
@@ -284,6 +231,14 @@ def test_command_writes_a_record_that_the_report_shows(vanedamp, tmp_path):
     (link,) = re.findall(r'download="masses-0.csv" href="data:text/csv;charset=utf-8;base64,([^"]+)"', page)
     table = list(csv.DictReader(io.StringIO(base64.b64decode(link).decode())))
     assert [float(row["ratio"]) for row in table] == [0.025, 0.00675]
+
+
+def test_export_has_the_format(vanedamp, tmp_path):
+    succeeds(vanedamp("body-masses", "scene.toml", "-o", "masses.h5"))
+    succeeds(vanedamp("export", "masses.h5", "-o", "masses.npz"))
+    with np.load(tmp_path / "masses.npz") as arrays:
+        assert arrays["ratio"].tolist() == [0.025, 0.00675]
+    assert "all variables, without units: numpy" in " ".join(succeeds(vanedamp("export", "--help")).split())
 
 
 def test_results_of_a_study_know_it(vanedamp, tmp_path):

@@ -1,6 +1,10 @@
 """`vanedamp info`: what it says of the results of commands, against the records in the files."""
 
+import ast
+import inspect
 import json
+import pkgutil
+import re
 import subprocess
 import sys
 
@@ -11,9 +15,11 @@ import pytest
 import vanedamp as vd
 from tests.tools.extras import bare
 from tests.tools.input_files import DAMPED_BLOCK, SCENE
+from tests.tools.processes import ROOT
 from vanedamp.files.store import Variable, digest, load_any, save
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.commands.info import _KINDS
+from vanedamp.studies.commands import COMMANDS
+from vanedamp.studies.file_kinds import RESULT_KINDS
 
 ROTATING = """
 [rotation]
@@ -101,6 +107,7 @@ def test_every_result_says_how_it_was_made(said, command):
     assert data["sizes"] == {
         name: size for item in variables.values() for name, size in zip(item.dims, item.values.shape, strict=True)
     }
+    assert inspect.isclass(pkgutil.resolve_name(data["record"]))
     assert lines.startswith(f"{command}.h5: {data['kind']}, ") and len(lines.splitlines()) > 6
     assert "[" not in lines and "{" not in lines  # words, no data
 
@@ -173,7 +180,23 @@ def test_foreign_and_broken_files_are_rejected(folder, monkeypatch, capfd):
         assert not out and len(error.splitlines()) == 1 and error.startswith(f"vanedamp: {file}: ") and reason in error
 
 
-def test_every_section_of_the_report_is_known():
-    from vanedamp.studies.report.results import sections
+def kinds_in_the_code():
+    """Kinds of the records that the product writes: what its modules and classes keep as KIND, or pass to `save`."""
+    for path in (path for part in ("modal", "rom", "coupling", "studies") for path in (ROOT / part).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Assign | ast.AnnAssign):
+                target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+                named = getattr(target, "id", "") in ("KIND", "_KIND", "_kind")
+            else:
+                call = isinstance(node, ast.Call) and len(node.args) > 2
+                named = call and getattr(node.func, "attr", getattr(node.func, "id", "")) == "save"
+            value = (node.args[1] if isinstance(node, ast.Call) else node.value) if named else None
+            if isinstance(value, ast.Constant) and re.fullmatch(r"[a-z_-]+", str(value.value)):
+                yield value.value
 
-    assert {kind for kind in sections() if not kind.startswith(".")} <= set(_KINDS)
+
+def test_every_kind_of_result_is_known():
+    assert set(kinds_in_the_code()) == set(RESULT_KINDS)
+    for kind in RESULT_KINDS.values():
+        assert inspect.isclass(pkgutil.resolve_name(kind.record)) and set(kind.commands) <= set(COMMANDS.own())
+    assert all(kind.commands for name, kind in RESULT_KINDS.items() if name != "system-matrices")

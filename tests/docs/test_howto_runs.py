@@ -1,5 +1,6 @@
 """Programs of docs/howto run as they stand, and the tutorial from its first block to its last."""
 
+import ast
 import re
 import shutil
 import tomllib
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from docs._ext.session import Session
-from tests.docs.test_examples import program, run
+from tests.docs.test_examples import examples_of, program, run
 from tests.tools.input_files import SCENE
 from tests.tools.processes import ROOT
 from tests.tools.small_structures import truss
@@ -18,6 +19,8 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.matrices import Patch
 from vanedamp.modal.matrix_files import write_folder
 
+#: of the repository, whose parts may take those of other packages
+PARTS = ("files", "modal", "rom", "coupling", "studies", "benchmarks")
 TUTORIAL = ROOT / "docs" / "tutorial" / "index.md"
 
 
@@ -62,6 +65,34 @@ def test_results_open_in_h5py(swept):
 def test_program_of_mpi_is_that_of_the_sweeps():
     """The one that tests/docs/test_examples.py runs."""
     assert program("supercomputer.md", "mpi4py") == program("sweeps.md", "mpi4py")
+
+
+#: what keeps parts of one kind
+PLACES = ("ExtensionPoint", "Registry", "Variants")
+
+
+def groups_in_the_code():
+    """Groups of entry points: words "vanedamp.NAME" in the calls that make the places of parts."""
+    for path in (path for part in PARTS for path in (ROOT / part).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in PLACES:
+                words = [word.value for word in node.args if isinstance(word, ast.Constant)]
+                yield from (word for word in words if re.fullmatch(r"vanedamp\.[a-z_]+", str(word)))
+
+
+def test_page_of_own_parts_has_every_group():
+    groups = list(groups_in_the_code())
+    assert len(groups) == 10 == len(set(groups))
+    listed = re.findall(r"^\| `(vanedamp\.\w+)` \|", (ROOT / "docs" / "howto" / "own_parts.md").read_text(), re.M)
+    assert sorted(listed) == sorted(groups)
+
+
+@pytest.mark.parametrize("word", ["Falling", "Triangle", "Chamfered", "Tether"])
+def test_own_parts_of_scenes(word, tmp_path):
+    """Each program prints what the page says: the law's restitution is its formula."""
+    page = examples_of(ROOT / "docs" / "howto" / "own_parts.md")
+    at = next(i for i, example in enumerate(page) if f"class {word}(" in example.text)
+    assert run(page[at].text, tmp_path).split() == page[at + 1].text.split()
 
 
 # the tutorial

@@ -498,7 +498,6 @@ def test_numba_is_as_assumed(text, tmp_path):
 
 def test_the_package_compiles_by_its_own_code_library():
     """Where a numba lacks what it needs, it takes numba's compiler in silence: slower, with the same results."""
-    from numba.core.compiler import Compiler
 
     from vanedamp.coupling.numerics.compiler import code_library
 

@@ -199,7 +199,9 @@ def test_it_rings_down():
 
 def test_tables_of_elements_are_read_written_and_described():
     scene = tethered()
-    assert validate(Scene, scene.to_dict(), "again") == scene
+    assert validate(Scene, scene.to_dict(), "again") == scene == Scene(**scene.to_dict())
+    with pytest.raises(InputError, match=r"^scene: tether\[0\].slack: should be greater than 0"):
+        Scene(**scene.to_dict() | {"tether": [{"damper": 0, "slack": -1.0, "stiffness": 1.0}]})
     assert scene.replace({"tether.0.slack": 2e-3}).to_dict()["tether"][0]["slack"] == 2e-3
     whole = schema(Scene)
     (table,) = options(whole, key_in(whole, "tether")["items"])
