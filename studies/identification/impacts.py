@@ -23,12 +23,12 @@ class Impacts(Model):
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by a run."""
-        self._follower.motion = None
+        self._follower = Follower(self.paths, self.count)
         return self.predict(values)
 
     def predict(self, values: np.ndarray) -> Predicted:
         """Return the prediction by the orbit near the last one, or by a run."""
-        self._follower.follow(self.scene(values), values)
+        self._follower.follow(self.scene(values))
         self._found, size = self._follower.sensitivity(), len(self.measured.at)
         found = self._nearest()
         if found is None or self._found is None:

@@ -58,13 +58,24 @@ class Model(ABC):
     def derivative(self, values: np.ndarray) -> Values:
         """Return derivatives (n, P) of the channels at values of the numbers that `predict` was called with last."""
 
-    def differences(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float) -> np.ndarray:
-        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges."""
+    def rough_derivative(self, values: np.ndarray) -> Values:
+        """Return derivatives that lead a search: these, or some that are faster and less exact."""
+        return self.derivative(values)
+
+    def differences(
+        self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float, here: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges.
+
+        here: its values at these numbers, for differences to one side.
+        """
         low, high = self._bounds
         columns = []
         for place, size in enumerate(step * (high - low)):
             ends = np.array([values, values])
-            ends[:, place] = np.clip(values[place] + [-size, size], low[place], high[place])
-            below, above = (of(end) for end in ends)
-            columns.append((above - below) / (ends[1, place] - ends[0, place]))
+            one = size if values[place] + size <= high[place] else -size
+            sides = [-size, size] if here is None else [0.0, one]
+            ends[:, place] = np.clip(values[place] + sides, low[place], high[place])
+            first = of(ends[0]) if here is None else here
+            columns.append((of(ends[1]) - first) / (ends[1, place] - ends[0, place]))
         return np.stack(columns, axis=-1)

@@ -81,6 +81,13 @@ def profile(fit: Fit, best: Minimum, covariance: np.ndarray, number: int, most: 
     return Profile(np.array(places), rise, (ends[0], ends[1]), (opened[0], opened[1]), better)
 
 
+def unfinished(best: Minimum, covariance: np.ndarray, number: int, most: float) -> Profile:
+    """Return what derivatives tell in place of the profile of a number: covariance (P, P), most as of `profile`."""
+    half, at = float(np.sqrt(most * covariance[number, number])), float(best.z[number])
+    ends = max(at - half, 0.0), min(at + half, 1.0)
+    return Profile(np.array([at]), np.zeros(1), ends, (ends[0] == 0.0, ends[1] == 1.0), None)
+
+
 def held_at(fit: Fit, near: Minimum, covariance: np.ndarray, number: int, value: float) -> Minimum:
     """Return the minimum with one coordinate at a value, from a minimum near it."""
     column, own = covariance[:, number], covariance[number, number]
