@@ -25,6 +25,8 @@ _NOTHING = 30.0
 _ASSUMED = 0.05
 #: changes of the sum of squares, relative, and of the coordinates at which the minimum is found; most predictions
 _CLOSE, _STILL, _MOST = 1e-5, 1e-7, 60
+#: the largest such changes, where motions do not repeat and predictions scatter
+_LEAST_CLOSE, _LEAST_STILL = 0.1, 1e-3
 #: change of the residuals, in standard deviations together, over which their derivatives are the same
 _STRAIGHT = 0.5
 
@@ -136,10 +138,13 @@ class Fit:
                 lowest[:] = [Minimum(full(part), float(found @ found), False)]
             return found
 
+        start = np.clip(z[free], 1e-9, 1 - 1e-9)
         try:
+            rough = self._scatter(full(start))  # changes below it are those of the runs' means
             found = least_squares(
-                residual, np.clip(z[free], 1e-9, 1 - 1e-9), lambda part: slopes.at(full(part))[:, free],
-                bounds=(0.0, 1.0), ftol=close, xtol=_STILL, gtol=1e-12, max_nfev=most,
+                residual, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
+                ftol=min(max(close, rough), _LEAST_CLOSE), xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12,
+                max_nfev=most,
             )  # fmt: skip
         except OutOfTime:
             if not lowest:
@@ -159,6 +164,16 @@ class Fit:
                 changed = changed or abs(own / self.deviations[place] - 1.0) > 0.02
                 self.deviations[place] = own
         return changed
+
+    def _scatter(self, z: np.ndarray) -> float:
+        """Return the relative standard deviation of the sum of squares by those of means of runs; 0 without."""
+        found, residual = self.predict(z), self.residual(z)
+        errors = [
+            error / np.hypot(deviation, error)
+            for (_, _, error), deviation in zip(self._pairs(found), self.deviations, strict=True)
+        ]
+        own = np.nan_to_num(np.concatenate(errors)) * residual[: sum(map(len, errors))]
+        return 2.0 * float(np.linalg.norm(own) / max(residual @ residual, np.finfo(float).tiny))
 
     def _residual(self, values: np.ndarray, found: list[Predicted]) -> np.ndarray:
         rows = []
