@@ -44,6 +44,8 @@ def run(arguments: Namespace) -> None:
 
 def _deviations(arguments: Namespace) -> None:
     """Find deviations of a ring's sectors."""
+    if arguments.budget is not None:
+        raise InputError("--budget: not for deviations of a ring, which take no search")
     if arguments.scene is not None:
         raise InputError("--scene: not for deviations of a ring; --output or --csv has them")
     table = load_table(arguments.input)

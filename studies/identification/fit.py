@@ -27,6 +27,7 @@ _ASSUMED = 0.05
 _CLOSE, _STILL, _MOST = 1e-5, 1e-7, 60
 #: the largest such changes, where motions do not repeat and predictions scatter
 _LEAST_CLOSE, _LEAST_STILL = 0.1, 1e-3
+_TINY = float(np.finfo(float).tiny)
 #: change of the residuals, in standard deviations together, over which their derivatives are the same
 _STRAIGHT = 0.5
 
@@ -140,7 +141,8 @@ class Fit:
 
         start = np.clip(z[free], 1e-9, 1 - 1e-9)
         try:
-            rough = self._scatter(full(start))  # changes below it are those of the runs' means
+            residual(start)
+            rough = self.scatter(full(start)) / max(lowest[0].misfit, _TINY)  # of which nothing better can be found
             found = least_squares(
                 residual, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
                 ftol=min(max(close, rough), _LEAST_CLOSE), xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12,
@@ -165,15 +167,15 @@ class Fit:
                 self.deviations[place] = own
         return changed
 
-    def _scatter(self, z: np.ndarray) -> float:
-        """Return the relative standard deviation of the sum of squares by those of means of runs; 0 without."""
+    def scatter(self, z: np.ndarray) -> float:
+        """Return the standard deviation of the sum of squares by those of means of runs; 0 where all motions repeat."""
         found, residual = self.predict(z), self.residual(z)
         errors = [
             error / np.hypot(deviation, error)
             for (_, _, error), deviation in zip(self._pairs(found), self.deviations, strict=True)
         ]
         own = np.nan_to_num(np.concatenate(errors)) * residual[: sum(map(len, errors))]
-        return 2.0 * float(np.linalg.norm(own) / max(residual @ residual, np.finfo(float).tiny))
+        return 2.0 * float(np.linalg.norm(own))
 
     def _residual(self, values: np.ndarray, found: list[Predicted]) -> np.ndarray:
         rows = []
