@@ -25,11 +25,11 @@ class Forecast:
         """Expect some parts of a kind from now on."""
         self._left[kind] = count
 
-    def ended(self, kind: str, seconds: float) -> None:
-        """Count a part that took some time."""
+    def ended(self, kind: str, seconds: float, kept: bool = False) -> None:
+        """Count a part that took some time; kept: by an earlier call, which says nothing of this one's rate."""
         self._left[kind] = max(self._left[kind] - 1, 0)
         self._seconds[kind].append(seconds)
-        if self._progress is None:
+        if self._progress is None or kept:
             return
         unit = max(self._mean(next(iter(self._left))), 1e-9)
         left = sum(count * self._mean(each) for each, count in self._left.items())

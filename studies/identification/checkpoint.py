@@ -20,7 +20,7 @@ class Part(NamedTuple):
     """A part that has ended: its result as plain data, its engine runs, and its time, s."""
 
     result: Any
-    count: Counter[str]
+    counts: Counter[str]
     seconds: float
 
 
@@ -33,8 +33,8 @@ class Checkpoint(SceneCheckpoint):
         self.parts: dict[int, Part] = {}
         if (found := self.read()) is not None:
             for number, text in zip(found[0]["number"].tolist(), found[0]["part"], strict=True):
-                result, count, seconds = json.loads(text)
-                self.parts[number] = Part(result, Counter(count), seconds)
+                result, counts, seconds = json.loads(text)
+                self.parts[number] = Part(result, Counter(counts), seconds)
 
     def add(self, number: int, part: Part) -> None:
         """Keep a part. Raises StoreError, such as for a full disk."""
@@ -55,4 +55,4 @@ def _told(study: IdentificationStudy) -> dict[str, Any]:
     noise = [[one.direction, *(channel.deviation for channel in one.channels)] for one in study.measured]
     values = hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
     search = {name: value for name, value in told["search"].items() if name != "budget"}
-    return json.loads(json.dumps(told | {"search": search, "noise": noise, "values": values}))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(told | {"search": search, "noise": noise, "values": values}))

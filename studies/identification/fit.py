@@ -133,7 +133,7 @@ class Fit:
 
         slopes, lowest = _Slopes(self), list[Minimum]()
 
-        def residual(part: np.ndarray) -> np.ndarray:
+        def off(part: np.ndarray) -> np.ndarray:
             found = self.residual(full(part))
             if not lowest or found @ found < lowest[0].misfit:
                 lowest[:] = [Minimum(full(part), float(found @ found), False)]
@@ -141,10 +141,10 @@ class Fit:
 
         start = np.clip(z[free], 1e-9, 1 - 1e-9)
         try:
-            residual(start)
+            off(start)
             rough = self.scatter(full(start)) / max(lowest[0].misfit, _TINY)  # of which nothing better can be found
             found = least_squares(
-                residual, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
+                off, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
                 ftol=min(max(close, rough), _LEAST_CLOSE), xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12,
                 max_nfev=most,
             )  # fmt: skip

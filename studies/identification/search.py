@@ -121,17 +121,17 @@ class _Work:
         self._forecast.expect(kind, len(calls))
         results: list[Any] = [None] * len(calls)
 
-        def take(place: int, part: Part) -> None:
+        def take(place: int, part: Part, kept: bool = False) -> None:
             results[place] = part.result
-            self.count += part.count
-            self._forecast.ended(kind, part.seconds)
+            self.count += part.counts
+            self._forecast.ended(kind, part.seconds, kept)
 
         missing = list[int]()
         for place in range(len(calls)):
-            if first + place in self._kept.parts:
-                take(place, self._kept.parts[first + place])
-            else:
+            if (part := self._kept.parts.get(first + place)) is None:
                 missing.append(place)
+            else:
+                take(place, part, True)
         for place, part in _called(self._executor, function, {place: calls[place] for place in missing}, self._until):
             if time.monotonic() <= self._until:
                 self._kept.add(first + place, part)
@@ -185,8 +185,7 @@ class _Work:
             given = self.study, self.fit.deviations, best, scatter, self.rise, self._until
             found = self._each("profiles", _profile, [(*given, number) for number in range(len(best.z))])
             told = [
-                unfinished(best, scatter, number, self.rise) if one is None
-                else Profile(np.array(one[0]), np.array(one[1]), *map(tuple, one[2:4]), one[4] and _read(one[4]))
+                unfinished(best, scatter, number, self.rise) if one is None else _read_profile(one)
                 for number, one in enumerate(found)
             ]  # fmt: skip
             better = [each.better for each in told if each.better is not None]
@@ -280,6 +279,11 @@ def _told(minimum: Minimum) -> list[Any]:
 
 def _read(told: list[Any]) -> Minimum:
     return Minimum(np.array(told[0]), told[1], told[2])
+
+
+def _read_profile(told: list[Any]) -> Profile:
+    z, rise, ends, opened, better = told
+    return Profile(np.array(z), np.array(rise), tuple(ends), tuple(opened), None if better is None else _read(better))
 
 
 @_part

@@ -45,9 +45,8 @@ def life(
         moments = list(_moments(_Course(study, wearing, runs, first), expected))
     ends, starts = {"new": study.scene, "end": wearing.worn(moments[-1].state)}, dict[str, Any]()
     for name, scene in ends.items():
-        done = runs.asked + study.starts // 2 * len(starts)
-        expected.total = runs.asked + study.starts
-        starts[name] = worst_start(scene, study.frequencies, executor, lambda own, _, done=done: expected(done + own))
+        expected.total, done = runs.asked + study.starts, runs.asked + study.starts // 2 * len(starts)
+        starts[name] = worst_start(scene, study.frequencies, executor, expected.after(done))
     return _record(study, wearing, runs, moments, starts, dict(provenance or {}), time.perf_counter() - started)
 
 
@@ -61,6 +60,10 @@ class _Expected:
         """Show how many runs are done."""
         if self._progress is not None:
             self._progress(done, max(self.total, done))
+
+    def after(self, done: int) -> Callable[[int, int], None]:
+        """Return the progress of runs that follow those done."""
+        return lambda own, _: self(done + own)
 
     def at(self, asked: int, before: Moment[Found] | None, now: Moment[Found], steps: Steps) -> None:
         """Expect the runs from a moment on, with those asked for so far and the moment before.

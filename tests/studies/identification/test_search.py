@@ -136,7 +136,7 @@ def test_commands(folder, capfd):
     assert main(["identify", "study.toml", "-o", "b.h5", "--budget", "1e-9", "--workers", "1"]) == 0
     captured = capfd.readouterr()
     assert captured.out.startswith("status budget") and "the budget of time is over" in captured.err
-    assert main(["identify", "study.toml", "-o", "b.h5", "--resume", "--workers", "1"]) == 0
+    assert main(["identify", "study.toml", "-o", "b.h5", "--workers", "1"]) == 0
     assert Identification.load("b.h5").best.tolist() == data["best"]
     assert sorted(path.name for path in folder.glob("*.partial")) == []
     assert main(["identify", "study.toml", "-o", "b.h5", "--resume"]) == BAD_INPUT
@@ -153,7 +153,7 @@ def test_commands(folder, capfd):
 
 @pytest.mark.parametrize("workers", [None, 2])
 def test_an_interrupted_search_resumes_bit_for_bit(found, tmp_path, workers):
-    file, calls, stops = tmp_path / "f.h5.partial", [], [1, 9, 14]
+    file, calls, stops = tmp_path / "f.h5.partial", [], [1, 8, 5]
 
     def progress(done, total):
         calls.append((done, total))
@@ -162,11 +162,11 @@ def test_an_interrupted_search_resumes_bit_for_bit(found, tmp_path, workers):
 
     with nullcontext() if workers is None else WorkerPool(workers) as pool:
         while stops:
+            calls.clear()
             with pytest.raises(KeyboardInterrupt):
                 identify(study(), pool, progress, {"a": 1}, file)
             stops.pop(0)
-        kept = len(load(file, "identify-checkpoint")[0]["part"])
-        assert kept >= 9
+        assert len(load(file, "identify-checkpoint")[0]["part"]) == 14  # none is done again
         resumed = identify(study(), pool, progress, {"a": 1}, file)
     whole = found[0].to_json() | {"wall_time_s": resumed.wall_time_s}
     assert json.dumps(resumed.to_json(), sort_keys=True) == json.dumps(whole, sort_keys=True)
