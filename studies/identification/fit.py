@@ -16,6 +16,7 @@ from vanedamp.studies.identification.decay import Decay
 from vanedamp.studies.identification.forced import Forced
 from vanedamp.studies.identification.impacts import Impacts
 from vanedamp.studies.identification.model import Model, Predicted, Values
+from vanedamp.studies.identification.steady import Steady
 from vanedamp.studies.identification.study import IdentificationStudy
 
 _MODELS: dict[str, type[Model]] = {"forced": Forced, "decay": Decay, "impacts": Impacts}
@@ -61,6 +62,7 @@ class Fit:
         self.deviations = list(map(_assumed, self.channels) if deviations is None else map(float, deviations))
         self._priors = [(place, one.prior) for place, one in enumerate(study.numbers.values()) if one.prior]
         self._last: tuple[np.ndarray, list[Predicted]] | None = None
+        self._kept: list[Steady | None] = []
 
     @property
     def estimated(self) -> list[bool]:
@@ -81,6 +83,18 @@ class Fit:
             values = self.study.values(z)
             self._last = np.array(z), [model.predict(values) for model in self.models]
         return self._last[1]
+
+    def remember(self, z: np.ndarray) -> None:
+        """Keep the motions at z for `recall`."""
+        self.predict(z)
+        self._kept = [follower.leader for model in self.models for follower in model.followers]
+
+    def recall(self) -> None:
+        """Begin with the motions that were kept last: what follows depends on no place in between."""
+        followers = [follower for model in self.models for follower in model.followers]
+        for follower, leader in zip(followers, self._kept, strict=True):
+            follower.leader = leader
+        self._last = None
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return the residuals (N,), in standard deviations: of channels, then of priors."""

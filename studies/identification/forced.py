@@ -29,11 +29,11 @@ class Forced(Model):
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         super().__init__(study, measured, count)
         self._names = (measured.measure, *(["phase"] if len(measured.channels) > 1 else []))
-        self._followers = [Follower(study.paths, count) for _ in measured.at]
+        self.followers = [Follower(study.paths, count) for _ in measured.at]
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs; those that go up or down begin with the state of their neighbour."""
-        motions: list[Steady | None] = [None] * len(self._followers)
+        motions: list[Steady | None] = [None] * len(self.followers)
         before: RestartState | None = None
         for place, linked in self._order():
             scene = self._at(values, place)
@@ -45,18 +45,18 @@ class Forced(Model):
         """Return the prediction by runs, which begin with the last orbits where motions repeat."""
         before: RestartState | None = None
         for place, linked in self._order():
-            found = self._followers[place].follow(self._at(values, place), before if linked else None)
+            found = self.followers[place].follow(self._at(values, place), before if linked else None)
             before = _end(found)
-        return self._predicted([follower.motion for follower in self._followers])
+        return self._predicted([follower.motion for follower in self.followers])
 
     def derivative(self, values: np.ndarray) -> Values:
         """Return the derivatives: of orbits exact ones, of means of runs differences."""
-        of = np.array([self._slopes(values, place) for place in range(len(self._followers))]).transpose(1, 0, 2)
+        of = np.array([self._slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
         return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
 
     def rough_derivative(self, values: np.ndarray) -> Values:
         """Return the derivatives of the runs that `predict` made, and let the next ones begin with these."""
-        of = np.array([self._rough_slopes(values, place) for place in range(len(self._followers))]).transpose(1, 0, 2)
+        of = np.array([self._rough_slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
         return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
 
     def _order(self) -> Iterator[tuple[int, bool]]:
@@ -70,7 +70,7 @@ class Forced(Model):
 
     def _slopes(self, values: np.ndarray, place: int) -> np.ndarray:
         """Return derivatives (c, P) of the channels at a place."""
-        follower = self._followers[place]
+        follower = self.followers[place]
         found, motion = follower.sensitivity(), follower.motion
         if found is not None:
             return np.array([found.derivatives[name] for name in self._names])
@@ -80,7 +80,7 @@ class Forced(Model):
 
     def _rough_slopes(self, values: np.ndarray, place: int) -> np.ndarray:
         """Return derivatives (c, P) of the channels at a place, by differences of runs to one side."""
-        follower = self._followers[place]
+        follower = self.followers[place]
         if (motion := follower.motion) is None or not motion.repeats:
             return self._slopes(values, place)
         here, figures = self._figures(motion)[0], partial(self._beside, place, motion)
@@ -90,7 +90,7 @@ class Forced(Model):
 
     def _beside(self, place: int, motion: Steady, moved: np.ndarray) -> np.ndarray:
         """Return the measured quantities (c,) with values (P,) of the numbers near those of a motion."""
-        return self._figures(self._followers[place].beside(self._at(moved, place)) or motion)[0]
+        return self._figures(self.followers[place].beside(self._at(moved, place)) or motion)[0]
 
     def _at(self, values: np.ndarray, place: int) -> Scene | None:
         return self.scene(values, {FREQUENCY: float(self.measured.at[place])})

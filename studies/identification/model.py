@@ -13,6 +13,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.identification.data import Measured
+from vanedamp.studies.identification.steady import Follower
 from vanedamp.studies.identification.study import IdentificationStudy
 
 #: arrays by the names of a measurement's channels
@@ -32,11 +33,12 @@ class Predicted(NamedTuple):
 
 
 class Model(ABC):
-    """What scenes say of one measurement. count: of engine runs, to which it adds."""
+    """What scenes say of one measurement. followers: of its steady motions; count: of engine runs, to which it adds."""
 
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         self.measured, self.paths, self.count = measured, study.paths, count
         self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
+        self.followers: list[Follower] = []
         self._points = Points(study.base.replace(measured.changes))
 
     def scene(self, values: np.ndarray, further: Mapping[str, float] | None = None) -> Scene | None:

@@ -304,7 +304,6 @@ def _profile(
     until: float, number: int,
 ) -> tuple[list[Any], Counter[str]]:  # fmt: skip
     fit = Fit(study, deviations, until)
-    fit.predict(best.z)
     z, rise, ends, opened, better = profile(fit, best, scatter, number, most)
     return [z.tolist(), rise.tolist(), list(ends), list(opened), None if better is None else _told(better)], fit.count
 

@@ -16,6 +16,8 @@ LEVEL = 0.95
 #: how closely the end of an interval is found, as a fraction of its rise's root, and where the misfit scatters because
 #: motions do not repeat; most profile points a side
 _CLOSE, _ROUGH, _MOST = 0.02, 0.2, 12
+#: width over the first step of the bracket in which an end lies, at which it is found, as where the misfit jumps
+_NARROW = 0.01
 #: change of the sum of squares, relative, at which the other numbers of a profile point are found
 _PROFILE = 1e-4
 #: first step of a profile of a number that the derivatives do not tell, as a fraction of its range
@@ -70,6 +72,7 @@ def profile(fit: Fit, best: Minimum, covariance: np.ndarray, number: int, most: 
     points = {float(best.z[number]): best}
     better: Minimum | None = None
     ends, opened, scatter = [], [], fit.scatter(best.z)
+    fit.remember(best.z)
     close = min(max(_CLOSE, 0.5 * scatter / most), _ROUGH)
     for way in (-1.0, 1.0):
         end, is_open = _end(fit, best, covariance, number, most, close, way, points)
@@ -115,6 +118,7 @@ def _end(
     for _ in range(_MOST):
         if at == inner[0]:
             return bound, True
+        fit.recall()
         found = held_at(fit, inner[2], covariance, number, float(at))
         points[float(at)] = found
         root = float(np.sqrt(max(found.misfit - best.misfit, 0.0)))
@@ -126,6 +130,8 @@ def _end(
             inner = (float(at), root, found)
         else:
             outer = (float(at), root)
+        if outer is not None and abs(outer[0] - inner[0]) < _NARROW * min(step, abs(bound - start)):
+            break
         if outer is None:
             ahead = start + (at - start) * min(goal / max(root, 0.25 * goal), 4.0) * 1.02
             at = min(ahead, bound) if way > 0 else max(ahead, bound)

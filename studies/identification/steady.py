@@ -45,7 +45,8 @@ class Steady(NamedTuple):
 class Follower:
     """The steady motion of a scene, followed as numbers of it change.
 
-    paths: of the numbers; motion: the last one found, None before and where there is none; count: of engine runs.
+    paths: of the numbers; motion: the last one found, None before and where there is none; leader: the motion that runs
+    begin with, if any; count: of engine runs.
     Runs are followed rather than orbits: a passage of the period map, which has derivatives, takes about as long as
     a thousand periods without.
     """
@@ -53,25 +54,22 @@ class Follower:
     def __init__(self, paths: tuple[str, ...], count: Counter[str]) -> None:
         self.paths, self._count = paths, count
         self.motion: Steady | None = None
-        self._leader: Steady | None = None
+        self.leader: Steady | None = None
 
     def follow(self, scene: Scene | None, before: RestartState | None = None) -> Steady | None:
         """Return the motion of a scene: a run from one that repeats, or else from a state or the scene's own start.
 
-        That one changes with `lead` and `sensitivity` only, between which motions depend on the scene alone.
+        That one changes with `lead` and `sensitivity`, and where a run from it has no end, such as in a narrower gap.
         """
-        if scene is None:
-            self.motion = None
-        elif self._leader is not None:
-            self.motion = self.beside(scene)
-        else:
+        self.motion = None if self.leader is None else self.beside(scene)
+        if self.motion is None and scene is not None:
             self.motion = settled(run(scene, before, self._count), self._count)
             self.lead()
         return self.motion
 
     def lead(self) -> None:
         """Let runs begin with the last motion from now on, if it repeats."""
-        self._leader = self.motion if self.motion is not None and self.motion.repeats else None
+        self.leader = self.motion if self.motion is not None and self.motion.repeats else None
 
     def sensitivity(self) -> Sensitivity | None:
         """Return the derivatives of the last motion, as an orbit, which leads; None where it has none."""
@@ -85,7 +83,7 @@ class Follower:
 
     def beside(self, scene: Scene | None) -> Steady | None:
         """Return the motion of a scene that differs little from the last one, which stays the last one."""
-        leader = self._leader or self.motion
+        leader = self.leader or self.motion
         return None if scene is None or leader is None else run(scene, leader.restart, self._count)
 
 
