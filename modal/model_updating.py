@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,8 @@ _BETTER = 0.1
 _PAIRINGS = 4
 # further modes that are computed, so that one that moves up is not lost
 _SPARE = 4
+#: part of the stiffness below which the rest is round-off of the assembly
+_ROUND_OFF = 1e-12
 # of the largest singular value of the sensitivities: below it two factors do the same to all frequencies
 _ALIKE = 1e-6
 
@@ -112,7 +115,8 @@ def tune(
     keep       of evaluations, from an interrupted call
 
     Least squares on the logarithms of the factors (Gauss-Newton in a trust region) with exact sensitivities; the modes
-    are tracked by their MAC, so that they may cross.
+    are tracked by their MAC, so that they may cross. One factor on the whole stiffness leaves the shapes as they are:
+    after one eigenvalue problem the rest is in closed form.
 
     Raises TuningError, also for frequencies that the tuned modes miss by more than 5 %, and where other modes would
     meet them far better, or with far less change of the factors unless `modes` are named. These come from the best
@@ -207,6 +211,7 @@ def _other_pairing(
         trial = _Problem(
             problem.matrices, problem.parts, problem.target, None, meant.tolist(), problem.least, problem.keep
         )
+        trial.scaled_from(before)
         fit = _fit(trial, np.zeros(found.x.size), -np.log(LIMIT))
         problem.evaluations += trial.evaluations
         waiting.append(trial.nearest(trial.at(fit.x).all_hz))
@@ -243,6 +248,13 @@ class _State:
     residual: np.ndarray
     jacobian: np.ndarray
 
+    def scaled(self, factor: float, modes: np.ndarray, target: np.ndarray) -> _State:
+        """Return the state of some modes (n,) with the whole stiffness times a factor; target (n,): Hz."""
+        all_hz = self.all_hz * np.sqrt(factor)
+        whole, own = np.full((len(modes), 1), 0.5), np.array_equal(modes, self.indices)
+        mac = self.mac if own else np.ones(len(modes))
+        return _State(all_hz, all_hz[modes], modes, mac, np.log(all_hz[modes] / target), whole)
+
 
 @dataclass(eq=False)
 class _Followed:
@@ -268,6 +280,7 @@ class _Problem:
     least: float
     keep: Keep = not_kept
     evaluations: int = 0
+    _first: _State | None = None
     _point: np.ndarray | None = None
     _state: _State | None = None
     _origin: _Followed | None = None
@@ -277,6 +290,20 @@ class _Problem:
         self._check(self.modes)
         self.meant = np.arange(self.target.size) if self.modes is None else np.asarray(self.modes, dtype=int)
         self.count = min(int(self.meant.max()) + 1 + _SPARE, self.matrices.free.size)
+
+    @cached_property
+    def scales(self) -> bool:
+        """Whether there is one factor, on the whole stiffness, up to round-off."""
+        if len(self.parts) != 1:
+            return False
+        [part] = self.parts.values()
+        rest = abs(self.matrices.stiffness - part)
+        return bool(rest.max() <= _ROUND_OFF * abs(part).max())
+
+    def scaled_from(self, untuned: _State) -> None:
+        """Take the untuned state of other modes, where one factor scales all of them."""
+        if self.scales:
+            self._first = untuned.scaled(1.0, self.meant, self.target)
 
     def system(self, point: np.ndarray) -> SystemMatrices:
         """Return the matrices with these factors."""
@@ -311,6 +338,8 @@ class _Problem:
         return np.asarray(modes)
 
     def _evaluate(self, point: np.ndarray) -> _State:
+        if self._first is not None:
+            return self._first.scaled(float(np.exp(point[0])), self._first.indices, self.target)
         self.evaluations += 1
         shapes: np.ndarray | None = None  # of an evaluation that was kept they are not known
 
@@ -330,6 +359,8 @@ class _Problem:
         state = _State(**self.keep(solved))
         self._followed = _Followed(np.array(point), state.indices, shapes)
         self._origin = self._origin or self._followed
+        if self.scales and not point.any():
+            self._first = state
         return state
 
     def _shapes(self, modes: _Followed) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Any
 
@@ -18,9 +19,15 @@ from vanedamp.studies.band import drive
 STARTS = {"independent": "at rest", "up": "going up", "down": "going down"}
 
 
-def worst_start(scene: Scene, frequencies: np.ndarray, executor: Executor | None = None) -> dict[str, Any]:
+def worst_start(
+    scene: Scene,
+    frequencies: np.ndarray,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
     """Return the worst of a scene over frequencies (f,), Hz, and starts, as plain data.
 
+    progress: called with the number of runs done and their total.
     starts: their number, 1 for a method that cannot begin with the state of another run; direction, frequency (Hz) and
     peak_ratio of the highest mean of peaks; maximum_ratio: largest amplitude of all; None without any; not_ok: points.
     """
@@ -28,7 +35,7 @@ def worst_start(scene: Scene, frequencies: np.ndarray, executor: Executor | None
     for frequency in frequencies.tolist():
         for path, value in drive(scene, frequency).items():
             axes.setdefault(path, []).append(value)
-    found = sweep(scene.replace({"sweep": axes}), executor)
+    found = sweep(scene.replace({"sweep": axes}), executor, progress)
     ok, worst = found.status == "ok", points_of_designs(found)[0][0]
     start, place = np.unravel_index(worst, found.shape)
     mean, largest = (

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from vanedamp.studies.checkout import CheckoutCommand
 from vanedamp.studies.commands.support.arguments import (
+    budget,
     count,
     family_count,
     hertz,
@@ -258,9 +259,10 @@ COMMANDS = (
             input_file("STUDY.toml"), output_file("IDENTIFICATION.h5"),
             argument("--scene", metavar="TUNED.toml", help="the scene with the numbers found"),
             argument("--csv", metavar="FILE.csv", help="deviations by sector, as [mistuning.stiffness] reads them"),
-            json_file, workers,
+            json_file, workers, budget, resume,
         ),
         writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)}, takes=("identification", "deviations"),
+        checkpoint=True,
     ),
     Command(
         "report", "one HTML page of results", 100,

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.identification.deviations import identify_deviations, load_table, save
-from vanedamp.studies.identification.record import Identification
+from vanedamp.studies.identification.record import Identification, IdentificationStatus
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.summary import number_texts, proposal_text
@@ -32,13 +33,19 @@ def run(arguments: Namespace) -> None:
     with workers(arguments.workers) as pool:
         compile_engine([study.base], pool)
         with progress("identify") as report:
-            found = identify(study, pool, report, {"versions": versions()})
+            found = identify(
+                study, pool, report, {"versions": versions()}, arguments.checkpoint, budget=arguments.budget
+            )
     lines = _summary(found)
     write_result(arguments, found.to_json(), lines, found.notes, output=found.save, scene=found.save_scene)
+    if arguments.checkpoint is not None and found.status is not IdentificationStatus.BUDGET:
+        clear(arguments.checkpoint)
 
 
 def _deviations(arguments: Namespace) -> None:
     """Find deviations of a ring's sectors."""
+    if arguments.budget is not None:
+        raise InputError("--budget: not for deviations of a ring, which take no search")
     if arguments.scene is not None:
         raise InputError("--scene: not for deviations of a ring; --output or --csv has them")
     table = load_table(arguments.input)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,6 +16,7 @@ from vanedamp.studies.identification.decay import Decay
 from vanedamp.studies.identification.forced import Forced
 from vanedamp.studies.identification.impacts import Impacts
 from vanedamp.studies.identification.model import Model, Predicted, Values
+from vanedamp.studies.identification.steady import Steady
 from vanedamp.studies.identification.study import IdentificationStudy
 
 _MODELS: dict[str, type[Model]] = {"forced": Forced, "decay": Decay, "impacts": Impacts}
@@ -23,8 +26,15 @@ _NOTHING = 30.0
 _ASSUMED = 0.05
 #: changes of the sum of squares, relative, and of the coordinates at which the minimum is found; most predictions
 _CLOSE, _STILL, _MOST = 1e-5, 1e-7, 60
+#: the largest such changes, where motions do not repeat and predictions scatter
+_LEAST_CLOSE, _LEAST_STILL = 0.1, 1e-3
+_TINY = float(np.finfo(float).tiny)
 #: change of the residuals, in standard deviations together, over which their derivatives are the same
 _STRAIGHT = 0.5
+
+
+class OutOfTime(Exception):
+    """The time that a search may take is over."""
 
 
 class Minimum(NamedTuple):
@@ -39,16 +49,20 @@ class Fit:
     """Predictions of all measurements, and their weighted residuals (N,) with derivatives (N, P).
 
     Numbers are given by coordinates z (P,) from 0 to 1 between their bounds (IdentificationStudy.coordinates).
-    deviations: standard deviation of each channel; count: of engine runs and passages.
+    deviations: standard deviation of each channel; until: when the search must end, s on the monotonic clock; count: of
+    engine runs and passages.
     """
 
-    def __init__(self, study: IdentificationStudy, deviations: Sequence[float] | None = None) -> None:
-        self.study, self.count = study, Counter[str]()
+    def __init__(
+        self, study: IdentificationStudy, deviations: Sequence[float] | None = None, until: float = math.inf
+    ) -> None:
+        self.study, self.until, self.count = study, until, Counter[str]()
         self.models = [_MODELS[one.kind](study, one, self.count) for one in study.measured]
         self.channels: list[Channel] = [channel for one in study.measured for channel in one.channels]
         self.deviations = list(map(_assumed, self.channels) if deviations is None else map(float, deviations))
         self._priors = [(place, one.prior) for place, one in enumerate(study.numbers.values()) if one.prior]
         self._last: tuple[np.ndarray, list[Predicted]] | None = None
+        self._kept: list[Steady | None] = []
 
     @property
     def estimated(self) -> list[bool]:
@@ -62,11 +76,25 @@ class Fit:
         return float(residual @ residual)
 
     def predict(self, z: np.ndarray) -> list[Predicted]:
-        """Return the predictions of all measurements."""
+        """Return the predictions of all measurements. Raises OutOfTime."""
         if self._last is None or not np.array_equal(self._last[0], z):
+            if time.monotonic() > self.until:
+                raise OutOfTime
             values = self.study.values(z)
             self._last = np.array(z), [model.predict(values) for model in self.models]
         return self._last[1]
+
+    def remember(self, z: np.ndarray) -> None:
+        """Keep the motions at z for `recall`."""
+        self.predict(z)
+        self._kept = [follower.leader for model in self.models for follower in model.followers]
+
+    def recall(self) -> None:
+        """Begin with the motions that were kept last: what follows depends on no place in between."""
+        followers = [follower for model in self.models for follower in model.followers]
+        for follower, leader in zip(followers, self._kept, strict=True):
+            follower.leader = leader
+        self._last = None
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return the residuals (N,), in standard deviations: of channels, then of priors."""
@@ -83,11 +111,11 @@ class Fit:
         """Return the differences (n,) of the channels, not weighted; nan where the model says nothing."""
         return [channel.difference(values) for channel, values, _ in self._pairs(self.predict(z))]
 
-    def jacobian(self, z: np.ndarray) -> np.ndarray:
-        """Return the derivatives (N, P) of the residuals by the coordinates."""
+    def jacobian(self, z: np.ndarray, rough: bool = False) -> np.ndarray:
+        """Return the derivatives (N, P) of the residuals by the coordinates; rough: as they lead a search."""
         values, found = self.study.values(z), self.predict(z)
         slope, rows = self.study.slope(values), list[np.ndarray]()
-        of = [model.derivative(values) for model in self.models]
+        of = [model.rough_derivative(values) if rough else model.derivative(values) for model in self.models]
         for (channel, model, error), derivative, deviation in zip(
             self._pairs(found), self._each(of), self.deviations, strict=True
         ):
@@ -103,7 +131,10 @@ class Fit:
         return [each * self.study.slope(values) for each in self._each([m.derivative(values) for m in self.models])]
 
     def minimum(self, z: np.ndarray, held: Sequence[int] = (), close: float = _CLOSE, most: int = _MOST) -> Minimum:
-        """Return the minimum near a start, some coordinates held."""
+        """Return the minimum near a start, some coordinates held; the lowest place so far if the time is over.
+
+        Raises OutOfTime before the first prediction.
+        """
         free = np.setdiff1d(np.arange(len(z)), held)
         if not len(free):
             residual = self.residual(z)
@@ -114,12 +145,27 @@ class Fit:
             whole[free] = part
             return whole
 
-        slopes = _Slopes(self)
-        found = least_squares(
-            lambda part: self.residual(full(part)), np.clip(z[free], 1e-9, 1 - 1e-9),
-            lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0), ftol=close, xtol=_STILL, gtol=1e-12,
-            max_nfev=most,
-        )  # fmt: skip
+        slopes, lowest = _Slopes(self), list[Minimum]()
+
+        def off(part: np.ndarray) -> np.ndarray:
+            found = self.residual(full(part))
+            if not lowest or found @ found < lowest[0].misfit:
+                lowest[:] = [Minimum(full(part), float(found @ found), False)]
+            return found
+
+        start = np.clip(z[free], 1e-9, 1 - 1e-9)
+        try:
+            off(start)
+            rough = self.scatter(full(start)) / max(lowest[0].misfit, _TINY)  # of which nothing better can be found
+            found = least_squares(
+                off, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
+                ftol=min(max(close, rough), _LEAST_CLOSE), xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12,
+                max_nfev=most,
+            )  # fmt: skip
+        except OutOfTime:
+            if not lowest:
+                raise
+            return lowest[0]
         return Minimum(full(found.x), float(2.0 * found.cost), bool(found.status > 0))
 
     def estimate(self, z: np.ndarray) -> bool:
@@ -134,6 +180,16 @@ class Fit:
                 changed = changed or abs(own / self.deviations[place] - 1.0) > 0.02
                 self.deviations[place] = own
         return changed
+
+    def scatter(self, z: np.ndarray) -> float:
+        """Return the standard deviation of the sum of squares by those of means of runs; 0 where all motions repeat."""
+        found, residual = self.predict(z), self.residual(z)
+        errors = [
+            error / np.hypot(deviation, error)
+            for (_, _, error), deviation in zip(self._pairs(found), self.deviations, strict=True)
+        ]
+        own = np.nan_to_num(np.concatenate(errors)) * residual[: sum(map(len, errors))]
+        return 2.0 * float(np.linalg.norm(own))
 
     def _residual(self, values: np.ndarray, found: list[Predicted]) -> np.ndarray:
         rows = []
@@ -171,7 +227,7 @@ class _Slopes:
     def at(self, z: np.ndarray) -> np.ndarray:
         """Return the derivatives (N, P)."""
         if self._last is None or float(np.linalg.norm(self._last[1] @ (z - self._last[0]))) > _STRAIGHT:
-            self._last = np.array(z), self._fit.jacobian(z)
+            self._last = np.array(z), self._fit.jacobian(z, rough=True)
         return self._last[1]
 
 

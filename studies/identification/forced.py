@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -28,11 +29,11 @@ class Forced(Model):
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         super().__init__(study, measured, count)
         self._names = (measured.measure, *(["phase"] if len(measured.channels) > 1 else []))
-        self._followers = [Follower(study.paths, count) for _ in measured.at]
+        self.followers = [Follower(study.paths, count) for _ in measured.at]
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs; those that go up or down begin with the state of their neighbour."""
-        motions: list[Steady | None] = [None] * len(self._followers)
+        motions: list[Steady | None] = [None] * len(self.followers)
         before: RestartState | None = None
         for place, linked in self._order():
             scene = self._at(values, place)
@@ -41,16 +42,21 @@ class Forced(Model):
         return self._predicted(motions)
 
     def predict(self, values: np.ndarray) -> Predicted:
-        """Return the prediction by orbits near the last ones, and by runs where there are none."""
+        """Return the prediction by runs, which begin with the last orbits where motions repeat."""
         before: RestartState | None = None
         for place, linked in self._order():
-            found = self._followers[place].follow(self._at(values, place), values, before if linked else None)
+            found = self.followers[place].follow(self._at(values, place), before if linked else None)
             before = _end(found)
-        return self._predicted([follower.motion for follower in self._followers])
+        return self._predicted([follower.motion for follower in self.followers])
 
     def derivative(self, values: np.ndarray) -> Values:
         """Return the derivatives: of orbits exact ones, of means of runs differences."""
-        of = np.array([self._slopes(values, place) for place in range(len(self._followers))]).transpose(1, 0, 2)
+        of = np.array([self._slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
+        return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
+
+    def rough_derivative(self, values: np.ndarray) -> Values:
+        """Return the derivatives of the runs that `predict` made, and let the next ones begin with these."""
+        of = np.array([self._rough_slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
         return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
 
     def _order(self) -> Iterator[tuple[int, bool]]:
@@ -64,17 +70,27 @@ class Forced(Model):
 
     def _slopes(self, values: np.ndarray, place: int) -> np.ndarray:
         """Return derivatives (c, P) of the channels at a place."""
-        follower = self._followers[place]
+        follower = self.followers[place]
         found, motion = follower.sensitivity(), follower.motion
         if found is not None:
             return np.array([found.derivatives[name] for name in self._names])
         if motion is None:
             return np.zeros((len(self._names), len(values)))
+        return self.differences(values, partial(self._beside, place, motion), _EXACT if motion.repeats else _MEAN)
 
-        def figures(moved: np.ndarray) -> np.ndarray:
-            return self._figures(follower.near(self._at(moved, place)) or motion)[0]
+    def _rough_slopes(self, values: np.ndarray, place: int) -> np.ndarray:
+        """Return derivatives (c, P) of the channels at a place, by differences of runs to one side."""
+        follower = self.followers[place]
+        if (motion := follower.motion) is None or not motion.repeats:
+            return self._slopes(values, place)
+        here, figures = self._figures(motion)[0], partial(self._beside, place, motion)
+        found = self.differences(values, figures, _EXACT, here)
+        follower.lead()
+        return found
 
-        return self.differences(values, figures, _MEAN if motion.orbit is None else _EXACT)
+    def _beside(self, place: int, motion: Steady, moved: np.ndarray) -> np.ndarray:
+        """Return the measured quantities (c,) with values (P,) of the numbers near those of a motion."""
+        return self._figures(self.followers[place].beside(self._at(moved, place)) or motion)[0]
 
     def _at(self, values: np.ndarray, place: int) -> Scene | None:
         return self.scene(values, {FREQUENCY: float(self.measured.at[place])})
@@ -85,7 +101,7 @@ class Forced(Model):
             return np.array([getattr(steady.orbit, self._names[0])]), 0.0
         response = steady.response or over_orbit(steady, self.count)
         figures = np.array([getattr(response, name) for name in self._names])
-        error = response.amplitude_mean_confidence if steady.orbit is None else 0.0
+        error = 0.0 if steady.repeats else response.amplitude_mean_confidence
         return figures, (error or 0.0) / _NORMAL / max(response.amplitude_mean, _TINY)
 
     def _predicted(self, motions: Sequence[Steady | None]) -> Predicted:

@@ -19,17 +19,17 @@ class Impacts(Model):
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         super().__init__(study, measured, count)
         self._found: Sensitivity | None = None
-        self._follower = Follower(study.paths, count)
+        self.followers = [Follower(study.paths, count)]
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by a run."""
-        self._follower.motion = None
+        self.followers = [Follower(self.paths, self.count)]
         return self.predict(values)
 
     def predict(self, values: np.ndarray) -> Predicted:
         """Return the prediction by the orbit near the last one, or by a run."""
-        self._follower.follow(self.scene(values), values)
-        self._found, size = self._follower.sensitivity(), len(self.measured.at)
+        self.followers[0].follow(self.scene(values))
+        self._found, size = self.followers[0].sensitivity(), len(self.measured.at)
         found = self._nearest()
         if found is None or self._found is None:
             return Predicted(
@@ -49,7 +49,7 @@ class Impacts(Model):
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Return numbers (n,) of the impacts nearest to the measured ones and how much later they are, s; or None."""
-        motion = self._follower.motion
+        motion = self.followers[0].motion
         if self._found is None or motion is None or motion.orbit is None or not len(self._found.impact_time):
             return None
         period = motion.orbit.periods / motion.scene.frequency

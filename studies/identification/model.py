@@ -13,6 +13,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.identification.data import Measured
+from vanedamp.studies.identification.steady import Follower
 from vanedamp.studies.identification.study import IdentificationStudy
 
 #: arrays by the names of a measurement's channels
@@ -32,11 +33,12 @@ class Predicted(NamedTuple):
 
 
 class Model(ABC):
-    """What scenes say of one measurement. count: of engine runs, to which it adds."""
+    """What scenes say of one measurement. followers: of its steady motions; count: of engine runs, to which it adds."""
 
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         self.measured, self.paths, self.count = measured, study.paths, count
         self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
+        self.followers: list[Follower] = []
         self._points = Points(study.base.replace(measured.changes))
 
     def scene(self, values: np.ndarray, further: Mapping[str, float] | None = None) -> Scene | None:
@@ -58,13 +60,24 @@ class Model(ABC):
     def derivative(self, values: np.ndarray) -> Values:
         """Return derivatives (n, P) of the channels at values of the numbers that `predict` was called with last."""
 
-    def differences(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float) -> np.ndarray:
-        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges."""
+    def rough_derivative(self, values: np.ndarray) -> Values:
+        """Return derivatives that lead a search: these, or some that are faster and less exact."""
+        return self.derivative(values)
+
+    def differences(
+        self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float, here: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges.
+
+        here: its values at these numbers, for differences to one side.
+        """
         low, high = self._bounds
         columns = []
         for place, size in enumerate(step * (high - low)):
             ends = np.array([values, values])
-            ends[:, place] = np.clip(values[place] + [-size, size], low[place], high[place])
-            below, above = (of(end) for end in ends)
-            columns.append((above - below) / (ends[1, place] - ends[0, place]))
+            one = size if values[place] + size <= high[place] else -size
+            sides = [-size, size] if here is None else [0.0, one]
+            ends[:, place] = np.clip(values[place] + sides, low[place], high[place])
+            first = of(ends[0]) if here is None else here
+            columns.append((of(ends[1]) - first) / (ends[1, place] - ends[0, place]))
         return np.stack(columns, axis=-1)

@@ -46,6 +46,9 @@ class IdentificationStatus(StrEnum):
     """the model misses the measurements by more than their noise: its numbers and intervals are not to be trusted"""
     NOT_CONVERGED = "not_converged"
     """the search has not reached a minimum"""
+    BUDGET = "budget"
+    """its budget of time has ended the search: the best numbers so far, with intervals by derivatives where there is no
+    profile"""
 
 
 class Misfit(NamedTuple):

@@ -6,8 +6,10 @@ import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
+from contextlib import suppress
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,12 @@ import numpy as np
 from scipy.stats import qmc
 
 from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.sweep.worker import SweepError
 from vanedamp.files.store import frozen
+from vanedamp.studies.forecast import Forecast
+from vanedamp.studies.identification.checkpoint import Checkpoint, Part
 from vanedamp.studies.identification.data import forced
-from vanedamp.studies.identification.fit import Fit, Minimum
+from vanedamp.studies.identification.fit import Fit, Minimum, OutOfTime
 from vanedamp.studies.identification.forced import Forced
 from vanedamp.studies.identification.record import Identification, Proposal
 from vanedamp.studies.identification.statistics import (
@@ -28,6 +33,7 @@ from vanedamp.studies.identification.statistics import (
     profile,
     shrunk,
     threshold,
+    unfinished,
 )
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.summary import outcome, sentence_of
@@ -52,84 +58,136 @@ def identify(
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
+    checkpoint: str | Path | None = None,
+    budget: float | None = None,
 ) -> Identification:
     """Find the numbers of a scene that measurements tell, in a study or its TOML file.
 
     executor: of concurrent.futures, for candidates, starts and profiles; the answer does not depend on it; progress:
-    called with the parts done and of those expected. Raises InputError for a bad file.
+    called with the work done and what is expected in all, in candidates; checkpoint: a file to which finished parts are
+    written and from which an interrupted search, or one whose budget ended, resumes; the caller removes it once the
+    result is safe (files.checkpoint_file.clear); budget: s, in place of the study's. Raises InputError for a bad file,
+    SweepError where workers are lost.
     """
     began = time.perf_counter()
     study = study if isinstance(study, IdentificationStudy) else IdentificationStudy.load(study)
-    work = _Work(study, executor, progress)
-    with stage("candidates"):
-        starts = work.starts()
-    with stage("minima"):
-        minima = work.minima(starts)
-        best = work.estimated(minima[0])
-    with stage("profiles"):
-        best, profiles = work.profiles(best)
-    with stage("next measurement"):
-        proposal = work.proposal(best)
+    with Checkpoint(checkpoint, study, provenance or {}) as kept:
+        work = _Work(study, executor, progress, kept, study.search.budget if budget is None else budget)
+        with stage("candidates"):
+            starts = work.starts()
+        with stage("minima"):
+            minima = work.minima(starts)
+            best = work.estimated(minima[0])
+        with stage("profiles"):
+            best, profiles = work.profiles(best)
+        with stage("next measurement"):
+            proposal = work.proposal(best)
     return _identification(study, work, best, minima, profiles, proposal, dict(provenance or {}), began)
 
 
 class _Work:
-    """The steps of an identification. deviations: of the channels, as far as they are known."""
+    """The steps of an identification.
+
+    fit: of the best numbers, with the deviations of the channels as far as they are known; over: what the budget of
+    time, s, has cut, in words, or "".
+    """
 
     def __init__(
-        self, study: IdentificationStudy, executor: Executor | None, progress: Callable[[int, int], None] | None
-    ) -> None:
-        self.study, self.count = study, Counter[str]()
+        self, study: IdentificationStudy, executor: Executor | None, progress: Callable[[int, int], None] | None,
+        kept: Checkpoint, budget: float | None,
+    ) -> None:  # fmt: skip
+        self.study, self.count, self.over = study, Counter[str](), ""
         self.fit = Fit(study)
-        self._map: Callable[..., Iterable[Any]] = map if executor is None else executor.map
-        self._progress, self._done = progress, 0
-        asked = math.prod(map(len, study.proposals().values())) if study.proposals() else 0
-        self._expected = study.search.candidates + study.search.starts + len(study.numbers) + asked
+        self._executor, self._kept, self._asked = executor, kept, 0
+        self._until = math.inf if budget is None else time.monotonic() + budget
+        numbers, asked = len(study.numbers), study.proposals()
+        parts = {
+            "candidates": (study.search.candidates, "candidates", 1.0),
+            "minima": (study.search.starts, "candidates", 8.0 + 4.0 * numbers),
+            "profiles": (numbers, "minima", 2.5),
+            "proposals": (
+                math.prod(map(len, asked.values())) if asked else 0, "candidates",
+                (numbers + 10.0) / sum(len(one.at) for one in study.measured),
+            ),
+        }  # fmt: skip
+        self._forecast = Forecast(progress, parts)
 
-    def _each(self, function: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
-        """Return the results of calls, in order, and count their engine runs."""
-        results = []
-        for result, count in self._map(function, *arguments):
-            self.count += count
-            results.append(result)
-            self._done += 1
-            if self._progress is not None:
-                self._progress(self._done, max(self._expected, self._done))
+    def _each(self, kind: str, function: Callable[..., Part], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """Return the results of calls in order, None of those that the budget has cut, and count their engine runs.
+
+        Those kept are not called.
+        """
+        first, self._asked = self._asked, self._asked + len(calls)
+        self._forecast.expect(kind, len(calls))
+        results: list[Any] = [None] * len(calls)
+
+        def take(place: int, part: Part, kept: bool = False) -> None:
+            results[place] = part.result
+            self.count += part.counts
+            self._forecast.ended(kind, part.seconds, kept)
+
+        missing = list[int]()
+        for place in range(len(calls)):
+            if (part := self._kept.parts.get(first + place)) is None:
+                missing.append(place)
+            else:
+                take(place, part, True)
+        for place, part in _called(self._executor, function, {place: calls[place] for place in missing}, self._until):
+            if time.monotonic() <= self._until:
+                self._kept.add(first + place, part)
+                missing.remove(place)
+            take(place, part)
+        if missing and not self.over:
+            self.over = f"{len(missing)} of {len(calls)} {kind} and what follows are not finished"
         return results
 
-    def starts(self) -> list[np.ndarray]:
-        """Return the best candidates that are apart, the best first: of the first guess and a Sobol sequence."""
+    def starts(self) -> list[tuple[np.ndarray, float]]:
+        """Return the best candidates that are apart, the best first: of the first guess and a Sobol sequence.
+
+        Each with its misfit, inf where it was not tried.
+        """
         table, tried = self.study.search, candidates(self.study)
-        misfits = self._each(_quick, itertools.repeat(self.study), tried)
-        chosen: list[np.ndarray] = []
+        found = self._each("candidates", _quick, [(self.study, z) for z in tried])
+        misfits = [math.inf if misfit is None else misfit for misfit in found]
+        chosen: list[tuple[np.ndarray, float]] = []
         for place in np.argsort(misfits, kind="stable"):
             z = tried[place]
-            if all(np.abs(z - other).max() > _APART for other in chosen):
-                chosen.append(z)
+            if all(np.abs(z - other).max() > _APART for other, _ in chosen):
+                chosen.append((z, misfits[place]))
         return chosen[: table.starts]
 
-    def minima(self, starts: Sequence[np.ndarray]) -> list[Minimum]:
+    def minima(self, starts: Sequence[tuple[np.ndarray, float]]) -> list[Minimum]:
         """Return the minima near some starts, the best first."""
-        found = self._each(_minimum, itertools.repeat(self.study), starts)
-        return sorted(found, key=lambda each: each.misfit)
+        found = self._each("minima", _minimum, [(self.study, z, self._until) for z, _ in starts])
+        each = (Minimum(z, m, False) if one is None else _read(one) for one, (z, m) in zip(found, starts, strict=True))
+        return sorted(each, key=lambda one: one.misfit)
 
     def estimated(self, best: Minimum) -> Minimum:
         """Return the minimum, close, with the deviations that are not given from its residuals."""
-        for _ in range(_ROUNDS):
-            changed = self.fit.estimate(best.z)
-            best = self.fit.minimum(best.z)
-            if not changed:
-                break
+        self.fit.until = self._until
+        try:
+            for _ in range(_ROUNDS):
+                changed = self.fit.estimate(best.z)
+                best = self.fit.minimum(best.z)
+                if not changed:
+                    break
+        except OutOfTime:
+            self.over = self.over or "the best minimum and what follows are not finished"
+        self.fit.until = math.inf
         return best
 
     def profiles(self, best: Minimum) -> tuple[Minimum, list[Profile]]:
         """Return the profiles of all numbers, and the minimum, which is another if a profile has found a better one."""
         for _ in range(_ROUNDS):
+            if self.over:
+                self.fit.estimate(best.z)
             scatter = covariance(self.fit.jacobian(best.z))
-            told = self._each(
-                _profile, itertools.repeat(self.study), itertools.repeat(self.fit.deviations),
-                itertools.repeat(best), itertools.repeat(scatter), range(len(best.z)), itertools.repeat(self.rise),
-            )  # fmt: skip
+            given = self.study, self.fit.deviations, best, scatter, self.rise, self._until
+            found = self._each("profiles", _profile, [(*given, number) for number in range(len(best.z))])
+            told = [
+                unfinished(best, scatter, number, self.rise) if one is None else _read_profile(one)
+                for number, one in enumerate(found)
+            ]  # fmt: skip
             better = [each.better for each in told if each.better is not None]
             if not better:
                 break
@@ -157,13 +215,13 @@ class _Work:
             if channel.unit == "m" and channel.compare == "ratio"
         ]  # fmt: skip
         deviation = min(noise, default=_NOISE)
-        found = self._each(
-            _sensitivity, itertools.repeat(self.study), itertools.repeat(best.z),
-            [dict(zip(axes, place, strict=True)) for place in places],
-        )  # fmt: skip
+        calls = [(self.study, best.z, dict(zip(axes, place, strict=True))) for place in places]
+        found = self._each("proposals", _sensitivity, calls)
+        if self.over:
+            return None
         told = information(self.fit.jacobian(best.z))
         before = np.sqrt(np.diag(np.linalg.inv(told)))
-        after = shrunk(told, [row / deviation for row in found])
+        after = shrunk(told, [np.array(row) / deviation for row in found])
         return Proposal(tuple(axes), frozen(places), frozen(after / before), int(np.argmax(before)))
 
 
@@ -175,32 +233,85 @@ def candidates(study: IdentificationStudy) -> np.ndarray:
     return np.vstack([own, spread[: table.candidates - 1]])
 
 
+def _called(
+    executor: Executor | None, function: Callable[..., Part], calls: Mapping[int, tuple[Any, ...]], until: float
+) -> Iterator[tuple[int, Part]]:
+    """Yield the parts of calls as they end, with their places, but for those that the time has cut."""
+    if executor is None:
+        for place, call in calls.items():
+            if time.monotonic() > until:
+                return
+            with suppress(OutOfTime):
+                yield place, function(*call)
+        return
+    futures = dict[Future[Part], int]()
+    try:
+        if time.monotonic() <= until:
+            futures = {executor.submit(function, *call): place for place, call in calls.items()}
+        for future in as_completed(futures):
+            with suppress(OutOfTime, CancelledError):
+                yield futures[future], future.result()
+            if time.monotonic() > until:
+                for waiting in futures:
+                    waiting.cancel()
+    except BrokenExecutor as error:
+        raise SweepError(f"the workers are gone ({error}); run the same again to go on from the checkpoint") from error
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _part(work: Callable[..., tuple[Any, Counter[str]]]) -> Callable[..., Part]:
+    """Return a function of a worker that returns its part, of the result as plain data and the counts of another."""
+
+    @wraps(work)
+    def timed(*arguments: Any) -> Part:
+        began = time.perf_counter()
+        result, count = work(*arguments)
+        return Part(result, count, time.perf_counter() - began)
+
+    return timed
+
+
+def _told(minimum: Minimum) -> list[Any]:
+    return [minimum.z.tolist(), minimum.misfit, minimum.converged]
+
+
+def _read(told: list[Any]) -> Minimum:
+    return Minimum(np.array(told[0]), told[1], told[2])
+
+
+def _read_profile(told: list[Any]) -> Profile:
+    z, rise, ends, opened, better = told
+    return Profile(np.array(z), np.array(rise), tuple(ends), tuple(opened), None if better is None else _read(better))
+
+
+@_part
 def _quick(study: IdentificationStudy, z: np.ndarray) -> tuple[float, Counter[str]]:
     fit = Fit(study)
     return fit.quick(z), fit.count
 
 
-def _minimum(study: IdentificationStudy, z: np.ndarray) -> tuple[Minimum, Counter[str]]:
-    fit = Fit(study)
-    return fit.minimum(z, close=_ROUGH), fit.count
+@_part
+def _minimum(study: IdentificationStudy, z: np.ndarray, until: float) -> tuple[list[Any], Counter[str]]:
+    fit = Fit(study, until=until)
+    return _told(fit.minimum(z, close=_ROUGH)), fit.count
 
 
+@_part
 def _profile(
-    study: IdentificationStudy,
-    deviations: Sequence[float],
-    best: Minimum,
-    scatter: np.ndarray,
-    number: int,
-    most: float,
-) -> tuple[Profile, Counter[str]]:
-    fit = Fit(study, deviations)
-    fit.predict(best.z)
-    return profile(fit, best, scatter, number, most), fit.count
+    study: IdentificationStudy, deviations: Sequence[float], best: Minimum, scatter: np.ndarray, most: float,
+    until: float, number: int,
+) -> tuple[list[Any], Counter[str]]:  # fmt: skip
+    fit = Fit(study, deviations, until)
+    z, rise, ends, opened, better = profile(fit, best, scatter, number, most)
+    return [z.tolist(), rise.tolist(), list(ends), list(opened), None if better is None else _told(better)], fit.count
 
 
+@_part
 def _sensitivity(
     study: IdentificationStudy, z: np.ndarray, changes: Mapping[str, float]
-) -> tuple[np.ndarray, Counter[str]]:
+) -> tuple[list[list[float]], Counter[str]]:
     """Return the derivatives (1, P) of the logarithm of the amplitude in a measurement; 0 where it does not repeat."""
     values, count = study.values(z), Counter[str]()
     others = {path: value for path, value in changes.items() if path not in (FREQUENCY, *study.paths)}
@@ -209,9 +320,9 @@ def _sensitivity(
     predicted = model.predict(values)
     amplitude = predicted.values["amplitude"]
     if not (predicted.repeats[0] and np.isfinite(amplitude[0])):
-        return np.zeros((1, len(z))), count
-    slope = model.derivative(values)["amplitude"] * study.slope(values) / amplitude[:, None]
-    return np.nan_to_num(slope), count
+        return [[0.0] * len(z)], count
+    slope = model.rough_derivative(values)["amplitude"] * study.slope(values) / amplitude[:, None]
+    return np.nan_to_num(slope).tolist(), count
 
 
 def _identification(
@@ -226,10 +337,12 @@ def _identification(
     ended = np.array([study.values(each.z) for each in minima])
     squares = np.array([_squares(fit, each.z) for each in minima])
     apart = np.array([np.abs(each.z - best.z).max() > _OTHER for each in minima])
-    others = ended[apart & (squares < best.misfit + _AS_GOOD)]
+    least = _squares(fit, best.z) if work.over else best.misfit
+    found = np.array([each.converged or not work.over for each in minima])
+    others = ended[apart & found & (squares < least + _AS_GOOD)]
     data = _data(fit, best.z, scatter)
     cold = fit.quick(best.z)
-    status, notes = outcome(study, opened, interval, test, best.converged, others, cold, best.misfit)
+    status, notes = outcome(study, opened, interval, test, best.converged, others, cold, least, work.over)
     return Identification(
         study=study.to_json(), status=status, notes=notes, paths=study.paths,
         sentence=sentence_of(study.paths, values, interval, opened), best=frozen(values),
@@ -237,7 +350,7 @@ def _identification(
         open=frozen(opened, bool),
         profile_number=frozen(np.repeat(np.arange(len(profiles)), [len(own.z) for own in profiles]), int),
         profile_value=frozen(np.concatenate([study.along(place, own.z) for place, own in enumerate(profiles)])),
-        profile_rise=frozen(np.concatenate([own.rise for own in profiles])), threshold=work.rise, misfit=best.misfit,
+        profile_rise=frozen(np.concatenate([own.rise for own in profiles])), threshold=work.rise, misfit=least,
         test=test, minima=frozen(ended), minima_misfit=frozen(squares), deviation=frozen(fit.deviations),
         estimated=frozen(fit.estimated, bool), proposal=proposal, counts=dict(work.count + fit.count),
         wall_time_s=time.perf_counter() - began, scene=study.scene_at(values), provenance=provenance, **data,

@@ -13,13 +13,16 @@ from vanedamp.studies.identification.record import Misfit
 
 #: probability that an interval covers the truth
 LEVEL = 0.95
-#: how closely the end of an interval is found, as a fraction of its rise's root, and most profile points a side
-_CLOSE, _MOST = 0.02, 12
+#: how closely the end of an interval is found, as a fraction of its rise's root, and where the misfit scatters because
+#: motions do not repeat; most profile points a side
+_CLOSE, _ROUGH, _MOST = 0.02, 0.2, 12
+#: width over the first step of the bracket in which an end lies, at which it is found, as where the misfit jumps
+_NARROW = 0.01
 #: change of the sum of squares, relative, at which the other numbers of a profile point are found
 _PROFILE = 1e-4
 #: first step of a profile of a number that the derivatives do not tell, as a fraction of its range
 _FAR = 0.3
-#: fall of the sum of squares along a profile by which another minimum is better
+#: fall of the sum of squares along a profile by which another minimum is better, unless it scatters by more
 BETTER = 0.1
 #: variance of a number of which only the bounds are known, in units of their range
 _UNIFORM = 1.0 / 12.0
@@ -68,17 +71,26 @@ def profile(fit: Fit, best: Minimum, covariance: np.ndarray, number: int, most: 
     """
     points = {float(best.z[number]): best}
     better: Minimum | None = None
-    ends, opened = [], []
+    ends, opened, scatter = [], [], fit.scatter(best.z)
+    fit.remember(best.z)
+    close = min(max(_CLOSE, 0.5 * scatter / most), _ROUGH)
     for way in (-1.0, 1.0):
-        end, is_open = _end(fit, best, covariance, number, most, way, points)
+        end, is_open = _end(fit, best, covariance, number, most, close, way, points)
         ends.append(end)
         opened.append(is_open)
     lowest = min(points.values(), key=lambda each: each.misfit)
-    if lowest.misfit < best.misfit - BETTER:
+    if lowest.misfit < best.misfit - max(BETTER, scatter):
         better = lowest
     places = sorted(points)
     rise = np.array([points[place].misfit - best.misfit for place in places])
     return Profile(np.array(places), rise, (ends[0], ends[1]), (opened[0], opened[1]), better)
+
+
+def unfinished(best: Minimum, covariance: np.ndarray, number: int, most: float) -> Profile:
+    """Return what derivatives tell in place of the profile of a number: covariance (P, P), most as of `profile`."""
+    half, at = float(np.sqrt(most * covariance[number, number])), float(best.z[number])
+    ends = max(at - half, 0.0), min(at + half, 1.0)
+    return Profile(np.array([at]), np.zeros(1), ends, (ends[0] == 0.0, ends[1] == 1.0), None)
 
 
 def held_at(fit: Fit, near: Minimum, covariance: np.ndarray, number: int, value: float) -> Minimum:
@@ -91,7 +103,7 @@ def held_at(fit: Fit, near: Minimum, covariance: np.ndarray, number: int, value:
 
 
 def _end(
-    fit: Fit, best: Minimum, covariance: np.ndarray, number: int, most: float, way: float,
+    fit: Fit, best: Minimum, covariance: np.ndarray, number: int, most: float, close: float, way: float,
     points: dict[float, Minimum],
 ) -> tuple[float, bool]:  # fmt: skip
     """Return where a profile rises by `most` on one side, and whether it does not before the bound.
@@ -106,10 +118,11 @@ def _end(
     for _ in range(_MOST):
         if at == inner[0]:
             return bound, True
+        fit.recall()
         found = held_at(fit, inner[2], covariance, number, float(at))
         points[float(at)] = found
         root = float(np.sqrt(max(found.misfit - best.misfit, 0.0)))
-        if abs(root - goal) <= _CLOSE * goal:
+        if abs(root - goal) <= close * goal:
             return float(at), False
         if root < goal:
             if at == bound:
@@ -117,6 +130,8 @@ def _end(
             inner = (float(at), root, found)
         else:
             outer = (float(at), root)
+        if outer is not None and abs(outer[0] - inner[0]) < _NARROW * min(step, abs(bound - start)):
+            break
         if outer is None:
             ahead = start + (at - start) * min(goal / max(root, 0.25 * goal), 4.0) * 1.02
             at = min(ahead, bound) if way > 0 else max(ahead, bound)

@@ -1,12 +1,10 @@
-"""Steady motions of a scene whose numbers change little by little: each is found from the last one."""
+"""Steady motions of a scene whose numbers change little by little: each is found from one before."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
 from typing import NamedTuple
-
-import numpy as np
 
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
@@ -38,53 +36,55 @@ class Steady(NamedTuple):
             return self.orbit.map.restart_of(self.orbit.state)
         return None if self.response is None else self.response.final
 
+    @property
+    def repeats(self) -> bool:
+        """Whether the motion repeats."""
+        return self.response is None or periods_of(self.response.classification) is not None
+
 
 class Follower:
-    """The steady motion of a scene, followed as P numbers of it change.
+    """The steady motion of a scene, followed as numbers of it change.
 
-    paths: of the numbers; motion: the last one found, None before and where there is none; count: of engine runs.
+    paths: of the numbers; motion: the last one found, None before and where there is none; leader: the motion that runs
+    begin with, if any; count: of engine runs.
+    Runs are followed rather than orbits: a passage of the period map, which has derivatives, takes about as long as
+    a thousand periods without.
     """
 
     def __init__(self, paths: tuple[str, ...], count: Counter[str]) -> None:
         self.paths, self._count = paths, count
         self.motion: Steady | None = None
-        self._at = np.zeros(len(paths))
-        self._slope: np.ndarray | None = None
+        self.leader: Steady | None = None
 
-    def follow(self, scene: Scene | None, values: np.ndarray, before: RestartState | None = None) -> Steady | None:
-        """Return the motion of the scene with values (P,) of the numbers: a stable orbit, or else a run.
+    def follow(self, scene: Scene | None, before: RestartState | None = None) -> Steady | None:
+        """Return the motion of a scene: a run from one that repeats, or else from a state or the scene's own start.
 
-        The orbit is sought from the last one, moved by its derivatives; the run begins with a state or the scene's own.
+        That one changes with `lead` and `sensitivity`, and where a run from it has no end, such as in a narrower gap.
         """
-        found = None if scene is None else self._near(scene, values)
-        if found is None and scene is not None:
-            found = settled(run(scene, before, self._count), self._count)
-        self.motion, self._at, self._slope = found, values, None
-        return found
+        self.motion = None if self.leader is None else self.beside(scene)
+        if self.motion is None and scene is not None:
+            self.motion = settled(run(scene, before, self._count), self._count)
+            self.lead()
+        return self.motion
+
+    def lead(self) -> None:
+        """Let runs begin with the last motion from now on, if it repeats."""
+        self.leader = self.motion if self.motion is not None and self.motion.repeats else None
 
     def sensitivity(self) -> Sensitivity | None:
-        """Return the derivatives of the last motion; None where it has none."""
+        """Return the derivatives of the last motion, as an orbit, which leads; None where it has none."""
+        self.motion = settled(self.motion, self._count)
+        self.lead()
         if self.motion is None or self.motion.orbit is None:
             return None
         self._count["derivatives"] += 1
         found = sensitivity(self.motion.orbit, self.paths)
-        if found.status is not SensitivityStatus.OK:
-            return None
-        self._slope = found.state_derivative
-        return found
+        return found if found.status is SensitivityStatus.OK else None
 
-    def near(self, scene: Scene | None) -> Steady | None:
+    def beside(self, scene: Scene | None) -> Steady | None:
         """Return the motion of a scene that differs little from the last one, which stays the last one."""
-        if scene is None or self.motion is None:
-            return None
-        return self._near(scene, self._at) or run(scene, self.motion.restart, self._count)
-
-    def _near(self, scene: Scene, values: np.ndarray) -> Steady | None:
-        if self.motion is None or self.motion.orbit is None:
-            return None
-        last = self.motion.orbit
-        moved = 0.0 if self._slope is None else self._slope @ (values - self._at)
-        return _orbit(scene, last.periods, last.state + moved, self._count)
+        leader = self.leader or self.motion
+        return None if scene is None or leader is None else run(scene, leader.restart, self._count)
 
 
 def run(scene: Scene, start: RestartState | None, count: Counter[str]) -> Steady | None:
@@ -100,16 +100,11 @@ def settled(steady: Steady | None, count: Counter[str]) -> Steady | None:
     periods = None if response is None else periods_of(response.classification)
     if steady is None or response is None or response.final is None or periods is None:
         return steady
-    return _orbit(steady.scene, periods, response.final, count) or steady
-
-
-def _orbit(scene: Scene, periods: int, start: np.ndarray | RestartState, count: Counter[str]) -> Steady | None:
-    """Return the stable orbit near a state; None if there is none."""
-    passages = map_along(replace(scene, orbit=Table(periods=periods)))
-    orbit = newton.find_orbit(passages, start if isinstance(start, np.ndarray) else passages.state_of(start))
+    passages = map_along(replace(steady.scene, orbit=Table(periods=periods)))
+    orbit = newton.find_orbit(passages, passages.state_of(response.final))
     count["passages"] += orbit.iterations + 1
     good = orbit.status is OrbitStatus.OK and (orbit.undetermined or orbit.stable)
-    return Steady(scene, orbit, None) if good else None
+    return Steady(steady.scene, orbit, None) if good else steady
 
 
 def over_orbit(steady: Steady, count: Counter[str]) -> Response:

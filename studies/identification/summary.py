@@ -47,13 +47,16 @@ def proposal_text(paths: Sequence[str], proposal: Proposal) -> str:
 
 def outcome(
     study: IdentificationStudy, opened: np.ndarray, interval: np.ndarray, test: Misfit, converged: bool,
-    others: np.ndarray, cold: float, misfit: float,
+    others: np.ndarray, cold: float, misfit: float, over: str,
 ) -> tuple[IdentificationStatus, tuple[str, ...]]:  # fmt: skip
     """Return how an identification ended, and its notes.
 
-    others: (o, P) numbers of other minima that are as good; cold: misfit of runs from the scene's own start.
+    others: (o, P) numbers of other minima that are as good; cold: misfit of runs from the scene's own start; over: what
+    its budget of time has cut, in words, or "".
     """
-    notes = list(_notes(study, opened, interval, test, converged, others, cold, misfit))
+    notes = list(_notes(study, opened, interval, test, converged or bool(over), others, cold, misfit))
+    if over:
+        return IdentificationStatus.BUDGET, (f"the budget of time is over: {over}", *notes)
     if not converged:
         return IdentificationStatus.NOT_CONVERGED, tuple(notes)
     if test.larger:

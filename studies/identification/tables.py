@@ -114,6 +114,8 @@ class SearchTable:
     """best ones of these from which the search with derivatives begins"""
     seed: Annotated[Whole, Field(ge=0)] = 1
     """seed of the candidates"""
+    budget: Positive | None = None
+    """time after which the search ends with what it has found, and can be resumed (default: none) [s]"""
 
 
 @dataclass(frozen=True, config=STRICT)

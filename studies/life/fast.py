@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -71,12 +71,16 @@ class Runs(SceneCheckpoint):
     """
 
     def __init__(
-        self, path: str | Path | None, study: LifeStudy, executor: Executor | None, provenance: Mapping[str, Any]
-    ) -> None:
-        """Take up the file's runs. Raises InputError for a file of another study, or one that cannot be read."""
+        self, path: str | Path | None, study: LifeStudy, executor: Executor | None, provenance: Mapping[str, Any],
+        progress: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        """Take up the file's runs. progress: called with the number of runs done.
+
+        Raises InputError for a file of another study, or one that cannot be read.
+        """
         belongs = {"life": ("study", json.loads(json.dumps(tables(study.table))))}
         super().__init__(path, "life-checkpoint", study.scene, provenance, belongs)
-        self.study, self._executor = study, executor
+        self.study, self._executor, self._progress = study, executor, progress
         self.contacts: list[Contact] = []
         self._rows: list[np.ndarray] = []
         self.asked = self.trouble = 0
@@ -93,6 +97,7 @@ class Runs(SceneCheckpoint):
             self.contacts = self.contacts or contacts
             self._rows.append(row)
             self.changed()
+            self._progress(len(self._rows))
         rows = self._rows[self.asked - len(points) : self.asked]
         width = _RATES + 2 * len(self.contacts)
         found = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
@@ -14,7 +15,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.life.fast import Found, Runs
 from vanedamp.studies.life.record import LifeRecord, sentence_of
-from vanedamp.studies.life.slow import Moment, Steps, between, integrate
+from vanedamp.studies.life.slow import STAGES, Moment, Steps, between, integrate, steps_left
 from vanedamp.studies.life.study import LifeStudy, Wearing
 from vanedamp.studies.worst_start import worst_start
 
@@ -31,18 +32,55 @@ def life(
 ) -> LifeRecord:
     """Integrate the wear of a damper over the hours of its study, or until the reduction is lost with certainty.
 
-    progress: called with the hours done and all; checkpoint: a file to which finished runs are written and from which
-    an interrupted life resumes; the caller removes it once the result is safe (files.checkpoint_file.clear).
+    progress: called with the number of runs done and of those expected; checkpoint: a file to which finished runs are
+    written and from which an interrupted life resumes; the caller removes it once the result is safe
+    (files.checkpoint_file.clear).
     Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
     """
     started = time.perf_counter()
-    with Runs(checkpoint, study, executor, provenance or {}) as runs:
+    expected = _Expected(study, progress)
+    with Runs(checkpoint, study, executor, provenance or {}, expected) as runs:
         first = runs.at(study.scene)
         wearing = study.wearing(runs.contacts)
-        moments = list(_moments(_Course(study, wearing, runs, first), progress))
-    ends = {"new": study.scene, "end": wearing.worn(moments[-1].state)}
-    starts = {name: worst_start(scene, study.frequencies, executor) for name, scene in ends.items()}
+        moments = list(_moments(_Course(study, wearing, runs, first), expected))
+    ends, starts = {"new": study.scene, "end": wearing.worn(moments[-1].state)}, dict[str, Any]()
+    for name, scene in ends.items():
+        expected.total, done = runs.asked + study.starts, runs.asked + study.starts // 2 * len(starts)
+        starts[name] = worst_start(scene, study.frequencies, executor, expected.after(done))
     return _record(study, wearing, runs, moments, starts, dict(provenance or {}), time.perf_counter() - started)
+
+
+class _Expected:
+    """Progress in runs. total: of those expected so far."""
+
+    def __init__(self, study: LifeStudy, progress: Callable[[int, int], None] | None) -> None:
+        self._study, self._progress, self.total = study, progress, study.runs
+
+    def __call__(self, done: int) -> None:
+        """Show how many runs are done."""
+        if self._progress is not None:
+            self._progress(done, max(self.total, done))
+
+    def after(self, done: int) -> Callable[[int, int], None]:
+        """Return the progress of runs that follow those done."""
+        return lambda own, _: self(done + own)
+
+    def at(self, asked: int, before: Moment[Found] | None, now: Moment[Found], steps: Steps) -> None:
+        """Expect the runs from a moment on, with those asked for so far and the moment before.
+
+        The reduction goes on as since then; once it is lost, the time at which that was is halved a few times.
+        """
+        table, halved = self._study.table, 0
+        end, step = table.hours, 0.0 if table.steps is None else table.hours / table.steps
+        if before is not None:
+            step = now.time - before.time
+            left = now.found.reduction + now.found.reduction_confidence - table.threshold
+            falls = (before.found.reduction - now.found.reduction) / step
+            if falls > 0.0 and left > 0.0 and now.time + left / falls < end:
+                end = now.time + left / falls
+                halved = max(math.ceil(math.log2(step / (_CLOSE * table.hours))), 0)
+        evaluations = len(STAGES) * steps_left(now, end, step, steps) + halved
+        self.total = asked + evaluations * len(self._study.frequencies) + self._study.starts
 
 
 class _Course:
@@ -51,6 +89,11 @@ class _Course:
     def __init__(self, study: LifeStudy, wearing: Wearing, runs: Runs, first: Found) -> None:
         self.study, self.wearing, self._runs = study, wearing, runs
         self._new: Found | None = first
+
+    @property
+    def asked(self) -> int:
+        """Runs asked for so far."""
+        return self._runs.asked
 
     def rates(self, volume: np.ndarray) -> Found:
         """Return what is found with some wear."""
@@ -76,7 +119,7 @@ class _Course:
         return scale
 
 
-def _moments(course: _Course, progress: Callable[[int, int], None] | None) -> Iterator[Moment[Found]]:
+def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
     """Yield the moments, those between two steps as well where the threshold is passed."""
     table, before, damped = course.study.table, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
@@ -85,8 +128,7 @@ def _moments(course: _Course, progress: Callable[[int, int], None] | None) -> It
         if before is not None and _passes(before, now, table.threshold):
             yield from _halved(course, before, now)
         yield now
-        if progress is not None:
-            progress(round(now.time), round(table.hours))
+        expected.at(course.asked, before, now, steps)
         damped = damped or now.found.reduction >= table.threshold
         if damped and now.found.reduction + now.found.reduction_confidence < table.threshold:
             return

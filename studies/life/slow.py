@@ -14,8 +14,8 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 #: stages, their weights, and the difference of both orders
-_STAGES = ((0.5,), (0.0, 0.75), (2 / 9, 1 / 3, 4 / 9))
-_WEIGHTS = np.array(_STAGES[-1])
+STAGES = ((0.5,), (0.0, 0.75), (2 / 9, 1 / 3, 4 / 9))
+_WEIGHTS = np.array(STAGES[-1])
 _ERROR = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
 #: growth of a step at most and at least, and by how much it stays below what its error allows
 _GROWTH, _SHRINK, _SAFETY = 3.0, 0.2, 0.85
@@ -102,16 +102,35 @@ def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[n
     return state, (1 - s) * before.band + s * after.band
 
 
+def steps_left(now: Moment[Found], until: float, step: float, steps: Steps) -> int:
+    """Return about how many steps like the last one (0: none yet) lead from a moment to a time.
+
+    Its rates stay, so that scales, and the steps with them, grow by the same factor each time.
+    """
+    span, fastest = until - now.time, _fastest(now, steps)
+    step = step or _longest(now, span, steps)
+    if span <= 0.0 or step <= 0.0:
+        return 0
+    if fastest == 0.0 or steps.fixed is not None:
+        return int(np.ceil(span / step))
+    return int(np.ceil(np.log1p(span * fastest) / np.log1p(min(step * fastest, steps.reach))))
+
+
+def _fastest(now: Moment[Found], steps: Steps) -> float:
+    """Return the growth of the states per unit of time, over their scales, at most."""
+    return float(np.max(np.abs(now.found.rate) / steps.scale(now.state), initial=0.0))
+
+
 def _longest(now: Moment[Found], end: float, steps: Steps) -> float:
     """Return the step in which no state grows by more than its reach."""
-    fastest = float(np.max(np.abs(now.found.rate) / steps.scale(now.state), initial=0.0))
+    fastest = _fastest(now, steps)
     return min(end, steps.reach / fastest) if fastest > 0.0 else end
 
 
 def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float) -> tuple[Moment[Found], np.ndarray]:
     """Return the moment after a step, and by how much its error exceeds the confidence of the rates (k,)."""
     found = [now.found]
-    for weights in _STAGES:
+    for weights in STAGES:
         slope = sum(weight * one.rate for weight, one in zip(weights, found, strict=True))
         state = now.state + step * slope
         found.append(rates(state))

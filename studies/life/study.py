@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
@@ -22,7 +23,10 @@ from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplitude, scene_in
+from vanedamp.studies.worst_start import STARTS
 
+#: about how often a life is evaluated over its band
+_EVALUATIONS = 20
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
 
@@ -112,6 +116,16 @@ class LifeStudy(NamedTuple):
         if reference == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
         return cls(replace(scene, sweep={}), file.life, frozen(band), reference)
+
+    @property
+    def starts(self) -> int:
+        """Runs from other starts, of the damper as new and as worn."""
+        return 2 * len(self.frequencies) * (1 if why_no_restart(self.scene) else len(STARTS))
+
+    @property
+    def runs(self) -> int:
+        """About how many runs a life takes."""
+        return _EVALUATIONS * len(self.frequencies) + self.starts
 
     def wearing(self, contacts: Sequence[Contact]) -> Wearing:
         """Return how the scene wears at its contacts.

@@ -29,7 +29,7 @@ from vanedamp.studies.optimisation.record import Optimisation, Optimum
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
 from vanedamp.studies.optimisation.tolerances import estimate
 from vanedamp.studies.terminal import stage
-from vanedamp.studies.worst_start import worst_start, worst_words
+from vanedamp.studies.worst_start import STARTS, worst_start, worst_words
 
 #: generations of a search, at least
 _GENERATIONS = 5
@@ -57,8 +57,10 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     started, table = time.perf_counter(), study.table
     with stage("search as designed"):
         first, gradient = descend(study, trial.tried, trial.best_designs(trial.search(False, [])))
+    trial.begins(1)
     with stage("search within tolerances"):
         second = trial.search(True, trial.best_designs(first)) if len(trial.sample) > 1 else first
+    trial.begins(2)
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
@@ -74,10 +76,12 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     responses = {name: trial.response(design) for name, design in best.items()}
     curves = best if table.by_amplitude else {}
     headlines = {name: trial.headline(design, responses[name][0]) for name, design in curves.items()}
+    trial.begins(3)
     with stage("derivatives by tolerances"):
         estimates = {name: estimate(study, best[name], responses[name][0], trial.sample, trial.within) for name in best}
     with stage("runs from other starts"):
-        starts = {name: trial.worst_start(design) for name, design in curves.items()}
+        found = {design: trial.worst_start(design) for design in dict.fromkeys(curves.values())}
+    starts = {name: found[design] for name, design in curves.items()}
     took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": tables(table), "scene": study.scene.to_dict()},
@@ -134,12 +138,21 @@ class _Trial:
     ) -> None:
         self.study, self.sample = study, sample
         self.history: list[tuple[Design, float, bool]] = []
-        self.scenes = self.trouble = 0
+        self.scenes = self.trouble = self._others = 0
         self._executor, self._progress, self._kept = executor, progress, kept
         table = study.table
         self._variables = [n for n in Design._fields if len(set(getattr(table.variables, n))) > 1]
-        designs = table.evaluations * (1 + len(sample) * (len(sample) > 1)) + table.map.mass_ratio * table.map.gap_ratio
-        self._expected = len(study.frequencies) * designs
+        both = 2 if len(sample) > 1 else 1
+        searched = table.evaluations, (both - 1) * table.evaluations * len(sample)
+        self._designs = (
+            searched[0] + table.gradient_steps * table.by_amplitude, searched[1],
+            table.map.mass_ratio * table.map.gap_ratio + both * len(sample), both * len(STARTS) * table.by_amplitude,
+        )  # fmt: skip
+        self.begins(0)
+
+    def begins(self, number: int) -> None:
+        """Expect the designs of a stage, at most, and of those after it: both searches, the map, other starts."""
+        self._expected = self.scenes + len(self.study.frequencies) * sum(self._designs[number:])
 
     def optimum(self, design: Design) -> Optimum:
         """Return both amplitudes of a design."""
@@ -172,7 +185,9 @@ class _Trial:
     def worst_start(self, design: Design) -> dict[str, Any]:
         """Return the worst curve of a design as it is, from several starts (worst_start.worst_start)."""
         scene = self.study.scene_of(design, NO_DEVIATION, float(self.study.frequencies[0]))
-        return worst_start(scene, self.study.frequencies, self._executor)
+        found = worst_start(scene, self.study.frequencies, self._executor, lambda done, _: self._tell(done))
+        self._others += found["starts"] * len(self.study.frequencies)
+        return found
 
     def search(self, robust: bool, designs: Sequence[Design]) -> Design:
         """Return the best design by differential evolution, from the first of some designs or from a Latin hypercube.
@@ -263,7 +278,8 @@ class _Trial:
     def _tell(self, done: int) -> None:
         """Show progress: the runs done of the list at hand."""
         if self._progress is not None:
-            self._progress(self.scenes + done, max(self._expected, self.scenes + done))
+            done += self.scenes + self._others
+            self._progress(done, max(self._expected, done))
 
 
 _KEYS = (

@@ -233,14 +233,19 @@ class Identify(Stage):
 
     def work(self, tools: Tools) -> str:
         """Identify."""
+        from vanedamp.files.checkpoint_file import clear
         from vanedamp.studies.identification.search import identify
         from vanedamp.studies.terminal import progress
 
-        with progress(self.name) as report:
-            found = identify(self.file, tools.pool(), report, {"versions": versions()})
         record, scene = self.outputs
+        checkpoint = f"{record}.partial"
+        if tools.fresh:
+            clear(checkpoint)
+        with progress(self.name) as report:
+            found = identify(self.file, tools.pool(), report, {"versions": versions()}, checkpoint)
         found.save(record)
         found.save_scene(scene)
+        clear(checkpoint)
         tools.warn(found.notes)
         return f"{found.status.value}, {found.sentence.removesuffix('.')}"
 

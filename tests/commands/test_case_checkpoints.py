@@ -35,6 +35,8 @@ TUNED = (
 [calibration.tune]
 frequencies = [800.0, 1500.0]
 vary = ["material.default"]
+[support.elastic.top]
+normal = 1e6
 """
 )
 CASES = {

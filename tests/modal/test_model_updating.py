@@ -132,6 +132,21 @@ def test_one_factor_meets_one_frequency_with_any_mode(system):
     assert not tune(matrices, whole, [1.02 * first]).warnings
 
 
+@pytest.mark.parametrize("starts", [1, 3])
+def test_one_factor_on_the_whole_stiffness_is_a_closed_form(system, starts):
+    """Frequencies rise by the root of the factor: one eigenvalue problem, and another one confirms it."""
+    matrices, _ = system
+    before = solve_modes(matrices, 3).frequencies_hz
+    found = tune(matrices, {"all": matrices.stiffness}, [1.1 * before[0], 1.1 * before[2]], modes=[0, 2], starts=starts)
+    assert found.evaluations == 1
+    assert found.factors == pytest.approx([1.21], rel=1e-9)
+    confirmed = solve_modes(found.matrices, 3).frequencies_hz
+    assert found.after_hz == pytest.approx(confirmed[[0, 2]], rel=1e-9)
+    assert found.sensitivities == pytest.approx(
+        sensitivities(solve_modes(found.matrices, 3), {"all": found.matrices.stiffness}, [0, 2])
+    )
+
+
 def test_modes_that_cross_are_followed():
     """Bending about two axes on springs of their own: stiffening one moves its mode past the other's."""
     bare = truss(nodes=14, held=13, seed=1)

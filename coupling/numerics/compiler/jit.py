@@ -26,7 +26,7 @@ from vanedamp.files.errors import VanedampError
 try:
     from vanedamp.coupling.numerics.compiler.code_library import COMPILERS
 except ImportError:  # another numba than those tried
-    COMPILERS = dict.fromkeys(("entry", "kernel", "inlined", "loops"), {})
+    COMPILERS = {kind: {} for kind in ("entry", "kernel", "inlined", "loops")}
 
 #: start of a counter: numba would compile the callees of a literal 0 again
 ZERO = np.int64(0)

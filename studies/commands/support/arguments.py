@@ -61,6 +61,11 @@ def metres_per_second(text: str) -> float:
     return _number(text, "a speed in m/s", lambda value: 0.0 < value < math.inf)
 
 
+def seconds(text: str) -> float:
+    """Return a time."""
+    return _number(text, "a time in s", lambda value: 0.0 < value < math.inf)
+
+
 def newtons(text: str) -> float:
     """Return a force."""
     return _number(text, "a force in N", lambda value: 0.0 < value < math.inf)
@@ -89,6 +94,10 @@ json_file = argument(
 resume = argument(
     "--resume", action="store_true",
     help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
+)  # fmt: skip
+budget = argument(
+    "--budget", type=seconds, metavar="S",
+    help="seconds after which the search ends with what it has found; the same command resumes (default: the study's)",
 )  # fmt: skip
 #: no machine has more cores
 workers = argument(

@@ -27,8 +27,6 @@ RUN, TOGETHER = 1.5e-3, 1e-5
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: s of a period whose derivative is followed, with a few impacts (coupling.exponents)
 DERIVATIVE = 5e-3
-#: about how often a life is evaluated over its band
-_EVALUATIONS = 40
 #: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
 _IN_PLANE = 20
 #: at most: points of a sweep, bytes of a run, s of a command
@@ -76,9 +74,8 @@ def check_optimise(study: Study, workers: int) -> None:
 
 def check_life(study: LifeStudy, workers: int) -> None:
     """Reject a life that takes a month. Raises InputError."""
-    runs = _EVALUATIONS * len(study.frequencies)
     check_run(study.scene)
-    _check_time("life", f"{runs:.3g} runs on {workers} workers", runs * run_seconds(study.scene) / workers)
+    _check_time("life", f"{study.runs:.3g} runs on {workers} workers", study.runs * run_seconds(study.scene) / workers)
 
 
 def _modes(scene: Scene) -> int:

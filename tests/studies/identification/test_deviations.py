@@ -58,3 +58,5 @@ def test_wrong_measurements_in_a_line(folder: Path, capsys, given, put, message)
 def test_options_of_the_other_kind_are_rejected(folder: Path, capsys):
     assert main(["identify", str(folder / "study.toml"), "--scene", str(folder / "scene.toml")]) == 2
     assert "--scene: not for deviations" in capsys.readouterr().err
+    assert main(["identify", str(folder / "study.toml"), "--budget", "9"]) == 2
+    assert "--budget: not for deviations" in capsys.readouterr().err

@@ -1,7 +1,10 @@
 """Identification as a whole: the truth within its intervals, flat numbers, wrong models, commands and files."""
 
 import json
+import time
 import tomllib
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +16,16 @@ from tests.studies.identification.test_fit import body
 from tests.studies.identification.test_study import write
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.studies.cli import main
+from vanedamp.files.store import load
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.identification import search
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.record import Identification, IdentificationStatus
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.tables import Number, SearchTable
+from vanedamp.studies.workers import WorkerPool
 
 QUICK = SearchTable(candidates=8, starts=1)
 
@@ -39,7 +46,7 @@ def test_truth_lies_in_the_intervals(found):
     assert half == pytest.approx(1.96 * deviation, rel=0.05)
     assert record.threshold == pytest.approx(3.8415, abs=1e-3) and record.test.chance > 0.01
     assert record.correlation.diagonal() == pytest.approx(1.0) and abs(record.correlation[0, 1]) < 1
-    assert calls[-1][0] == calls[-1][1]
+    assert calls[-1][0] == calls[-1][1] and all(done <= total for done, total in calls)
     assert record.scene.structure.stiffness == record.best[1]
     errors = (record.data_model - record.data_value) / record.data_deviation
     assert errors @ errors == pytest.approx(record.misfit, rel=0.05)
@@ -126,12 +133,78 @@ def test_commands(folder, capfd):
     assert data["best"] == pytest.approx([RATIO, STIFFNESS], rel=1e-3)
     tuned = tomllib.loads((folder / "t.toml").read_text())
     assert tuned["structure"]["stiffness"] == data["best"][1] and tuned["sweep"]["excitation.frequency"] == [15.8, 15.9]
+    assert main(["identify", "study.toml", "-o", "b.h5", "--budget", "1e-9", "--workers", "1"]) == 0
+    captured = capfd.readouterr()
+    assert captured.out.startswith("status budget") and "the budget of time is over" in captured.err
+    assert main(["identify", "study.toml", "-o", "b.h5", "--workers", "1"]) == 0
+    assert Identification.load("b.h5").best.tolist() == data["best"]
+    assert sorted(path.name for path in folder.glob("*.partial")) == []
+    assert main(["identify", "study.toml", "-o", "b.h5", "--resume"]) == BAD_INPUT
+    with pytest.raises(SystemExit):
+        main(["identify", "study.toml", "--budget", "0"])
+    assert "--budget: expected a time in s, not '0'" in capfd.readouterr().err
     assert main(["info", "f.h5"]) == 0
     assert "vanedamp identify" in capfd.readouterr().out
     assert main(["report", "f.h5", "-o", "r.html"]) == 0
     page = (folder / "r.html").read_text()
     for chart in ("data", "profiles", "correlations", "next"):
         assert f'id="identification-{chart}-0"' in page
+
+
+@pytest.mark.parametrize("workers", [None, 2])
+def test_an_interrupted_search_resumes_bit_for_bit(found, tmp_path, workers):
+    file, calls, stops = tmp_path / "f.h5.partial", [], [1, 8, 5]
+
+    def progress(done, total):
+        calls.append((done, total))
+        if stops and len(calls) >= stops[0]:
+            raise KeyboardInterrupt
+
+    with nullcontext() if workers is None else WorkerPool(workers) as pool:
+        while stops:
+            calls.clear()
+            with pytest.raises(KeyboardInterrupt):
+                identify(study(), pool, progress, {"a": 1}, file)
+            stops.pop(0)
+        assert len(load(file, "identify-checkpoint")[0]["part"]) == 14  # none is done again
+        resumed = identify(study(), pool, progress, {"a": 1}, file)
+    whole = found[0].to_json() | {"wall_time_s": resumed.wall_time_s}
+    assert json.dumps(resumed.to_json(), sort_keys=True) == json.dumps(whole, sort_keys=True)
+    done, total = calls[-1]
+    assert done == total
+    with pytest.raises(InputError, match="the checkpoint of another study; nothing was done to it"):
+        identify(study(seed=2), provenance={"a": 1}, checkpoint=file)
+
+
+def test_what_a_budget_leaves_is_written_and_gone_on_from(found, tmp_path):
+    file = tmp_path / "f.h5.partial"
+    cut = identify(study(search=SearchTable(candidates=8, starts=1, budget=1e-9)), provenance={"a": 1}, checkpoint=file)
+    assert cut.status is IdentificationStatus.BUDGET and cut.proposal is None
+    assert cut.notes[0] == "the budget of time is over: 8 of 8 candidates and what follows are not finished"
+    # the first guess, with the intervals of its derivatives
+    assert cut.best == pytest.approx([0.02, 1.02e4]) and np.all(np.ptp(cut.interval, axis=1) > 0.0)
+    cut.save(tmp_path / "cut.h5")
+    assert Identification.load(tmp_path / "cut.h5").status is IdentificationStatus.BUDGET
+    whole = identify(study(), provenance={"a": 1}, checkpoint=file)
+    assert whole.best.tolist() == found[0].best.tolist() and whole.interval.tolist() == found[0].interval.tolist()
+
+
+@pytest.mark.parametrize("function", ["_minimum", "_profile", "_sensitivity"])
+def test_a_budget_that_ends_within_a_stage(found, monkeypatch, function):
+    """The clock runs out as that stage begins."""
+    late = []
+    clock = SimpleNamespace(monotonic=lambda: 2.0 if late else 0.0, perf_counter=time.perf_counter)
+    monkeypatch.setattr(search, "time", clock)
+    monkeypatch.setattr("vanedamp.studies.identification.fit.time", clock)
+    own = getattr(search, function)
+    monkeypatch.setattr(search, function, lambda *arguments: late.append(1) or own(*arguments))
+    cut = identify(study(), budget=1.0)
+    assert cut.status is IdentificationStatus.BUDGET and "the budget of time is over" in cut.notes[0]
+    if function == "_minimum":
+        assert cut.best == pytest.approx([0.02, 1.02e4], rel=0.2)
+    else:
+        assert cut.best == pytest.approx(found[0].best, rel=1e-6)
+        assert cut.interval == pytest.approx(found[0].interval, rel=0.02)
 
 
 def test_pipeline_finds_numbers_and_sweeps_with_them(folder):

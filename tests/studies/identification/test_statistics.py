@@ -19,6 +19,15 @@ class Straight:
         self.jacobian_of, self.centre, self.rest = jacobian, centre, rest
         self.calls = 0
 
+    def scatter(self, z):
+        return 0.0
+
+    def remember(self, z):
+        """It has no motions."""
+
+    def recall(self):
+        """It has none to begin with."""
+
     def minimum(self, z, held=(), close=0.0, most=0):
         self.calls += 1
         z, free = np.array(z), np.setdiff1d(np.arange(len(z)), held)

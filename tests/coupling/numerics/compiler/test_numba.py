@@ -498,8 +498,7 @@ def test_numba_is_as_assumed(text, tmp_path):
 
 def test_the_package_compiles_by_its_own_code_library():
     """Where a numba lacks what it needs, it takes numba's compiler in silence: slower, with the same results."""
-
-    from vanedamp.coupling.numerics.compiler import code_library
+    from vanedamp.coupling.numerics.compiler import code_library, jit
 
     assert jit.COMPILERS is code_library.COMPILERS
 
