@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import signal
 import sys
@@ -56,6 +58,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
+    if argv is None and isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # characters that its encoding does not have
     terminated = terminate_as_interrupt() if argv is None else []
     try:
         with swallowed_interrupts_again():
@@ -67,7 +71,19 @@ def main(argv: Sequence[str] | None = None) -> int:
             _ignore_interrupts()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
+    finally:
+        _drop_unwritten()
     return status
+
+
+def _drop_unwritten() -> None:
+    """Drop output that cannot be written, such as to a full disk: the interpreter would try again as it ends, and
+    change the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _ignore_interrupts() -> None:
@@ -93,13 +109,16 @@ def _run(words: Sequence[str]) -> int:
         with warnings.catch_warnings():
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
-            arguments = _parser(words[0] if words else None).parse_args(words)
+            try:
+                arguments = _parser(words[0] if words else None).parse_args(words)
+            except SystemExit:
+                sys.stdout.flush()  # of --help
+                raise
             input_file = getattr(arguments, "input", None)
             with stages_shown():
                 arguments.run(arguments)
             sys.stdout.flush()
     except BrokenPipeError:  # the reader has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (ValueError, OSError, ImportError, MemoryError) as error:
         message = _message(error, input_file)
@@ -127,7 +146,8 @@ def _message(error: Exception, file: str | None) -> str | None:
 
 
 def _refuse(message: str) -> int:
-    print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
+    with contextlib.suppress(OSError):  # nowhere to say it
+        print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
     return BAD_INPUT
 
 

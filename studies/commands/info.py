@@ -18,7 +18,7 @@ from vanedamp.coupling.response.response import UNITS
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
-from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.files.store import Variable, decoding, finite, json_text, load_any
 from vanedamp.modal.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
@@ -52,17 +52,18 @@ def run(arguments: Namespace) -> None:
     """Print the facts. Raises StoreError for a file that is no record of ours, or damaged."""
     path = arguments.input
     kind, variables, attributes = load_any(path)
-    record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
     checkpoint = kind.endswith(_CHECKPOINT)
     what, command, figures = _KINDS.get(kind.removesuffix(_CHECKPOINT), (kind, None, _any))
     what = f"what {what} had finished" if checkpoint else what
-    found = [Fact("command", f"vanedamp {command}" if command else None), *_origin(record)]
     with decoding(path):
+        record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
+        found = [Fact("command", f"vanedamp {command}" if command else None), *_origin(record)]
         found += [Fact("finished", record.attributes.get("finished"))] if checkpoint else figures(record)
-    sizes = {} if checkpoint else _sizes(variables)
-    found += [Fact("sizes", sizes), Fact("warnings", _warnings(record))]
-    result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
-    write_result(arguments, result, fact_lines(f"{path}: {kind}, {what}", found))
+        found += [Fact("sizes", {} if checkpoint else _sizes(variables)), Fact("warnings", _warnings(record))]
+        result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
+        lines = list(fact_lines(f"{path}: {kind}, {what}", found))
+        json_text(finite(result))  # values of no type that a record of ours has
+    write_result(arguments, result, lines)
 
 
 def _nested(value: Any) -> Any:
