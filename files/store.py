@@ -451,6 +451,8 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
 
 
 def _create(file: h5py.File, name: str, variable: Variable, compressed: bool) -> None:
+    if not name or "/" in name or "\0" in name or name == ".":
+        raise StoreError(f"{name!r}: is no name of a variable in HDF5; expected one without a slash")
     values = np.asarray(variable.values)
     if values.dtype.kind in "UO":
         import h5py

@@ -139,6 +139,8 @@ def _message(error: Exception, file: str | None) -> str | None:
         package = (error.name or "").split(".")[0]
         remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
         return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+    if isinstance(error, UnicodeEncodeError) and error.encoding == "utf-8":
+        return "the name of a file is not in UTF-8, in which it would be written; rename it, or set LC_ALL=C.UTF-8"
     if not isinstance(error, VanedampError):  # bad input has error classes of our own
         return None
     message = str(error)

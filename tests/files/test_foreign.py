@@ -209,6 +209,8 @@ def test_equal_records_are_equal_files(tmp_path):
         (".".join(["a"] * 5000) + " = 1", "nested too deeply; at most 30 levels"),
         ("a = " + "[" * 5000, "nested too deeply"),
         ("k" * 200_000 + " = ", "not valid TOML"),
+        ('[a]\nb = [{"c\\u0000" = "d"}]', r"'a.b\[0\].c\\x00': holds a zero character; leave \\u0000 out"),
+        ('a = "x\\U00000000"', "'a': holds a zero character"),
     ],
 )
 def test_texts_that_are_no_input(tmp_path, text, told):
@@ -216,6 +218,17 @@ def test_texts_that_are_no_input(tmp_path, text, told):
     with pytest.raises(InputError, match=told) as error:
         read_toml(tmp_path / "a.toml")
     assert len(str(error.value)) < 5000
+
+
+def test_a_zero_character_is_no_text_of_a_table(tmp_path):
+    (tmp_path / "a.csv").write_text("x\n\0\n")
+    with pytest.raises(InputError, match=r"a\.csv: line 2: holds a zero character"):
+        read_csv(tmp_path / "a.csv", ("x",))
+    with pytest.raises(StoreError, match="'a/b': is no name of a variable in HDF5"):
+        store.save(tmp_path / "a.h5", "kind", {"a/b": Variable(np.zeros(1), ("n",))})
+    wide = "cavity_\N{MICRO SIGN} 1_" + "x" * 200
+    store.save(tmp_path / "a.h5", "kind", {wide: Variable(np.ones(1), (wide,)), "y": Variable(np.ones(1), (wide,))})
+    assert store.load_any(tmp_path / "a.h5")[1]["y"].dims == (wide,)
 
 
 def test_long_words_are_cut_in_messages():
