@@ -18,7 +18,6 @@ from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.reference import unit_in
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real
 
-
 #: characters of the name of a cavity
 _LONGEST_NAME = 200
 

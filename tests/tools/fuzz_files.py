@@ -148,7 +148,8 @@ def _write_measurements() -> None:
     chain = Chain(6)
     chain.ring().save("chain.h5")
     squares, shapes = linalg.eigh(*chain.matrices(Deviations(0.03 * np.arange(-2.0, 4.0))))
-    rows = [(square**0.5 / (2 * np.pi), sector, value, 0.0) for square, shape in zip(squares[:3], shapes.T, strict=False)
+    rows = [(square**0.5 / (2 * np.pi), sector, value, 0.0)
+            for square, shape in zip(squares[:3], shapes.T, strict=False)
             for sector, value in enumerate(shape)]  # fmt: skip
     write_csv("waves.csv", ("frequency_hz", "sector", "real", "imaginary"), rows)
     write_csv("decay.csv", ("time_s", "amplitude_m"), zip(*oscillator.half_swings(), strict=True))

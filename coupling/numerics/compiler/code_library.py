@@ -7,8 +7,7 @@ than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
 are numba's own but not documented; one function of numba is replaced, and does for other code what it did (`_index`).
-Where a version of numba lacks one of them, this module raises ImportError, and numba's compiler is taken (jit.py):
-slower, with the same results. numba's own means
+Where a version of numba lacks one of them, numba's compiler is taken: slower, with the same results. numba's own means
 do not replace it: numba 0.68 compiles the engine of sliders in 201 s in place of 41 s with its option `forceinline`;
 without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
 """
@@ -22,7 +21,7 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import config, types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
@@ -222,17 +221,12 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
 
 
 if (
-    not all(hasattr(JITCodeLibrary, name) for name in _METHODS)
-    or not hasattr(llvm, "create_pipeline_tuning_options")
-    or _numbas_index is None
+    all(hasattr(JITCodeLibrary, name) for name in _METHODS)
+    and hasattr(llvm, "create_pipeline_tuning_options")
+    and _numbas_index is not None
 ):
-    raise ImportError("this numba has another library of code")
-
-arrayobj.fix_integer_index = _index
-#: options of njit by kind of function
-COMPILERS = {
-    "entry": {"pipeline_class": _compiler(_Entry, "entry")},
-    "kernel": {"pipeline_class": _compiler(_Kernel, "kernel")},
-    "inlined": {"pipeline_class": _compiler(_Kernel, "inlined", inline=True)},
-    "loops": {"pipeline_class": _compiler(_Loops, "loops")},
-}
+    arrayobj.fix_integer_index = _index
+    ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
+    INLINED, LOOPS = _compiler(_Kernel, "inlined", inline=True), _compiler(_Loops, "loops")
+else:
+    ENTRY = KERNEL = INLINED = LOOPS = Compiler

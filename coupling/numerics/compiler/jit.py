@@ -20,13 +20,10 @@ from numba import config, njit, typeof, types
 from numba.core import event
 from numba.extending import typeof_impl
 
+from vanedamp.coupling.numerics.compiler.code_file import CodeFile
+from vanedamp.coupling.numerics.compiler.code_library import ENTRY, INLINED, KERNEL, LOOPS
 from vanedamp.coupling.numerics.compiler.record import is_record, lengths, sized_type
 from vanedamp.files.errors import VanedampError
-
-try:
-    from vanedamp.coupling.numerics.compiler.code_library import COMPILERS
-except ImportError:  # another numba than those tried
-    COMPILERS = dict.fromkeys(("entry", "kernel", "inlined", "loops"), {})
 
 #: start of a counter: numba would compile the callees of a literal 0 again
 ZERO = np.int64(0)
@@ -46,18 +43,18 @@ _PACKAGE = Path(__file__).parents[3]
 _Decorator = Callable[[Callable[..., Any]], Any]
 
 #: compiles a function that only compiled functions call, as a part of them
-kernel: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, **COMPILERS["kernel"])
+kernel: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: the same into its callers: for functions that every segment runs
-inlined: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, **COMPILERS["inlined"])
+inlined: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, pipeline_class=INLINED)
 #: a kernel with the same results, bit for bit, in all its callers: for figures of single runs and of batches. It calls
 #: no part of numba that is written in Python (complex division, abs of a complex number): that would have the freedoms
 #: of its first caller
-strict: _Decorator = njit(**_STRICT | _NOT_FROM_PYTHON, **COMPILERS["kernel"])
+strict: _Decorator = njit(**_STRICT | _NOT_FROM_PYTHON, pipeline_class=KERNEL)
 #: a kernel whose sums may be taken in any order, several terms at once
-summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, **COMPILERS["loops"])
+summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)
 #: a kernel that compares many numbers, several at once; what it returns for NaN is anything
 comparing: _Decorator = njit(
-    **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, **COMPILERS["loops"]
+    **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS
 )
 
 
@@ -70,7 +67,7 @@ class Entry:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.kernel = njit(**options | _NOT_FROM_PYTHON, **COMPILERS["kernel"])(function)
+        self.kernel = njit(**options | _NOT_FROM_PYTHON, pipeline_class=KERNEL)(function)
         self._compiled = _kept(function, options)
         self._sized: dict[Any, Callable[..., Any]] = {}
 
@@ -108,23 +105,18 @@ def strict_entry(function: Callable[..., Any]) -> Any:
 def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Compile a function that Python calls, and keep it on disk."""
     try:
-        compiled = njit(**options, cache=True, **COMPILERS["entry"])(function)
+        compiled = njit(**options, cache=True, pipeline_class=ENTRY)(function)
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(
             f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
             "set NUMBA_CACHE_DIR to one"
         ) from error
-    try:
-        from vanedamp.coupling.numerics.compiler.code_file import CodeFile
-
-        kept = compiled._cache
-        # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
-        kept._cache_file = CodeFile(
-            kept.cache_path, kept._impl.filename_base, _sources(Path(function.__code__.co_filename))
-        )  # fmt: skip
-    except (AttributeError, ImportError, TypeError):  # another numba: nothing is kept, as its date would not do
-        return njit(**options, **COMPILERS["entry"])(function)
+    kept = compiled._cache
+    # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
+    kept._cache_file = CodeFile(
+        kept.cache_path, kept._impl.filename_base, _sources(Path(function.__code__.co_filename))
+    )  # fmt: skip
     if hasattr(kept, "_load_overload"):
         kept.load_overload = partial(_load, kept)
     return compiled
