@@ -68,6 +68,12 @@ class CheckpointFile:
         if kind is None or not issubclass(kind, StoreError):
             self.write()
 
+    def discard(self) -> None:
+        """Remove the file: the input that it belongs to is rejected after all, and would block the corrected one."""
+        self._unsaved = False
+        if self._path is not None:
+            clear(self._path)
+
     def changed(self) -> None:
         """Write the file, unless the last time is too short ago. Raises StoreError, such as for a full disk."""
         self._unsaved = True

@@ -42,6 +42,8 @@ def csv_table(path: str | Path, error: type[VanedampError], kind: str = "file") 
     with reading(file, error, "not a CSV table"):
         lines = enumerate(file.read_text(encoding="utf-8-sig").splitlines(), 1)
         content = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
+        if zero := [number for number, line in content if "\0" in line]:
+            raise error(f"{path}: line {zero[0]}: holds a zero character; expected text")
         # line by line, so that no quotation mark joins two of them
         return [(number, [word.strip() for word in next(csv.reader([line]))]) for number, line in content]
 

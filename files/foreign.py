@@ -1,4 +1,4 @@
-"""Files from a user: no devices, and any error of a reader or its library becomes one line."""
+"""Files from a user: no devices, nothing from elsewhere, and any error of a reader or its library becomes one line."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ import stat
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from vanedamp.files.errors import VanedampError
+
+if TYPE_CHECKING:
+    import h5py
 
 #: signals that end a fork at once; PETSc catches some, and ends the process with a page of text
 _DEADLY = [
@@ -23,6 +26,10 @@ _DEADLY = [
 _Read = TypeVar("_Read")
 #: s for a fork, and bytes a second beyond them: a slow disk's
 _PATIENCE, _SPEED = 60, 1e6
+#: bytes that deflate makes of one, at most
+_INFLATED = 1100
+#: bytes that a fork may take, and further ones per byte of its file
+_MEMORY, _PER_BYTE = 2 << 30, 100
 
 
 def existing(path: str | os.PathLike[str], error: type[VanedampError], kind: str = "file") -> Path:
@@ -61,21 +68,55 @@ def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: 
         raise error(f"{path}: {expected}: damaged, or of another format ({told})") from reason
 
 
+def self_contained(file: h5py.File) -> None:
+    """Check that an HDF5 file holds all its data: what leads to other files would show these, and shapes without data
+    would fill the memory.
+
+    Raises VanedampError for links other than hard ones, data in other files (external or virtual), and shapes that
+    the bytes of the file cannot fill.
+    """
+    import h5py
+
+    def reject(what: str) -> NoReturn:
+        raise VanedampError(f"{file.filename}: {what}; expected a file that holds its data itself")
+
+    groups, known, room = [h5py.Group(file.id)], set(), _INFLATED * os.path.getsize(file.filename)
+    while groups:
+        group = groups.pop()
+        for name in group:
+            place = f"{group.name.rstrip('/')}/{name}".lstrip("/")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                reject(f"{place} is a link to data elsewhere")
+            item = group[name]
+            if h5py.h5o.get_info(item.id).addr in known:  # another name of it
+                continue
+            known.add(h5py.h5o.get_info(item.id).addr)
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif isinstance(item, h5py.Dataset):
+                if item.is_virtual or item.external:
+                    reject(f"the data of {place} are in other files")
+                room -= item.size * item.dtype.itemsize if item.shape else 0
+                if room < 0:
+                    reject(f"{place} has the shape {item.shape}, more than its bytes can fill")
+
+
 def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callable[[], _Read]) -> _Read:
     """Return what `read` makes of a file, called in a fork of this process: damage may crash or hang its library.
 
-    What it returns is pickled. Raises `error` for a fork that ends by a signal, and ValueError with the words of an
-    exception of `read`. Where the system has no forks, `read` is called here.
+    What it returns is pickled. Raises `error` for a fork that ends by a signal, and for an error about input of
+    `read`; ValueError with the words of another exception. Where the system has no forks, `read` is called here.
     """
     if not hasattr(os, "fork"):
         return read()
-    seconds = int(_PATIENCE + os.stat(path).st_size / _SPEED)
+    size = os.stat(path).st_size
+    seconds = int(_PATIENCE + size / _SPEED)
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which reads files
         child = os.fork()
     if child == 0:
-        _tell(read, writing, seconds)
+        _tell(read, writing, seconds, _MEMORY + _PER_BYTE * size)
     os.close(writing)
     try:
         with os.fdopen(reading, "rb") as stream:
@@ -86,13 +127,13 @@ def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callab
         number = os.WTERMSIG(status)
         what = f"takes more than {seconds} s" if number == signal.SIGALRM else signal.Signals(number).name
         raise error(f"{path}: damaged: its library ends in the middle of it ({what}); write it again")
-    made, failure = pickle.loads(told)
+    made, failure, of_input = pickle.loads(told)
     if failure is not None:
-        raise ValueError(failure)
+        raise (error if of_input else ValueError)(failure)
     return made
 
 
-def _tell(read: Callable[[], object], writing: int, seconds: int) -> None:
+def _tell(read: Callable[[], object], writing: int, seconds: int, memory: int) -> None:
     """Read, silently, write what comes of it, and end this process."""
     try:
         for number in _DEADLY:
@@ -102,10 +143,22 @@ def _tell(read: Callable[[], object], writing: int, seconds: int) -> None:
         os.dup2(nowhere, 2)
         signal.alarm(seconds)
         try:
-            told = pickle.dumps((read(), None), protocol=5)
+            _limit_memory(memory)
+            told = pickle.dumps((read(), None, False), protocol=5)
         except BaseException as reason:  # the library may end the program
-            told = pickle.dumps((None, str(reason) or type(reason).__name__))
+            told = pickle.dumps((None, str(reason) or type(reason).__name__, isinstance(reason, VanedampError)))
         with os.fdopen(writing, "wb") as stream:
             stream.write(told)
     finally:
         os._exit(0)
+
+
+def _limit_memory(more: int) -> None:
+    """Let this process take so many bytes more than it has: beyond them it has a MemoryError."""
+    with contextlib.suppress(OSError, ImportError):  # systems without /proc, or without limits
+        import resource
+
+        taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        unlimited = resource.RLIM_INFINITY
+        resource.setrlimit(resource.RLIMIT_AS, (taken + more if soft == unlimited else min(soft, taken + more), hard))

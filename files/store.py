@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeVar
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.foreign import apart, existing, reading
+from vanedamp.files.foreign import apart, existing, reading, self_contained
 from vanedamp.files.interrupts import uninterrupted
 
 if TYPE_CHECKING:
@@ -357,6 +357,7 @@ def _read_all(path: str | os.PathLike[str], dimensions: bool) -> tuple[dict[str,
     import h5py
 
     with h5py.File(path, "r") as file:
+        self_contained(file)
         attributes = {name: _plain(value) for name, value in file.attrs.items()}
         items = [(name, item) for name, item in file.items() if isinstance(item, h5py.Dataset)]
         if not dimensions:
@@ -450,6 +451,8 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
 
 
 def _create(file: h5py.File, name: str, variable: Variable, compressed: bool) -> None:
+    if not name or "/" in name or "\0" in name or name == ".":
+        raise StoreError(f"{name!r}: is no name of a variable in HDF5; expected one without a slash")
     values = np.asarray(variable.values)
     if values.dtype.kind in "UO":
         import h5py

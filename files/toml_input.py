@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import reprlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -90,7 +90,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     if file.stat().st_size > _MOST_BYTES:
         raise InputError(f"{path}: has {file.stat().st_size / 1e6:.0f} MB; expected at most {_MOST_BYTES / 1e6:.0f} MB")
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+        text = file.read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     except RecursionError:
@@ -99,7 +100,20 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}") from None
     if _depth(data) > _DEEPEST:
         raise InputError(f"{path}: its tables are nested too deeply; at most {_DEEPEST} levels")
+    if r"\u0000" in text or r"\U00000000" in text:  # no result could hold it
+        for place in _with_zero(data, []):
+            raise InputError(f"{path}: {dotted(place)!r}: holds a zero character; leave \\u0000 out")
     return data
+
+
+def _with_zero(data: Any, place: list[Any]) -> Iterator[list[Any]]:
+    """Yield the places of names and texts with a zero character."""
+    if isinstance(data, str) and "\0" in data:
+        yield place
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        if isinstance(key, str) and "\0" in key:
+            yield [*place, key]
+        yield from _with_zero(value, [*place, key])
 
 
 def _depth(data: Any) -> int:

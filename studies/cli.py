@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import re
 import signal
@@ -64,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
     if "_ARGCOMPLETE" in os.environ:
         _complete()
+    if argv is None and isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # characters that its encoding does not have
     terminated = terminate_as_interrupt() if argv is None else []
     try:
         with swallowed_interrupts_again():
@@ -75,6 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             _ignore_interrupts()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
+    finally:
+        _drop_unwritten()
     if status == _NO_MEMORY:
         if argv is None:  # libraries want memory to end, too: OpenBLAS waits for it for ever
             os._exit(BAD_INPUT)
@@ -95,6 +101,16 @@ def _complete() -> None:
         if endings and not action.choices:
             action.completer = argcomplete.FilesCompleter(endings)  # type: ignore[attr-defined]
     argcomplete.autocomplete(parser)
+
+
+def _drop_unwritten() -> None:
+    """Drop output that cannot be written, such as to a full disk: the interpreter would try again as it ends, and
+    change the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _ignore_interrupts() -> None:
@@ -123,15 +139,18 @@ def _run(words: Sequence[str]) -> int:
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
             parser, command = _parsers(words[0] if words else None)
-            arguments, unknown = parser.parse_known_args(words)
-            if unknown:
-                command.error(f"unrecognized arguments: {' '.join(unknown)}")
+            try:
+                arguments, unknown = parser.parse_known_args(words)
+                if unknown:
+                    command.error(f"unrecognized arguments: {' '.join(unknown)}")
+            except SystemExit:
+                sys.stdout.flush()  # of --help
+                raise
             input_file = getattr(arguments, "input", None)
             with stages_shown():
                 arguments.run(arguments)
             sys.stdout.flush()
     except BrokenPipeError:  # the reader has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
         message = _message(error, input_file)
@@ -159,6 +178,8 @@ def _message(error: Exception, file: str | None) -> str | None:
         return f"{where}: {error.strerror}" if error.strerror else str(error)
     if isinstance(error, ImportError):
         return not_loaded(error)
+    if isinstance(error, UnicodeEncodeError) and error.encoding == "utf-8":
+        return "the name of a file is not in UTF-8, in which it would be written; rename it, or set LC_ALL=C.UTF-8"
     if not isinstance(error, VanedampError):  # bad input has error classes of our own
         return None
     message = str(error)
@@ -166,7 +187,8 @@ def _message(error: Exception, file: str | None) -> str | None:
 
 
 def _refuse(message: str) -> int:
-    print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
+    with contextlib.suppress(OSError):  # nowhere to say it
+        print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
     return BAD_INPUT
 
 

@@ -18,11 +18,21 @@ from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.reference import unit_in
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real
 
+#: characters of the name of a cavity
+_LONGEST_NAME = 200
+
 
 def _addressable(name: str) -> str:
-    """Return a name that a dotted path such as cavity.c1.gap can hold, distinct from an index and from a key."""
-    if not name or "." in name or name.isdecimal() or name in Cavity.__dataclass_fields__:
-        raise ValueError("expected a word that is no number and no key and has no dot, such as 'c1'")
+    """Return a name that a dotted path such as cavity.c1.gap can hold, distinct from an index and from a key.
+
+    The path names variables of HDF5 files, in which a slash stands for a group.
+    """
+    special = name.isdecimal() or name in Cavity.__dataclass_fields__ or not name.isprintable()
+    if special or not 0 < len(name) <= _LONGEST_NAME or {".", "/"} & set(name):
+        raise ValueError(
+            f"expected a word of at most {_LONGEST_NAME} characters that is no number and no key and has no dot and no "
+            "slash, such as 'c1'"
+        )
     return name
 
 

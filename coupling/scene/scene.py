@@ -226,7 +226,10 @@ class Scene(OpenRecord, Displayed):
         self._check_structure()
         self._check_ring()
         self._check_elements()
+        in_files = dict[str, str]()
         for path, axis in self.sweep.items():
+            if (other := in_files.setdefault(path.replace(".", "_"), path)) != path:
+                raise ValueError(f"sweep.{path}: files have _ for dots, which makes it {other}; rename the cavity")
             if path in _KEPT and not (isinstance(axis, int) and axis >= _KEPT[path][0]):
                 raise ValueError(f"sweep.{path}: expected a whole number of periods, at least {_KEPT[path][0]}")
             if isinstance(axis, int) and path not in _KEPT:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.files.checkpoint_file import CheckpointFile, clear, digests
+from vanedamp.files.checkpoint_file import CheckpointFile, digests
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import StoreError, Variable
@@ -42,10 +42,9 @@ class CaseCheckpoint(CheckpointFile):
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         of_the_case = kind is not None and issubclass(kind, VanedampError) and not issubclass(kind, StoreError)
-        if self._path is not None and of_the_case:
-            clear(self._path)  # the case must be changed, and the solutions belong to no other
-        else:
-            super().__exit__(kind, *rest)
+        if of_the_case:
+            self.discard()
+        super().__exit__(kind, *rest)
 
     def next(self, solve: Callable[[], Arrays]) -> Arrays:
         """Return the next solution: the file's, or else that of the function (modal.kept_solutions.Keep)."""

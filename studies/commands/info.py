@@ -18,7 +18,7 @@ from vanedamp.coupling.response.response import UNITS
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
-from vanedamp.files.store import Variable, decoding, load_any
+from vanedamp.files.store import Variable, decoding, finite, json_text, load_any
 from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
@@ -54,22 +54,23 @@ def run(arguments: Namespace) -> None:
     """Print the facts. Raises StoreError for a file that is no record of ours, or damaged."""
     path = arguments.input
     kind, variables, attributes = load_any(path)
-    record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
     checkpoint = kind.endswith(_CHECKPOINT)
     known = _kind(kind.removesuffix(_CHECKPOINT))
     what = f"what {known.about} had finished" if checkpoint else known.about
-    found = [
-        Fact("command", f"vanedamp {' or '.join(known.commands)}" if known.commands else None),
-        Fact("record", known.record, "", "in Python"),
-        *_origin(record),
-    ]
+    figures = _FIGURES.get(kind, _any)
     with decoding(path):
-        figures = _FIGURES.get(kind, _any)
+        record = _Record(path, variables, {name: _nested(value) for name, value in attributes.items()})
+        found = [
+            Fact("command", f"vanedamp {' or '.join(known.commands)}" if known.commands else None),
+            Fact("record", known.record, "", "in Python"),
+            *_origin(record),
+        ]
         found += [Fact("finished", record.attributes.get("finished"))] if checkpoint else figures(record)
-    sizes = {} if checkpoint else _sizes(variables)
-    found += [Fact("sizes", sizes), Fact("warnings", _warnings(record))]
-    result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
-    write_result(arguments, result, fact_lines(f"{path}: {kind}, {what}", found))
+        found += [Fact("sizes", {} if checkpoint else _sizes(variables)), Fact("warnings", _warnings(record))]
+        result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
+        lines = list(fact_lines(f"{path}: {kind}, {what}", found))
+        json_text(finite(result))  # values of no type that a record of ours has
+    write_result(arguments, result, lines)
 
 
 def _kind(name: str) -> ResultKind:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from argparse import Namespace
 from collections.abc import Iterator
 
@@ -24,20 +25,25 @@ def run(arguments: Namespace) -> None:
     arguments.outputs.keep(study.scene.files)
     check_optimise(study, arguments.workers or available_cores())
     print_resonance(arguments.input, study.scene)
+    started = time.perf_counter()
     with workers(arguments.workers) as pool:
         compile_engine(
             map(study.with_bodies, range(study.table.variables.bodies[0], study.table.variables.bodies[1] + 1)), pool
         )
         with progress("optimise") as report:
             optimisation = optimise(study, pool, report, {"versions": versions()}, arguments.checkpoint)
-    write_result(arguments, optimisation.to_json(), _summary(optimisation), study.doubts, output=optimisation.save)
+    seconds = time.perf_counter() - started
+    # times are not kept in the result, which is the same however it came about
+    data = optimisation.to_json() | {"wall_time_s": seconds}
+    write_result(arguments, data, _summary(optimisation, seconds), study.doubts, output=optimisation.save)
     if arguments.checkpoint is not None:
         clear(arguments.checkpoint)
 
 
-def _summary(optimisation: Optimisation) -> Iterator[str]:
+def _summary(optimisation: Optimisation, seconds: float) -> Iterator[str]:
     yield optimisation.sentence
     yield from optimisation.remarks
+    yield f"{optimisation.scenes} scenes in {seconds:.0f} s"
     if optimisation.trouble:
         yield (
             f"{optimisation.trouble} of {optimisation.scenes} scenes are not ok and count as undamped, so that the "

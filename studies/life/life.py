@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.store import frozen
-from vanedamp.files.toml_input import tables
+from vanedamp.files.toml_input import InputError, tables
 from vanedamp.studies.life.fast import Found, Runs
 from vanedamp.studies.life.record import LifeRecord, sentence_of
 from vanedamp.studies.life.slow import STAGES, Moment, Steps, between, integrate, steps_left
@@ -37,17 +36,20 @@ def life(
     (files.checkpoint_file.clear).
     Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
     """
-    started = time.perf_counter()
     expected = _Expected(study, progress)
     with Runs(checkpoint, study, executor, provenance or {}, expected) as runs:
-        first = runs.at(study.scene)
-        wearing = study.wearing(runs.contacts)
+        try:
+            first = runs.at(study.scene)
+            wearing = study.wearing(runs.contacts)
+        except InputError:
+            runs.discard()
+            raise
         moments = list(_moments(_Course(study, wearing, runs, first), expected))
     ends, starts = {"new": study.scene, "end": wearing.worn(moments[-1].state)}, dict[str, Any]()
     for name, scene in ends.items():
         expected.total, done = runs.asked + study.starts, runs.asked + study.starts // 2 * len(starts)
         starts[name] = worst_start(scene, study.frequencies, executor, expected.after(done))
-    return _record(study, wearing, runs, moments, starts, dict(provenance or {}), time.perf_counter() - started)
+    return _record(study, wearing, runs, moments, starts, dict(provenance or {}))
 
 
 class _Expected:
@@ -159,7 +161,7 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
 
 def _record(
     study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], starts: dict[str, Any],
-    provenance: dict[str, Any], took: float,
+    provenance: dict[str, Any],
 ) -> LifeRecord:  # fmt: skip
     """Return the record of moments in the order of their times."""
     volume = np.array([moment.state for moment in moments])
@@ -187,7 +189,7 @@ def _record(
         study={"life": tables(study.table), "scene": study.scene.to_dict()},
         reference=study.reference, frequency=study.frequencies, contacts=tuple(runs.contacts),
         **{name: frozen(array) for name, array in values.items()},
-        hours=hours, runs=runs.asked, trouble=runs.trouble, wall_time_s=took,
+        hours=hours, runs=runs.asked, trouble=runs.trouble,
         sentence=sentence_of(hours, study.table, values, starts), starts=starts, provenance=provenance,
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from vanedamp.studies.life.study import Contact, Life
 from vanedamp.studies.worst_start import worst_words
 
 _KIND = "life"
-_PLAIN = ("reference", "hours", "runs", "trouble", "wall_time_s", "sentence")
+_PLAIN = ("reference", "hours", "runs", "trouble", "sentence")
 _ARRAYS = {
     "frequency": (("frequency",), "Hz"), "time": (("time",), "h"),
     "depth": (("time", "contact"), "m"), "depth_band": (("time", "contact"), "m"),
@@ -69,7 +69,6 @@ class LifeRecord:
     hours: tuple[float | None, float | None, float | None]
     runs: int
     trouble: int
-    wall_time_s: float
     sentence: str
     starts: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -17,9 +17,7 @@ from vanedamp.studies.optimisation.study import Design
 _KIND = "optimisation"
 #: distance from a bound, over the range, at which a search has run into it
 _AT_BOUND = 0.01
-_PLAIN = (
-    "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
-)  # fmt: skip
+_PLAIN = ("mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "sentence")
 _TABLES = ("study", "headlines", "starts", "gradient", "provenance")
 _ARRAYS = {
     "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
@@ -101,7 +99,6 @@ class Optimisation:
     starts             worst of these designs over starts (worst_start.worst_start), by the same names
     gradient           where derivatives led the best design as designed (gradient.descend)
     scenes, trouble    number of runs, and of those with another status than ok
-    wall_time_s        s
     sentence           the answer in words
     """
 
@@ -124,7 +121,6 @@ class Optimisation:
     robust_response: np.ndarray
     scenes: int
     trouble: int
-    wall_time_s: float
     sentence: str
     headlines: Mapping[str, Any] = field(default_factory=dict)
     starts: Mapping[str, Any] = field(default_factory=dict)

@@ -8,7 +8,6 @@ tolerances (a Latin hypercube and the design itself), so that designs differ by 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, replace
@@ -54,7 +53,7 @@ def optimise(
 
 
 def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optimisation:
-    started, table = time.perf_counter(), study.table
+    table = study.table
     with stage("search as designed"):
         first, gradient = descend(study, trial.tried, trial.best_designs(trial.search(False, [])))
     trial.begins(1)
@@ -82,7 +81,6 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
     with stage("runs from other starts"):
         found = {design: trial.worst_start(design) for design in dict.fromkeys(curves.values())}
     starts = {name: found[design] for name, design in curves.items()}
-    took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": tables(table), "scene": study.scene.to_dict()},
         mass=study.mass,
@@ -106,8 +104,7 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         gradient=gradient,
         scenes=trial.scenes,
         trouble=trial.trouble,
-        wall_time_s=took,
-        sentence=_sentence(study, nominal, robust, headlines, starts, trial.scenes, took),
+        sentence=_sentence(study, nominal, robust, headlines, starts),
         provenance=provenance,
     )
 
@@ -297,11 +294,11 @@ def _of_band(headline: Headline) -> dict[str, Any]:
 
 def _sentence(
     study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline],
-    starts: Mapping[str, dict[str, Any]], scenes: int, took: float,
+    starts: Mapping[str, dict[str, Any]],
 ) -> str:  # fmt: skip
     table = study.table
     if not table.by_amplitude:
-        return _measured_sentence(study, nominal, robust, scenes, took)
+        return _measured_sentence(study, nominal, robust)
     if table.over_band == "mean":
         of = "the mean without bodies in the band"
     elif headlines["nominal"].undamped_at_edge:
@@ -319,10 +316,10 @@ def _sentence(
             f"{robust.reduction_tolerances:.0%} {kind}; {worst_words(starts['robust'])}"
         )
     remarks = dict.fromkeys(remark for headline in headlines.values() for remark in headline.remarks)
-    return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
+    return f"{'; '.join([text, *remarks])}."
 
 
-def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum, scenes: int, took: float) -> str:
+def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum) -> str:
     """Return the answer where stress, life or wear counts."""
     table = study.table
     of = {
@@ -336,7 +333,7 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum, scenes: 
             f"; {nominal.amplitude_tolerances:.3g} within the tolerances; robust: "
             f"{_format_design(robust.design, study)}: {robust.amplitude:.3g}, {robust.amplitude_tolerances:.3g} within"
         )
-    return f"{text}; one start only: every run begins as the scene. {scenes} scenes in {took:.0f} s."
+    return f"{text}; one start only: every run begins as the scene."
 
 
 def _format_design(design: Design, study: Study) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from vanedamp.files.foreign import reading
 from vanedamp.files.store import digest, write_json
 from vanedamp.files.toml_input import InputError
 
@@ -32,15 +33,13 @@ class Record:
         self._begun: dict[str, Any] = {}
         if not path.exists():
             return
-        try:
+        with reading(path, InputError, "the record of the pipeline cannot be read; delete it to do all again"):
             data = json.loads(path.read_text(encoding="utf-8"))
             if data["kind"] != _KIND:
-                raise KeyError(data["kind"])
-            self._done, self._begun = dict(data["done"]), dict(data["begun"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(
-                f"{path}: the record of the pipeline cannot be read ({error}); delete it to do all again"
-            ) from None
+                raise ValueError(f"kind {data['kind']}")
+            self._begun = dict(data["begun"])
+            self._done = {name: {key: dict(made[key]) for key in ("inputs", "outputs")}
+                          for name, made in data["done"].items()}  # fmt: skip
 
     def reasons(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> list[str]:
         """Return why a stage must run; nothing if its results match these inputs."""

@@ -201,14 +201,37 @@ def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypa
     assert set(os.listdir("matrices")) == set(FILES) if output.startswith("matrices") else True
 
 
-def test_full_standard_output(folder):
+@pytest.mark.parametrize("words", [["run", "scene.toml", "--json", "-"], ["--help"], ["info", "none.h5"]])
+def test_full_output(folder, words):
+    """The interpreter would write the rest as it ends, and change the status."""
+    errors = words[0] == "info"
     with open("/dev/full", "w") as full:
         finished = subprocess.run(
-            [sys.executable, "-m", "vanedamp", "run", "scene.toml", "--json", "-"], cwd=folder, stdout=full,
-            stderr=subprocess.PIPE, text=True, check=False, env=environment(),
+            [sys.executable, "-m", "vanedamp", *words], cwd=folder, stdout=full, stderr=full if errors else -1,
+            text=True, check=False, env=environment(),
         )  # fmt: skip
     assert finished.returncode == BAD_INPUT
-    assert finished.stderr == "vanedamp: standard output, or another file: No space left on device\n"
+    if not errors:
+        assert finished.stderr == "vanedamp: standard output, or another file: No space left on device\n"
+
+
+@pytest.mark.parametrize(
+    "variables", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+)
+def test_output_that_holds_ascii_only(tmp_path, variables):
+    answer = "5 \N{MICRO SIGN}m"
+    save(tmp_path / "own.h5", "own", {}, {"answer": answer})
+    shown = vanedamp("info", "own.h5", cwd=tmp_path, **variables)
+    assert (shown.returncode, r"answer                5 \xb5m" in shown.stdout) == (0, True)
+    data = vanedamp("info", "own.h5", "--json", "-", cwd=tmp_path, **variables)
+    assert json.loads(data.stdout)["answer"] == answer
+    name = "\N{MICRO SIGN}.h5"  # whose bytes are no text in the C locale
+    ReducedModel.from_matrices(np.eye(2), np.diag([1e4, 1e6]), {"x": [1.0, 0.0]}, damping_ratio=0.1).save(
+        tmp_path / name
+    )
+    page = vanedamp("report", name, "-o", "r.html", cwd=tmp_path, **variables)
+    assert page.returncode == (BAD_INPUT if "LC_ALL" in variables else 0)
+    assert ("set LC_ALL=C.UTF-8\n" in page.stderr) == ("LC_ALL" in variables)
 
 
 def test_nobody_reads_on(folder):

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import zlib
 
 import h5py
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from tests.tools.processes import environment
 from vanedamp.files import foreign, store
 from vanedamp.files.csv_input import read_csv
-from vanedamp.files.errors import shortened
+from vanedamp.files.errors import VanedampError, shortened
 from vanedamp.files.foreign import apart, existing, reading
 from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.formats.matrices.registry import read_matrices
@@ -21,6 +22,7 @@ from vanedamp.files.store import StoreError, Variable, decoding
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.modal.msh import merge
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import BAD_INPUT, main
 
 
 def _stumble():
@@ -128,6 +130,72 @@ def test_a_fault_of_ours_is_not_called_damage(model):
         _stumble()
 
 
+def _external(file, folder):
+    file.create_dataset("x", (3,), "u1", external=[(str(folder / "secret"), 0, 3)])
+
+
+def _virtual(file, folder):
+    layout = h5py.VirtualLayout((3,), "f8")
+    layout[:] = h5py.VirtualSource(folder / "other.h5", "x", (3,))
+    file.create_virtual_dataset("x", layout)
+
+
+def _linked(link):
+    return lambda file, folder: file.__setitem__("x", link(folder))
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_external, "the data of x are in other files"),
+        (_virtual, "the data of x are in other files"),
+        (_linked(lambda folder: h5py.ExternalLink(folder / "other.h5", "x")), "x is a link to data elsewhere"),
+        (_linked(lambda folder: h5py.ExternalLink(folder / "none.h5", "x")), "x is a link to data elsewhere"),
+        (_linked(lambda _: h5py.SoftLink("/mass")), "x is a link to data elsewhere"),
+        (lambda file, _: file.create_group("g").__setitem__("x", h5py.SoftLink("/")), "g/x is a link"),
+        (lambda file, _: file.create_dataset("x", (10**12,)), "x has the shape (1000000000000,), more than its bytes"),
+        (lambda file, _: file.create_dataset("x", (10**6, 10**6), chunks=(99, 99), compression=9), "x has the shape"),
+    ],
+)
+def test_hdf5_that_leads_elsewhere_or_to_nothing(model, tmp_path, capfd, sealed, change, told):
+    """No data of other files become ours, and no shape without data fills the memory."""
+    (tmp_path / "secret").write_bytes(b"key")
+    with h5py.File(matlab := tmp_path / "seven.mat", "w", userblock_size=512) as file:
+        file["m"] = np.eye(2)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = np.zeros(3)
+    for name in (model, matlab):
+        with h5py.File(name, "r+") as file:
+            change(file, tmp_path)
+    with open(matlab, "r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + bytes([0x00, 0x02]) + b"IM")
+    if sealed:  # whoever writes a file may write a checksum
+        image = model.read_bytes()
+        model.write_bytes(image + store._SEAL.format(zlib.crc32(image)).encode())
+    for read, file in ((ReducedModel.load, model), (store.load_any, model), (read_matrices, matlab)):
+        with pytest.raises(VanedampError) as error:
+            read(file)
+        assert str(error.value).startswith(f"{file}: {told}")
+        assert str(error.value).endswith("; expected a file that holds its data itself")
+    assert main(["info", str(model)]) == BAD_INPUT
+    assert capfd.readouterr().err.count("\n") == 1
+
+
+def test_a_text_that_is_there_many_times_ends_in_a_line(model, monkeypatch):
+    """Texts of one place in a file are read to as many places in memory."""
+    with h5py.File(model, "r+") as file:
+        file.create_dataset("x", (1000,), h5py.string_dtype(), ["y" * 10**6] + [""] * 999)
+        place = file["x"].id.get_offset()
+    monkeypatch.setattr(foreign, "_MEMORY", 2 * 10**8)
+    monkeypatch.setattr(foreign, "_PER_BYTE", 1)
+    image = bytearray(model.read_bytes())
+    image[place : place + 16_000] = image[place : place + 16] * 1000
+    model.write_bytes(image)
+    with pytest.raises(StoreError, match=r"rom\.h5: "):
+        store.load_any(model)
+
+
 def test_equal_records_are_equal_files(tmp_path):
     for name in ("a.h5", "b.h5"):
         store.save(tmp_path / name, "kind", {"x": Variable(np.arange(3.0), ("n",))})
@@ -141,6 +209,8 @@ def test_equal_records_are_equal_files(tmp_path):
         (".".join(["a"] * 5000) + " = 1", "nested too deeply; at most 30 levels"),
         ("a = " + "[" * 5000, "nested too deeply"),
         ("k" * 200_000 + " = ", "not valid TOML"),
+        ('[a]\nb = [{"c\\u0000" = "d"}]', r"'a.b\[0\].c\\x00': holds a zero character; leave \\u0000 out"),
+        ('a = "x\\U00000000"', "'a': holds a zero character"),
     ],
 )
 def test_texts_that_are_no_input(tmp_path, text, told):
@@ -148,6 +218,17 @@ def test_texts_that_are_no_input(tmp_path, text, told):
     with pytest.raises(InputError, match=told) as error:
         read_toml(tmp_path / "a.toml")
     assert len(str(error.value)) < 5000
+
+
+def test_a_zero_character_is_no_text_of_a_table(tmp_path):
+    (tmp_path / "a.csv").write_text("x\n\0\n")
+    with pytest.raises(InputError, match=r"a\.csv: line 2: holds a zero character"):
+        read_csv(tmp_path / "a.csv", ("x",))
+    with pytest.raises(StoreError, match="'a/b': is no name of a variable in HDF5"):
+        store.save(tmp_path / "a.h5", "kind", {"a/b": Variable(np.zeros(1), ("n",))})
+    wide = "cavity_\N{MICRO SIGN} 1_" + "x" * 200
+    store.save(tmp_path / "a.h5", "kind", {wide: Variable(np.ones(1), (wide,)), "y": Variable(np.ones(1), (wide,))})
+    assert store.load_any(tmp_path / "a.h5")[1]["y"].dims == (wide,)
 
 
 def test_long_words_are_cut_in_messages():

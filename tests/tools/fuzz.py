@@ -167,7 +167,7 @@ def drawn(seed: int, count: int) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _spoil(data: dict[str, Any], draw: random.Random) -> None:
-    holder, key = draw.choice(list(_places(data)))
+    holder, key = draw.choice(list(places(data)))
     value = holder[key]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     match draw.randrange(10):
@@ -187,12 +187,12 @@ def _spoil(data: dict[str, Any], draw: random.Random) -> None:
             holder[key] = draw.choice(WRONG)
 
 
-def _places(node: Any) -> Iterator[tuple[Any, Any]]:
+def places(node: Any) -> Iterator[tuple[Any, Any]]:
     """(table or list, key or index) of everything in a file."""
     for key, value in list(node.items()) if isinstance(node, dict) else list(enumerate(node)):
         yield node, key
         if isinstance(value, dict | list):
-            yield from _places(value)
+            yield from places(value)
 
 
 def write_input(command: str, data: dict[str, Any]) -> list[str] | None:
@@ -236,10 +236,13 @@ def run_all(first: int, count: int, folder: Path) -> int:
 
     def file_case(number: int, told: Callable[[], str]) -> tuple[str, str, str | None]:
         for left in Path().glob("damaged.*"):
-            left.unlink()
-        name, words = damaged(number, samples)
-        found = fuzz_runs.call(readers[words[0]]) if words[0] in readers else fuzz_runs.answer(words, told)
-        return name, *found
+            left.rmdir() if left.is_dir() else left.unlink()
+        name, commands = damaged(number, samples)
+        ends = [fuzz_runs.call(readers[words[0]]) if words[0] in readers else fuzz_runs.answer(words, told)
+                for words in commands]  # fmt: skip
+        wrong = [f"{words[0]} {words[-1]}: {what}" for words, (_, what) in zip(commands, ends, strict=True) if what]
+        ends_as = "fault" if wrong else "one line" if ("one line", None) in ends else "result"
+        return name, ends_as, "; ".join(wrong) or None
 
     def input_case(number: int, told: Callable[[], str]) -> tuple[str, str, str | None]:
         line = number % 4 == 0

@@ -3,24 +3,40 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import tomli_w
-from scipy import io, sparse
+from scipy import io, linalg, sparse
 
+from tests.studies.identification import oscillator
 from tests.tools import fork_mesh
 from tests.tools.archives import ansys_archive, labelled
-from tests.tools.fuzz import CASE, OPTIMISE, RING, SCENE
+from tests.tools.fuzz import CASE, OPTIMISE, RING, SCENE, WRONG, places
 from tests.tools.op2_file import write_op2
+from tests.tools.rings import Chain
+from vanedamp.files.store import Variable, save, write_csv, write_json
+from vanedamp.rom.ring.deviations import Deviations
 
 #: what takes the place of a number in a text
 ODD = ("nan", "inf", "1e400", "1e308", "5e-324", "-1", "0", "", "999999999999", "1" * 5000, "x", "1e5", "3.5", "-0")
+#: deeper than a reader of JSON or TOML can follow
+NESTED = "[" * 100_000 + "]" * 100_000
+#: what takes the place of a variable's values
+_RETYPED = (
+    lambda values: np.asarray(values).astype(str).astype(object), lambda values: np.ones(np.shape(values), complex),
+    lambda values: np.full(np.shape(values), -3), lambda values: np.full(np.shape(values), np.nan),
+    lambda values: np.ravel(values), lambda values: np.zeros((0, *np.shape(values)[1:])),
+    lambda values: np.full(np.shape(values), b"\xff\xfe"), lambda values: h5py.Empty("f8"),
+    lambda values: np.zeros(np.shape(values), [("a", "f8"), ("b", "S3")]),
+)  # fmt: skip
 #: bytes of the checksum at the end of a record
 _SEAL = 19
 MASS, STIFFNESS = np.diag([1.0, 2.0, 1.5]), np.array([[4e6, -1e6, 0.0], [-1e6, 3e6, -1e6], [0.0, -1e6, 2e6]])
@@ -99,7 +115,15 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
         "orbit.toml": plain | {"orbit": {"to": 15.95, "max_points": 4}}, "optimise.toml": OPTIMISE,
         "campbell.toml": CASE | campbell, "ring.toml": RING,
         "external.toml": {"matrices": matrices, "interface": {"tip": {"coordinate": 0}, "top": {"coordinate": 2}}},
+        "ranged.toml": plain | {"damper": [plain["damper"][0] | {"friction": [0.2, 0.4]}], "ensemble": {"samples": 4}},
+        "life.toml": plain | {"wear": {"rate": 1e-14, "area": 5e-5},
+                              "life": {"band": [15.8, 15.9], "hours": 10.0, "steps": 1}},
+        "identify.toml": {"scene": "still.toml", "numbers": {"structure.stiffness": {"min": 9e3, "max": 1.1e4}},
+                          "decay": [{"file": "decay.csv", "noise": 0.02}], "search": {"candidates": 4, "starts": 1}},
+        "still.toml": oscillator.SCENE,
+        "deviations.toml": {"deviations": {"ring": "chain.h5", "file": "waves.csv", "at": "tip"}},
     }  # fmt: skip
+    _write_measurements()
     for name, tables in files.items():
         Path(name).write_text(tomli_w.dumps(tables))
     for words in (
@@ -111,18 +135,42 @@ def _write_results(run: Callable[[list[str]], int]) -> None:
         ["orbits", "orbit.toml", "-o", "orbits.h5"],
         ["ring", "ring.toml", "--orders", "1", "--draws", "2", "-o", "ring.h5", "--mistuning", "mistuning.h5"],
         ["optimise", "optimise.toml", "--workers", "1", "-o", "optimum.h5"],
+        ["run", "ranged.toml", "-o", "ensemble.h5"], ["life", "life.toml", "--workers", "1", "-o", "life.h5"],
+        ["identify", "identify.toml", "--workers", "1", "-o", "found.h5"],
+        ["identify", "deviations.toml", "-o", "deviations.h5"],
+        ["reduce", "ring.toml", "--basis", "sectors", "-o", "sectors.h5"],
     ):  # fmt: skip
         if run(words):
             raise RuntimeError(Path("../standard_error.txt").read_text())
 
 
+def _write_measurements() -> None:
+    """Write a ring and its modes, a decay, a checkpoint and the claims of a study."""
+    chain = Chain(6)
+    chain.ring().save("chain.h5")
+    squares, shapes = linalg.eigh(*chain.matrices(Deviations(0.03 * np.arange(-2.0, 4.0))))
+    rows = [(square**0.5 / (2 * np.pi), sector, value, 0.0)
+            for square, shape in zip(squares[:3], shapes.T, strict=False)
+            for sector, value in enumerate(shape)]  # fmt: skip
+    write_csv("waves.csv", ("frequency_hz", "sector", "real", "imaginary"), rows)
+    write_csv("decay.csv", ("time_s", "amplitude_m"), zip(*oscillator.half_swings(), strict=True))
+    save("part.h5", "sweep-checkpoint", {"point": Variable(np.arange(3), ("point",))}, {"scene": SCENE, "model": {}})
+    claim = {"claim": "it damps", "ours": "it does", "verdict": "shown", "figures": {"reduction": 0.5}}
+    study = {"study": "one", "title": "One", "sources": ["sweep.h5"], "claims": [claim]}
+    write_json("study.claims.json", study)
+
+
+#: results in files, of every kind
+_RESULTS = (
+    "run", "sweep", "ramp", "down", "modes", "calibration", "campbell", "orbits", "optimum", "ring", "mistuning",
+    "ensemble", "life", "found", "deviations", "chain", "sectors", "part", "rom",
+)  # fmt: skip
+_SHOWN = (["info", "@"], ["report", "@", "-o", "out.html"])
 #: by the name of a sample: the words of commands that read the damaged file "damaged.*", or a call of Python
 READS: dict[str, tuple[list[str], ...]] = {
-    **{f"{name}.h5": (["report", "@", "-o", "out.html"], *(["export", "@", "-o", f"out.{e}"] for e in ("csv", "mat")))
-       for name in ("run", "sweep", "ramp", "down", "modes", "calibration", "campbell", "orbits", "optimum", "ring",
-                    "mistuning")},
-    "rom.h5": (["report", "@", "-o", "out.html"], ["run", "on_rom.toml"], ["export", "@", "-o", "out.uff"],
-               ["export", "@", "-o", "out.mat"]),
+    **{f"{name}.h5": (*_SHOWN, *(["export", "@", "-o", f"out.{ending}"] for ending in (
+        "csv", "mat", "uff", "vtkhdf", "op4", "dmig", "inp"))) for name in _RESULTS},
+    "study.claims.json": _SHOWN,
     **{f"mesh.{ending}": (["check", "on_mesh.toml"], ["check", "on_mesh.toml"], ["modal", "on_mesh.toml"])
        for ending in ("msh", "inp", "bdf", "unv", "med", "cdb")},
     **{name: (["import", "on_matrices.toml", "-o", "out.h5"],)
@@ -137,14 +185,14 @@ READS: dict[str, tuple[list[str], ...]] = {
 }  # fmt: skip
 
 
-def damaged(number: int, samples: Path) -> tuple[str, list[str]]:
+def damaged(number: int, samples: Path) -> tuple[str, list[list[str]]]:
     """Write the damaged file of a case, and what names it, to the working directory.
 
-    Returns the name of the whole one and the words of the command, or the name of a function of modal.measurements.
+    Returns the name of the whole one and the words of commands, or the name of a function of modal.measurements.
     """
     draw = random.Random(f"file {number}")
     name = draw.choice(list(READS))
-    target = Path(f"damaged{Path(name).suffix}")
+    target = Path(f"damaged{''.join(Path(name).suffixes)}")
     data = bytearray((samples / name).read_bytes())
     if name.endswith(".h5") and draw.random() < 0.8:
         data = data[:-_SEAL]  # as one of an earlier version, which has no checksum
@@ -153,13 +201,24 @@ def damaged(number: int, samples: Path) -> tuple[str, list[str]]:
             with contextlib.suppress(Exception):
                 _change_record(target, draw)
             data = bytearray(target.read_bytes())
-    text = target.suffix in (".toml", ".csv", ".inp", ".bdf", ".unv", ".cdb", ".mtx", ".msh", ".op4", ".uff")
+    if draw.random() < 0.02:
+        target.unlink(missing_ok=True)
+        target.mkdir()
+        return name, _words(name, target, draw)
+    text = target.suffix in (".toml", ".json", ".csv", ".inp", ".bdf", ".unv", ".cdb", ".mtx", ".msh", ".op4", ".uff")
     for _ in range(draw.choice((0, 1, 1, 2, 5)) if name.endswith(".h5") else draw.choice((1, 1, 2, 5))):
         data = _damage_text(data, draw) if text and draw.random() < 0.7 else _damage(data, draw)
     target.write_bytes(data)
+    target.chmod(0 if draw.random() < 0.02 else 0o644)  # the superuser reads it none the less
+    return name, _words(name, target, draw)
+
+
+def _words(name: str, target: Path, draw: random.Random) -> list[list[str]]:
+    """Return the words of all commands that show a result, or of one that reads a file of another kind."""
     _write_users(target.name)
-    words = draw.choice(READS[name])
-    return name, [target.name if word == "@" else word for word in words]
+    reads = READS[name]
+    of = reads if reads[:2] == _SHOWN else [draw.choice(reads)]
+    return [[target.name if word == "@" else word for word in words] for words in of]
 
 
 def _write_users(file: str) -> None:
@@ -218,10 +277,14 @@ def _damage(data: bytearray, draw: random.Random) -> bytearray:
 
 
 def _damage_text(data: bytearray, draw: random.Random) -> bytearray:
-    """Change a number, a word or a line."""
+    """Change a number, a word, a line or the encoding."""
     lines = data.decode("latin-1").split("\n")
     place = draw.randrange(len(lines))
-    match draw.randrange(6):
+    match draw.randrange(8):
+        case 6:
+            return bytearray(data.decode("latin-1").encode(draw.choice(("utf-16", "utf-32", "utf-8-sig", "cp037"))))
+        case 7:
+            lines[place] = lines[place].replace("=", "= " + NESTED).replace(":", ": " + NESTED, 1)
         case 0:
             del lines[place]
         case 1:
@@ -243,12 +306,19 @@ def _change_record(path: Path, draw: random.Random) -> None:
         name = draw.choice([name for name, item in file.items() if isinstance(item, h5py.Dataset)])
         attribute = draw.choice(list(file.attrs))
         values = file[name][()]
-        match draw.randrange(9):
+        match draw.randrange(13):
             case 0:
                 del file[name]
             case 1:
                 del file[name]
                 file[name] = draw.choice((np.zeros(0), np.zeros((2, 2, 2)), 1.0, "text", np.zeros(3, complex)))
+            case 9 | 10:
+                del file[name]
+                file[name] = draw.choice(_RETYPED)(values)
+            case 11:
+                file.attrs["schema_version"] = draw.choice((0, 2, -1, 2**40, np.nan, "1", "", [1, 1]))
+            case 12:  # keeps the scale of a dimension
+                _change_value(file.attrs, attribute, draw)
             case 2:
                 del file[name]
                 file[name] = np.asarray(values)[..., :-1]
@@ -258,7 +328,9 @@ def _change_record(path: Path, draw: random.Random) -> None:
             case 4:
                 del file.attrs[attribute]
             case 5:
-                file.attrs[attribute] = draw.choice((1, -1.0, "", "{", "[]", "{}", "null", "[1, 2]", np.zeros(3)))
+                file.attrs[attribute] = draw.choice((
+                    1, -1.0, "", "{", "[]", "{}", "null", "[1, 2]", np.zeros(3), NESTED, "[" + NESTED[::-1],
+                ))  # fmt: skip
             case 6:
                 text = str(file.attrs[attribute])
                 cut = draw.randrange(max(len(text), 1))
@@ -269,6 +341,17 @@ def _change_record(path: Path, draw: random.Random) -> None:
                 file.attrs[attribute] = np.bytes_(b"\xff\xfe" + str(file.attrs[attribute]).encode())
             case _:
                 file[name].attrs["DIMENSION_LIST"] = 1
+
+
+def _change_value(attributes: Any, name: str, draw: random.Random) -> None:
+    """Change, remove or retype a value within an attribute that is JSON text."""
+    data = json.loads(attributes[name])
+    holder, key = draw.choice(list(places(data)))
+    if draw.random() < 0.3:
+        del holder[key]
+    else:
+        holder[key] = draw.choice(WRONG[:-2])  # no dates in JSON
+    attributes[name] = json.dumps(data)
 
 
 if __name__ == "__main__":  # the samples, to a folder

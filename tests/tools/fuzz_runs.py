@@ -137,11 +137,13 @@ def _child(numbers: range, case: Callable[..., tuple[str, str, str | None]], wri
         def told() -> str:
             sys.stderr.flush()
             with open("standard_error.txt", encoding="utf-8", errors="replace") as stream:
-                return stream.read()
-
-        for number in numbers:
+                said = stream.read()
             os.ftruncate(2, 0)
             os.lseek(2, 0, os.SEEK_SET)
+            return said
+
+        for number in numbers:
+            told()
             try:
                 kind, end, wrong = case(number, told)
             except Exception:  # of the tool

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from scipy import io, sparse
 
-from vanedamp.files.foreign import apart
+from vanedamp.files.foreign import apart, self_contained
 from vanedamp.files.formats.matrices import MatrixFileError
 from vanedamp.files.sparse_indices import within_shape
 
@@ -34,6 +34,7 @@ def _matlab(path: str | Path) -> dict[str, Any]:
         return dict(io.loadmat(path, appendmat=False))
     except NotImplementedError:  # scipy's word for version 7.3
         with h5py.File(path) as file:
+            self_contained(file)
             return {name: _variable(item) for name, item in file.items() if not name.startswith("#")}
 
 

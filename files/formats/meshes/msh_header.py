@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.files.foreign import reading
 from vanedamp.files.toml_input import InputError
 
 _FORMAT, _NAMES, _NODES = b"$MeshFormat", b"$PhysicalNames", b"$Nodes"
@@ -29,28 +30,23 @@ class MeshHeader(NamedTuple):
 def read_header(path: str | Path) -> MeshHeader:
     """Return the header of a gmsh file (.msh, version 2 or 4). Raises InputError for any other file."""
     groups: dict[int, list[str]] = {dimension: [] for dimension in range(4)}
-    try:
-        with open(path, "rb") as lines:
-            if next(lines, b"").strip() != _FORMAT:
-                raise InputError(f"{path}: is no gmsh file; expected $MeshFormat in its first line")
-            version, binary, *_ = next(lines).split()
-            for line in lines:
-                if line.strip() == _NAMES:
-                    for _ in range(int(next(lines))):
-                        dimension, _, name = next(lines).decode().split(maxsplit=2)
-                        groups[int(dimension)].append(name.strip().strip('"'))
-                elif line.strip() == _NODES:
-                    if binary != b"0":
-                        return MeshHeader(groups, None)
-                    counts, in_blocks = next(lines).split(), version.startswith(b"4")
-                    if version.startswith(b"4.0"):
-                        return MeshHeader(groups, int(counts[1]))
-                    points = np.array(list(_in_blocks(lines, int(counts[0])) if in_blocks else _one_by_one(lines)))
-                    return MeshHeader(groups, int(counts[in_blocks]), float(np.ptp(points, axis=0).max()))
-    except (OSError, ValueError, StopIteration, KeyError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: cannot be read as a gmsh file ({error or 'it ends early'})") from None
+    with reading(path, InputError, "cannot be read as a gmsh file"), open(path, "rb") as lines:
+        if next(lines, b"").strip() != _FORMAT:
+            raise InputError(f"{path}: is no gmsh file; expected $MeshFormat in its first line")
+        version, binary, *_ = next(lines).split()
+        for line in lines:
+            if line.strip() == _NAMES:
+                for _ in range(int(next(lines))):
+                    dimension, _, name = next(lines).decode().split(maxsplit=2)
+                    groups[int(dimension)].append(name.strip().strip('"'))
+            elif line.strip() == _NODES:
+                if binary != b"0":
+                    return MeshHeader(groups, None)
+                counts, in_blocks = next(lines).split(), version.startswith(b"4")
+                if version.startswith(b"4.0"):
+                    return MeshHeader(groups, int(counts[1]))
+                points = np.array(list(_in_blocks(lines, int(counts[0])) if in_blocks else _one_by_one(lines)))
+                return MeshHeader(groups, int(counts[in_blocks]), float(np.ptp(points, axis=0).max()))
     raise InputError(f"{path}: has no $Nodes; save it as a mesh")
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+import h5py
 import numpy as np
 
-from vanedamp.files.foreign import apart
+from vanedamp.files.foreign import apart, self_contained
 from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError
 
 
@@ -53,6 +54,9 @@ def read(path: Path) -> LabelledMesh:
 
 def _read(meshlane: Any, path: Path) -> Any:
     """Return the mesh as meshlane reads it. Raises ValueError with its output: it may end the program."""
+    if h5py.is_hdf5(path):
+        with h5py.File(path) as file:
+            self_contained(file)
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):

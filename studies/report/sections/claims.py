@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from vanedamp.files.foreign import reading
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.page import Page
@@ -17,10 +18,8 @@ KIND = CLAIMS
 
 def load(path: Path) -> Result:
     """Read what `vanedamp paper` wrote. Raises InputError."""
-    try:
+    with reading(path, InputError, "not JSON"):
         data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error})") from error
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected an object with study, title, sources and claims")
     study = validate(Study, data, str(path))

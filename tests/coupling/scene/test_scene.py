@@ -54,6 +54,17 @@ def put(path, value):
         (put(["time"], {"periods": 10, "transient": 10}), r"time: transient \(10\) must be less than periods"),
         (put(["gravity"], {"orientation_deg": 120.0}), r"damper\[0\]: gravity lifts the body off the floor"),
         (put(["cavity", 1, "name"], "c1"), "cavity: the name 'c1' is used twice"),
+        *(
+            (
+                put(["cavity", 1, "name"], name),
+                r"cavity\[1\].name: expected a word of at most 200 characters that is no",
+            )
+            for name in ("", ".", "a/b", "/", "a.b", "1", "gap", "a\0b", "a\nb", "x" * 201)
+        ),
+        (
+            put(["sweep"], {"cavity.c1.scatter.gap": [0.1], "cavity.c1_scatter.gap": [1e-5]}),
+            r"sweep.cavity.c1_scatter.gap: files have _ for dots, which makes it cavity.c1.scatter.gap; rename the",
+        ),
     ],
 )
 def test_mistakes_are_named(change, message):

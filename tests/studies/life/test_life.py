@@ -141,7 +141,9 @@ def test_resumes_after_an_interrupt_at_any_run(monkeypatch, tmp_path):
         monkeypatch.setattr(fast, "simulate", rest := Damper())
         record = life(case, checkpoint=kept)
         assert stopped.calls - 1 + rest.calls == whole.runs
-        assert record.hours == whole.hours and np.array_equal(record.gap, whole.gap)
+        for name, one in (("whole.h5", whole), ("resumed.h5", record)):
+            one.save(tmp_path / name)
+        assert (tmp_path / "resumed.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
         kept.unlink()
     monkeypatch.setattr(fast, "simulate", Damper(fail=9))
     with pytest.raises(KeyboardInterrupt):
@@ -161,6 +163,7 @@ def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     assert record.sentence in told and "reduction, %" in told
     assert not list(tmp_path.glob("*.partial"))
     data = json.loads((tmp_path / "life.json").read_text())
+    assert data["wall_time_s"] > 0 and f"{record.runs} runs in" in told
     assert [data["starts"][name]["starts"] for name in ("new", "end")] == [3, 3] and data["starts"] == record.starts
     assert "as new, from the worst of 3 starts" in told and "at the end, from the worst of 3 starts" in told
     assert data["hours"] == pytest.approx(list(record.hours))
@@ -227,7 +230,7 @@ def test_bad_input_is_one_line(tmp_path, capsys, table, change, said):
     assert told.err.count("\n") == 1 and said in told.err and not told.out
 
 
-def test_a_patch_that_is_not_known_is_asked_for(monkeypatch):
+def test_a_patch_that_is_not_known_is_asked_for(monkeypatch, tmp_path):
     data = copy.deepcopy(SCENE)
     del data["wear"]["area"]
 
@@ -239,8 +242,10 @@ def test_a_patch_that_is_not_known_is_asked_for(monkeypatch):
             return response
 
     monkeypatch.setattr(fast, "simulate", Bare())
+    kept = tmp_path / "life.h5.partial"
     with pytest.raises(InputError, match=r"wear.width: the patch of damper 0 at left is not known; give wear.width"):
-        life(LifeStudy.of(data))
+        life(LifeStudy.of(data), checkpoint=kept)
+    assert not kept.exists()  # it would block the corrected study
 
 
 # the engine

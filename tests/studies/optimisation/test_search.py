@@ -68,7 +68,6 @@ def test_best_of_all_that_was_tried(found):
     others = len(best) * len(STARTS) * len(record.frequency)
     (_, at_first), (done, expected) = calls[0], calls[-1]
     assert done == record.scenes + others <= expected <= at_first and record.trouble == 0
-    assert f"{record.scenes} scenes in" in record.sentence
     for name, optimum in (("nominal", record.nominal), ("robust", record.robust)):
         assert record.starts[name]["starts"] == 3  # of which one is that of the search
         assert record.starts[name]["peak_ratio"] >= optimum.amplitude * (1 - 1e-9)
@@ -132,8 +131,9 @@ def test_a_search_that_is_interrupted_three_times_gives_the_same_answer(found, t
     assert resumed.scenes == found[0].scenes and calls[-1] == found[1][-1][0]
     # what was done is not done again
     assert calls[before] > stop and len(calls) <= len(found[1]) + 6
-    for name in ("map_amplitude", "history_design", "history_amplitude", "robust_response"):
-        np.testing.assert_array_equal(getattr(resumed, name), getattr(found[0], name))
+    for name, record in (("whole.h5", found[0]), ("resumed.h5", resumed)):
+        record.save(tmp_path / name)
+    assert (tmp_path / "resumed.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
     other = Study.load(study(tmp_path, lambda data: data["optimise"].update(seed=7)))
     with pytest.raises(InputError, match="the checkpoint of another study; nothing was done to it"):
         optimise(other, provenance={"a": 1}, checkpoint=file)
@@ -313,6 +313,7 @@ def test_command(tmp_path, capsys, monkeypatch):
     result = json.loads(capsys.readouterr().out)
     assert result["nominal"]["reduction"] == pytest.approx(1 - result["nominal"]["amplitude"])
     assert Optimisation.load("o.h5").sentence == result["sentence"]
+    assert result["wall_time_s"] > 0
 
 
 @pytest.mark.parametrize(
