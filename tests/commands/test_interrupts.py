@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
-from tests.tools.processes import environment, without_stages
+from tests.tools.processes import PATIENCE, environment, until, without_stages
 from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import StoreError, replacing, together
 from vanedamp.studies.interrupts import swallowed_interrupts_again
@@ -69,14 +69,6 @@ def ignore_interrupts():
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def until(condition):
-    """Wait for what will happen, a minute at most."""
-    end = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.03)
-
-
 def members(group):
     """Processes of a process group."""
     found = []
@@ -89,7 +81,7 @@ def members(group):
 
 def check(process, folder, ended=(130, "", "vanedamp: interrupted\n")):
     try:
-        out, error = process.communicate(timeout=120.0)
+        out, error = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         raise
