@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import signal
 import sys
@@ -61,20 +62,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         with swallowed_interrupts_again():
             status = _on_first_rank(sys.argv[1:] if argv is None else argv)
         if argv is None:
-            _ignore_interrupts()
+            _leave()
     except KeyboardInterrupt:
         if argv is None:
-            _ignore_interrupts()
+            _leave()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
     return status
 
 
-def _ignore_interrupts() -> None:
-    """Ignore interrupts while the interpreter and libraries end: one there would end the process without a line."""
+def _leave() -> None:
+    """Prepare the end of the process, without interrupts: one there would end it without a line."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    gc.freeze()  # collecting what the end of the process frees takes longer than all else after an interrupt
+    exec("")  # CPython would end by the signal after an interrupt within exec, such as of a dataclass; this forgets it
 
 
 def _on_first_rank(words: Sequence[str]) -> int:
