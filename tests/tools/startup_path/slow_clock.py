@@ -23,7 +23,7 @@ def install() -> None:
     factor = float(os.environ.get(VARIABLE) or 0.0)
     if factor == 0.0 or hasattr(time.monotonic, "__wrapped__"):
         return
-    for name in ("monotonic", "perf_counter", "process_time", "time"):
+    for name in ("monotonic", "perf_counter", "process_time", "thread_time", "time"):
         setattr(time, name, _clock(getattr(time, name), factor))
     time.sleep = _sooner(time.sleep, 0, factor)
     signal.setitimer = _sooner(signal.setitimer, 1, factor)
