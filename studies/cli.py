@@ -59,8 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
     terminated = terminate_as_interrupt() if argv is None else []
     try:
-        with swallowed_interrupts_again():
-            status = _on_first_rank(sys.argv[1:] if argv is None else argv)
+        status = _on_first_rank(sys.argv[1:] if argv is None else argv)
         if argv is None:
             _leave()
     except KeyboardInterrupt:
@@ -93,7 +92,7 @@ def _on_first_rank(words: Sequence[str]) -> int:
 def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), swallowed_interrupts_again():
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
             arguments = _parser(words[0] if words else None).parse_args(words)

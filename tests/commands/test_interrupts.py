@@ -138,17 +138,38 @@ def test_termination_leaves_no_workers_and_no_semaphores(send, ignoring, tmp_pat
     check(process, tmp_path, (143, "", "vanedamp: terminated\n"))
 
 
-def test_interrupts_that_a_callback_swallows_come_again():
+def test_interrupts_that_are_swallowed_come_again():
     @ctypes.CFUNCTYPE(None)
     def callback():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), swallowed_interrupts_again():
         callback()
-    before = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), swallowed_interrupts_again():
+        try:
+            interrupt()
+        except KeyboardInterrupt:
+            raise ImportError from None  # as numpy does
+    before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
     with swallowed_interrupts_again():
-        assert sys.unraisablehook is not before
-    assert sys.unraisablehook is before
+        assert sys.unraisablehook is not before[0]
+    assert (sys.unraisablehook, signal.getsignal(signal.SIGINT)) == before
+    with pytest.raises(ImportError), swallowed_interrupts_again():
+        raise ImportError
+
+
+def test_an_interrupt_within_exec_ends_the_command_as_any_other():
+    """As where modules make named tuples: CPython would end the process by the signal, whoever has caught it."""
+    code = (
+        "from vanedamp.studies import cli\n"
+        "cli._run = lambda words: exec('import signal; signal.raise_signal(signal.SIGINT)')\n"
+        "raise SystemExit(cli.main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), stderr=subprocess.PIPE, text=True, check=False,
+        preexec_fn=heed_interrupts,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "vanedamp: interrupted\n")
 
 
 def test_interrupts_wait_while_processes_start_whichever_thread_gets_them():
