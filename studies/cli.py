@@ -76,7 +76,7 @@ def _leave() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
     gc.freeze()  # collecting what the end of the process frees takes longer than all else after an interrupt
-    exec("")  # CPython would end by the signal after an interrupt within exec, such as of a dataclass; this forgets it
+    exec("")  # CPython remembers an interrupt within the last exec, such as of a dataclass, and would end by the signal
 
 
 def _on_first_rank(words: Sequence[str]) -> int:

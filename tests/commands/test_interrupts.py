@@ -158,16 +158,16 @@ def test_interrupts_that_are_swallowed_come_again():
         raise ImportError
 
 
-def test_an_interrupt_within_exec_ends_the_command_as_any_other():
-    """As where modules make named tuples: CPython would end the process by the signal, whoever has caught it."""
-    code = (
+def test_an_interrupt_within_exec_ends_the_command_as_any_other(tmp_path):
+    """As where modules make named tuples: CPython would end `python -m` by the signal, whoever has caught it."""
+    (tmp_path / "program.py").write_text(
         "from vanedamp.studies import cli\n"
         "cli._run = lambda words: exec('import signal; signal.raise_signal(signal.SIGINT)')\n"
         "raise SystemExit(cli.main())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], env=environment(), stderr=subprocess.PIPE, text=True, check=False,
-        preexec_fn=heed_interrupts,
+        [sys.executable, "-m", "program"], cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True,
+        check=False, preexec_fn=heed_interrupts,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (130, "vanedamp: interrupted\n")
 
