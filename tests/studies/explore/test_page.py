@@ -287,7 +287,13 @@ def test_parts_of_a_curve_are_sweeps_of_what_is_done():
     assert list(part.status) == ["ok"] * len(found)
 
 
-def test_newer_curve_cancels_the_one_before_of_its_tab_only():
+@pytest.fixture
+def still(monkeypatch):
+    """Between the requests of tabs no time passes."""
+    monkeypatch.setattr("vanedamp.studies.explore.curves.time.monotonic", lambda: 1000.0)
+
+
+def test_newer_curve_cancels_the_one_before_of_its_tab_only(still):
     exploration, submit = page.Exploration.of(scene(), "scene.toml"), Waiting()
     curves = Curves(submit)
 
@@ -308,7 +314,7 @@ def test_newer_curve_cancels_the_one_before_of_its_tab_only():
     assert second.wanted
 
 
-def test_curve_of_a_closed_tab_gives_its_workers_back():
+def test_curve_of_a_closed_tab_gives_its_workers_back(still):
     exploration, submit = page.Exploration.of(scene(), "scene.toml"), Waiting()
     curves = Curves(submit)
 
