@@ -1,15 +1,14 @@
 """`pytest --slow-clock [FACTOR]`: as on a machine that takes FACTOR times as long, by the clocks that vanedamp reads.
 
-Clocks run faster, and sleeps, timers and limits end sooner, by this factor, for callers in vanedamp, its benchmarks and
+Clocks run faster, and sleeps, timers and waits end sooner, by this factor, for callers in vanedamp, its benchmarks and
 the paper's studies: stages take long, progress is told, what is due after a time is due. All others, such as tests that
 wait for a process, keep the clock. A factor far below 1 is a machine on which nothing is ever due.
 
-Not reached: options that name a time limit to a library or a process (subprocess's timeout), JavaScript.
+Not reached: limits by signals, options that name a limit to a library or a process (subprocess's timeout), JavaScript.
 """
 
 import functools
 import os
-import signal
 import sys
 import threading
 import time
@@ -26,7 +25,6 @@ def install() -> None:
     for name in ("monotonic", "perf_counter", "process_time", "thread_time", "time"):
         setattr(time, name, _clock(getattr(time, name), factor))
     time.sleep = _sooner(time.sleep, 0, factor)
-    signal.setitimer = _sooner(signal.setitimer, 1, factor)
     threading.Timer.__init__ = _sooner(threading.Timer.__init__, 1, factor)
     threading.Condition.wait_for = _sooner(threading.Condition.wait_for, 2, factor)
 
