@@ -83,9 +83,9 @@ def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callab
     finally:
         _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
-        number = os.WTERMSIG(status)
+        number = signal.Signals(os.WTERMSIG(status))
         limits = {signal.SIGPROF: seconds, signal.SIGALRM: _WAITS * seconds}
-        what = f"takes more than {limits[number]} s" if number in limits else signal.Signals(number).name
+        what = f"takes more than {limits[number]} s" if number in limits else number.name
         raise error(f"{path}: damaged: its library ends in the middle of it ({what}); write it again")
     made, failure = pickle.loads(told)
     if failure is not None:
