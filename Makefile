@@ -12,7 +12,7 @@ SETUP = $(if $(filter file,$(origin PYTHON)),scripts/setup.sh,:)
 SPELLED = README.md CONTRIBUTING.md CHANGELOG.md docs files meshes modal rom coupling studies benchmarks paper scripts vanedamp/__init__.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-arithmetic test-last-bits test-doors test-versions check bench docs
+.PHONY: help setup demo test test-all test-arithmetic test-last-bits test-slow-clock test-doors test-versions check bench docs
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z%-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -37,6 +37,9 @@ test-arithmetic: setup-tests setup-docs ## the fast tier under the arithmetic of
 
 test-last-bits: setup-tests setup-docs ## the fast tier with other last bits of the libraries, under three new seeds (ARGUMENTS="SEED ... TEST ...")
 	PYTHON=$(PYTHON) scripts/test_last_bits.sh $(ARGUMENTS)
+
+test-slow-clock: setup-tests setup-docs ## the fast tier as on a machine that is 100 times slower (ARGUMENTS="TEST ...")
+	$(TESTS) $(ARGUMENTS) --slow-clock
 
 test-doors: setup-tests ## what users install, tried: newest and oldest packages, what demo installs, dolfinx's wheel (ARGUMENTS="new ...")
 	PYTHON=$(PYTHON) scripts/test_doors.sh $(ARGUMENTS)

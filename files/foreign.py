@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 #: signals that end a fork at once; PETSc catches some, and ends the process with a page of text
 _DEADLY = [
     getattr(signal, name)
-    for name in ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS", "SIGALRM", "SIGINT", "SIGTERM")
+    for name in ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS", "SIGALRM", "SIGPROF", "SIGINT", "SIGTERM")
     if hasattr(signal, name)
 ]
 _Read = TypeVar("_Read")
-#: s for a fork, and bytes a second beyond them: a slow disk's
-_PATIENCE, _SPEED = 60, 1e6
+#: s of processor time for a fork, and bytes a second beyond them; and how many times as long it may wait
+_PATIENCE, _SPEED, _WAITS = 60, 1e6, 20
 #: bytes that deflate makes of one, at most
 _INFLATED = 1100
 #: bytes that a fork may take, and further ones per byte of its file
@@ -124,8 +124,9 @@ def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callab
     finally:
         _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
-        number = os.WTERMSIG(status)
-        what = f"takes more than {seconds} s" if number == signal.SIGALRM else signal.Signals(number).name
+        number = signal.Signals(os.WTERMSIG(status))
+        limits = {signal.SIGPROF: seconds, signal.SIGALRM: _WAITS * seconds}
+        what = f"takes more than {limits[number]} s" if number in limits else number.name
         raise error(f"{path}: damaged: its library ends in the middle of it ({what}); write it again")
     made, failure, of_input = pickle.loads(told)
     if failure is not None:
@@ -141,7 +142,8 @@ def _tell(read: Callable[[], object], writing: int, seconds: int, memory: int) -
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
-        signal.alarm(seconds)
+        signal.setitimer(signal.ITIMER_PROF, seconds)  # on a busy machine the clock says nothing of the file
+        signal.alarm(_WAITS * seconds)
         try:
             _limit_memory(memory)
             told = pickle.dumps((read(), None, False), protocol=5)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import io
 import os
 import re
@@ -70,13 +71,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # characters that its encoding does not have
     terminated = terminate_as_interrupt() if argv is None else []
     try:
-        with swallowed_interrupts_again():
-            status = _on_first_rank(sys.argv[1:] if argv is None else argv)
+        status = _on_first_rank(sys.argv[1:] if argv is None else argv)
         if argv is None:
-            _ignore_interrupts()
+            _leave()
     except KeyboardInterrupt:
         if argv is None:
-            _ignore_interrupts()
+            _leave()
         print("vanedamp: terminated" if terminated else "vanedamp: interrupted", file=sys.stderr)
         status = _TERMINATED if terminated else _INTERRUPTED
     finally:
@@ -113,11 +113,13 @@ def _drop_unwritten() -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _ignore_interrupts() -> None:
-    """Ignore interrupts while the interpreter and libraries end: one there would end the process without a line."""
+def _leave() -> None:
+    """Prepare the end of the process, without interrupts: one there would end it without a line."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    gc.freeze()  # collecting what the end of the process frees takes longer than all else after an interrupt
+    exec("")  # CPython remembers an interrupt within the last exec, such as of a dataclass, and would end by the signal
 
 
 def _on_first_rank(words: Sequence[str]) -> int:
@@ -135,7 +137,7 @@ def _on_first_rank(words: Sequence[str]) -> int:
 def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), swallowed_interrupts_again():
             if not sys.warnoptions:  # of numbers that overflow before the line that rejects them
                 warnings.simplefilter("ignore", RuntimeWarning)
             parser, command = _parsers(words[0] if words else None)

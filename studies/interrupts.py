@@ -16,8 +16,12 @@ _SOON = 0.02
 
 @contextmanager
 def swallowed_interrupts_again() -> Iterator[None]:
-    """Repeat an interrupt that a callback cannot pass on: LLVM has some while compiled functions are loaded."""
-    before, again = sys.unraisablehook, list[threading.Timer]()
+    """Repeat an interrupt that is swallowed: by a callback, such as LLVM's while compiled functions are loaded, which
+    cannot pass it on; or by a library that makes another error of it, such as numpy while it loads.
+    """
+    before, again, came = sys.unraisablehook, list[threading.Timer](), list[int]()
+    handler = signal.getsignal(signal.SIGINT)
+    heeded = callable(handler) and threading.current_thread() is threading.main_thread()
 
     def hook(unraisable: Any) -> None:
         if unraisable.exc_type is not None and issubclass(unraisable.exc_type, KeyboardInterrupt):
@@ -26,13 +30,25 @@ def swallowed_interrupts_again() -> Iterator[None]:
         else:
             before(unraisable)
 
+    def note(number: int, frame: Any) -> None:
+        came.append(number)
+        handler(number, frame)  # type: ignore[operator, misc]
+
     sys.unraisablehook = hook
+    if heeded:
+        signal.signal(signal.SIGINT, note)
     try:
         yield
         for timer in again:
             timer.join()
+    except Exception as error:
+        if came:
+            raise KeyboardInterrupt from error
+        raise
     finally:
         sys.unraisablehook = before
+        if heeded:
+            signal.signal(signal.SIGINT, handler)
 
 
 def terminate_as_interrupt() -> list[int]:

@@ -62,20 +62,27 @@ class _Alone:
     def __init__(self) -> None:
         self.title = ""
         self.timer: threading.Timer | None = None
+        self.lock = threading.Lock()
 
     def enter(self, title: str) -> str:
         """Show another stage, or none (""). Returns the one before."""
-        before, self.title = self.title, title
+        with self.lock:  # a line that is due now comes before what follows the stage, or not at all
+            before, self.title = self.title, title
         if self.timer is not None:
             self.timer.cancel()
-            self.timer = None
         if sys.stderr.isatty():
             print("\r\x1b[K" + (f"vanedamp: {title} ..." if title else ""), end="", file=sys.stderr, flush=True)
         elif title:
-            self.timer = threading.Timer(_SOON, _print, [f"{title} ..."])
+            self.timer = threading.Timer(_SOON, self.name, [title])
             self.timer.daemon = True
             self.timer.start()
         return before
+
+    def name(self, title: str) -> None:
+        """Name a stage, unless it has ended."""
+        with self.lock:
+            if self.title == title:
+                _print(f"{title} ...")
 
 
 class Bar:
@@ -140,7 +147,8 @@ class _Lines:
 
 
 def _print(text: str) -> None:
-    print(f"vanedamp: {text}", file=sys.stderr, flush=True)
+    # in one piece: another thread may print
+    print(f"vanedamp: {text}\n", end="", file=sys.stderr, flush=True)
 
 
 def duration(seconds: float) -> str:

@@ -1,24 +1,37 @@
 """Expensive records and working directories that several test files share; options of these tests."""
 
+import os
 import site
 import sys
 from pathlib import Path
 
 import pytest
 
+from tests.tools.processes import startup, without_stages
+
 
 def pytest_addoption(parser):
     parser.addoption(
         "--last-bits", type=int, metavar="SEED", help="perturb numerical results: tests/tools/last_bits.py"
     )
+    parser.addoption(
+        "--slow-clock", type=float, nargs="?", const=100.0, metavar="FACTOR",
+        help="let all that vanedamp does take as many times as long, 100 by default, by its clocks: "
+        "tests/tools/startup_path/slow_clock.py",
+    )  # fmt: skip
 
 
 def pytest_configure(config):
-    seed = config.getoption("last_bits")
+    seed, factor = config.getoption("last_bits"), config.getoption("slow_clock")
     if seed is not None:
         from tests.tools.last_bits import begin
 
         begin(seed)
+    if factor is not None:
+        from tests.tools.startup_path import slow_clock
+
+        os.environ |= startup() | {slow_clock.VARIABLE: str(factor)}
+        slow_clock.install()
     import vanedamp.modal.stack  # noqa: F401
 
 
@@ -31,8 +44,11 @@ def pytest_collection_modifyitems():
 
 
 def pytest_report_header(config):
-    seed = config.getoption("last_bits")
-    return None if seed is None else f"last bits: seed {seed}"
+    return [
+        f"{name.replace('_', ' ')}: {value:g}"
+        for name in ("last_bits", "slow_clock")
+        if (value := config.getoption(name)) is not None
+    ]
 
 
 def pytest_terminal_summary(terminalreporter):
@@ -41,6 +57,28 @@ def pytest_terminal_summary(terminalreporter):
             "Skipped tests: `make setup` installs what they lack (`make setup-browser setup-peers setup-docs`), "
             "unless they name a command."
         )
+
+
+def timeless(capture):
+    """What is printed on a fast machine: a busy one names its stages and tells its progress."""
+    read = capture.readouterr
+
+    def readouterr():
+        found = read()
+        return found._replace(err=without_stages(found.err))
+
+    capture.readouterr = readouterr
+    return capture
+
+
+@pytest.fixture
+def capsys(capsys):
+    return timeless(capsys)
+
+
+@pytest.fixture
+def capfd(capfd):
+    return timeless(capfd)
 
 
 @pytest.fixture

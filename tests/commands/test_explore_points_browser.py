@@ -13,7 +13,7 @@ import pytest
 
 from tests.commands.test_interrupts import heed_interrupts
 from tests.tools.input_files import SCENE, changed
-from tests.tools.processes import environment
+from tests.tools.processes import PATIENCE, environment
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
@@ -21,8 +21,6 @@ from vanedamp.coupling.sweep.sweep import sweep
 pytest.importorskip("dash", reason="the page is made with dash")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
 
-#: ms, on a machine that does much else
-PATIENCE = 120_000
 GAPS = [4e-4, 1e-4, 2e-4]
 AXES = f"""
 "excitation.frequency" = {{start = 15.4, stop = 16.2, num = 9}}
@@ -40,7 +38,7 @@ def opened(browser, folder, *words):
     try:
         address = server.stdout.readline().strip()
         page = browser.new_page(viewport={"width": 1300, "height": 1000})
-        page.set_default_timeout(PATIENCE)
+        page.set_default_timeout(1000 * PATIENCE)
         requests, complaints = [], []
         page.on("request", lambda request: requests.append(request.url))
         page.on("console", lambda message: complaints.append(message.text))
@@ -52,11 +50,11 @@ def opened(browser, folder, *words):
         page.close()
     finally:
         server.send_signal(signal.SIGINT)
-        server.communicate(timeout=60.0)
+        server.communicate(timeout=PATIENCE)
 
 
 def says(page, selector, text):
-    playwright.expect(page.locator(selector)).to_contain_text(text, timeout=PATIENCE)
+    playwright.expect(page.locator(selector)).to_contain_text(text, timeout=1000 * PATIENCE)
 
 
 def click(page, points, number):
@@ -102,7 +100,7 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path, browser):
         page.get_by_label("mass of a body, g").fill("30")
         says(page, "#point-stale", "The scene has changed since")
         page.locator("#point-show").click()
-        playwright.expect(page.locator("#point-stale")).to_be_empty(timeout=PATIENCE)
+        playwright.expect(page.locator("#point-stale")).to_be_empty(timeout=1000 * PATIENCE)
 
 
 def test_sliders_move_through_a_sweep(tmp_path, browser):

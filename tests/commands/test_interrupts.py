@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
-from tests.tools.processes import environment, without_stages
+from tests.tools.processes import PATIENCE, environment, until, without_stages
 from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import StoreError, replacing, together
 from vanedamp.studies.interrupts import swallowed_interrupts_again
@@ -69,14 +69,6 @@ def ignore_interrupts():
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def until(condition):
-    """Wait for what will happen, a minute at most."""
-    end = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.03)
-
-
 def members(group):
     """Processes of a process group."""
     found = []
@@ -89,7 +81,7 @@ def members(group):
 
 def check(process, folder, ended=(130, "", "vanedamp: interrupted\n")):
     try:
-        out, error = process.communicate(timeout=120.0)
+        out, error = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         raise
@@ -146,17 +138,38 @@ def test_termination_leaves_no_workers_and_no_semaphores(send, ignoring, tmp_pat
     check(process, tmp_path, (143, "", "vanedamp: terminated\n"))
 
 
-def test_interrupts_that_a_callback_swallows_come_again():
+def test_interrupts_that_are_swallowed_come_again():
     @ctypes.CFUNCTYPE(None)
     def callback():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), swallowed_interrupts_again():
         callback()
-    before = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), swallowed_interrupts_again():
+        try:
+            interrupt()
+        except KeyboardInterrupt:
+            raise ImportError from None  # as numpy does
+    before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
     with swallowed_interrupts_again():
-        assert sys.unraisablehook is not before
-    assert sys.unraisablehook is before
+        assert sys.unraisablehook is not before[0]
+    assert (sys.unraisablehook, signal.getsignal(signal.SIGINT)) == before
+    with pytest.raises(ImportError), swallowed_interrupts_again():
+        raise ImportError
+
+
+def test_an_interrupt_within_exec_ends_the_command_as_any_other(tmp_path):
+    """As where modules make named tuples: CPython would end `python -m` by the signal, whoever has caught it."""
+    (tmp_path / "program.py").write_text(
+        "from vanedamp.studies import cli\n"
+        "cli._run = lambda words: exec('import signal; signal.raise_signal(signal.SIGINT)')\n"
+        "raise SystemExit(cli.main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "program"], cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True,
+        check=False, preexec_fn=heed_interrupts,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "vanedamp: interrupted\n")
 
 
 def test_interrupts_wait_while_processes_start_whichever_thread_gets_them():

@@ -1,14 +1,18 @@
 """One line for what is wrong: in files that look right, and for work that nobody would wait for."""
 
+import io
+import sys
 from importlib.metadata import version
 
 import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
+from tests.tools.processes import until, without_stages
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
+from vanedamp.studies import terminal
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.terminal import progress, stage, stages_shown
 
@@ -178,18 +182,24 @@ def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
     assert found[0] == found[1]
 
 
-def test_long_work_says_in_a_log_how_far_it_is(capsys, monkeypatch):
-    now = [0.0]
+def log_of(monkeypatch):
+    """Standard error from now on, with the lines on stages and progress, which `capsys` leaves out."""
+    monkeypatch.setattr("sys.stderr", io.StringIO())
+    return sys.stderr
+
+
+def test_long_work_says_in_a_log_how_far_it_is(monkeypatch):
+    log, now = log_of(monkeypatch), [0.0]
     monkeypatch.setattr("vanedamp.studies.terminal.time.monotonic", lambda: now[0])
     with progress("sweep") as report:
         for done in range(100, 401, 100):  # the first hundred was there before
             report(done, 400)
             now[0] += 20.0
-    assert capsys.readouterr().err == "vanedamp: sweep: 300 of 400, 5 per second, 0.333 min left\n"
+    assert log.getvalue() == "vanedamp: sweep: 300 of 400, 5 per second, 0.333 min left\n"
 
 
-def test_what_is_done_before_the_first_point_says_nothing_of_the_rate(capsys, monkeypatch):
-    now = [0.0]
+def test_what_is_done_before_the_first_point_says_nothing_of_the_rate(monkeypatch):
+    log, now = log_of(monkeypatch), [0.0]
     monkeypatch.setattr("vanedamp.studies.terminal.time.monotonic", lambda: now[0])
     with progress("sweep") as report:
         now[0] = 40.0  # such as the engine, which is compiled
@@ -198,17 +208,30 @@ def test_what_is_done_before_the_first_point_says_nothing_of_the_rate(capsys, mo
                 report(done, 4)
             now[0] += 30.0
     told = "vanedamp: sweep, map: {} of 4, 0.0333 per second, {} min left\n"
-    assert capsys.readouterr().err == told.format(1, 1.5) + told.format(2, 1)
+    assert log.getvalue() == told.format(1, 1.5) + told.format(2, 1)
 
 
-def test_stages_show_in_commands_only(capsys, monkeypatch):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+def test_a_log_names_a_stage_that_takes_long_and_none_that_has_ended(monkeypatch):
+    log = log_of(monkeypatch)
+    monkeypatch.setattr(terminal, "_SOON", 1e-3)
+    with stages_shown():
+        with stage("mesh"):
+            until(lambda: log.getvalue() == "vanedamp: mesh ...\n")
+        lines = terminal._DISPLAY.get()
+        lines.name("mesh")  # by a timer that is up as the stage ends
+    assert log.getvalue() == "vanedamp: mesh ...\n"
+    assert without_stages(log.getvalue()) == ""
+
+
+def test_stages_show_in_commands_only(monkeypatch):
+    log = log_of(monkeypatch)
+    log.isatty = lambda: True
     with stage("modes"):
         pass
-    assert capsys.readouterr().err == ""
+    assert log.getvalue() == ""
     with stages_shown(), stage("modes"):
         pass
-    assert capsys.readouterr().err == "\r\x1b[Kvanedamp: modes ...\r\x1b[K"
+    assert log.getvalue() == "\r\x1b[Kvanedamp: modes ...\r\x1b[K"
 
 
 def test_figures_of_a_run_have_units(folder, capsys):

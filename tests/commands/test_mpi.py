@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK
-from tests.tools.processes import RANKS, ROOT, environment
+from tests.tools.processes import PATIENCE, RANKS, ROOT, environment
 from vanedamp.modal.records.modes import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mp
 def on_two_ranks(*arguments, cwd, program=("-m", "vanedamp")):
     command = ["mpirun", "-n", "2", sys.executable, *program, *arguments]
     return subprocess.run(
-        command, cwd=cwd, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=300
+        command, cwd=cwd, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=PATIENCE
     )
 
 

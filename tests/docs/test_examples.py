@@ -16,7 +16,7 @@ import tomli_w
 from benchmarks import BENCHMARKS
 from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
-from tests.tools.processes import RANKS, ROOT, environment
+from tests.tools.processes import PATIENCE, RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
@@ -204,7 +204,7 @@ def run(text: str, folder: Path) -> str:
     (folder / "program.py").write_text(text)
     done = subprocess.run(
         [sys.executable, "program.py"], cwd=folder, env=environment(**RANKS), capture_output=True, text=True,
-        check=False, timeout=300,
+        check=False, timeout=PATIENCE,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -18,7 +18,7 @@ pytest.importorskip("myst_parser", reason="needs the extra docs")
 from docs._ext import commands, pages, python_api, toml_keys
 from docs.check_site import faults
 from tests.tools.input_files import SCENE
-from tests.tools.processes import ROOT, environment
+from tests.tools.processes import PATIENCE, ROOT, environment
 from tests.tools.schemas import shipped_schemas
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
@@ -258,7 +258,7 @@ def test_search_in_a_browser_from_files(site):
         for key in ("normal_load", "base_acceleration", "damper.normal_load", "orientation_deg", "centrifugal_deg"):
             page.goto(f"{(site / 'search.html').as_uri()}?q={key}")
             first = page.locator("#search-results ul.search li a").first
-            first.wait_for(timeout=20000)
+            first.wait_for(timeout=1000 * PATIENCE)
             target = first.get_attribute("href")
             assert target.startswith("reference/scene.html#") and target.endswith(f".{key.split('.')[-1]}"), target
             page.goto(f"{site.as_uri()}/{target}")
@@ -266,7 +266,7 @@ def test_search_in_a_browser_from_files(site):
         for asked_for in ("external.interface.<name>.direction", "external.interface.direction"):
             page.goto(f"{(site / 'search.html').as_uri()}?q={quote(asked_for)}")
             first = page.locator("#search-results ul.search li a").first
-            first.wait_for(timeout=20000)
+            first.wait_for(timeout=1000 * PATIENCE)
             assert first.get_attribute("href") == "reference/external.html#interface.name.direction"
             assert first.inner_text() == "external.interface.NAME.direction"
         for name in ("index", "engine", "reference/commands", "tutorial/index", "auto_gallery/index"):

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from tests.tools.processes import without_stages
 from vanedamp.files.errors import VanedampError
 from vanedamp.studies.cli import BAD_INPUT, main
 
@@ -63,7 +64,7 @@ def answer(words: list[str], told: Callable[[], str]) -> tuple[str, str | None]:
         return "fault", f"{type(error).__name__}: {str(error)[:200]} ({place.filename}:{place.lineno})"
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
-    said = told()
+    said = without_stages(told())
     if status not in (0, BAD_INPUT):
         return "fault", f"status {status}: {said[:200]}"
     if status == BAD_INPUT and (said.count("\n") != 1 or not said.startswith("vanedamp") or len(said) > 6000):

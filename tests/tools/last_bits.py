@@ -2,7 +2,7 @@
 
 A result that turns on its last bits differs between processors, and a test that turns on it fails on some. This takes
 sums in another order, and gives LAPACK, SuperLU, CHOLMOD, MUMPS and ARPACK another order of unknowns, other signs and
-bases of eigenvectors, or other round-off (`last_bits_path/last_bits_arithmetic.py`). All of it is drawn from the seed,
+bases of eigenvectors, or other round-off (`startup_path/last_bits_arithmetic.py`). All of it is drawn from the seed,
 and the same for the same seed and call: repeated and parallel runs agree as they do with a real library, and a test
 fails alone as it failed among others.
 
@@ -22,14 +22,14 @@ from pathlib import Path
 
 from _pytest.assertion import rewrite
 
-_HOOK = Path(__file__).with_name("last_bits_path")
+from tests.tools.processes import STARTUP, startup
+
 _NUMBA = Path(__file__).resolve().parents[2] / ".cache" / "numba-generic"
 
 
 def variables(seed: int) -> dict[str, str]:
     """Return the environment of a process that is perturbed from its start."""
-    paths = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path not in ("", str(_HOOK))]
-    found = {"VANEDAMP_LAST_BITS": str(seed), "PYTHONPATH": os.pathsep.join([str(_HOOK), *paths])}
+    found = startup() | {"VANEDAMP_LAST_BITS": str(seed)}
     if seed % 2 == 0:
         found |= {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(_NUMBA)}
     return found
@@ -38,7 +38,7 @@ def variables(seed: int) -> dict[str, str]:
 def begin(seed: int) -> None:
     """Perturb this process and those that it starts."""
     os.environ |= variables(seed)
-    sys.path.append(str(_HOOK))
+    sys.path.append(str(STARTUP))
     import last_bits_imports
 
     last_bits_imports.install()

@@ -4,9 +4,15 @@ import os
 import re
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+#: whose sitecustomize passes the options of the tests on to the processes that they start
+STARTUP = Path(__file__).resolve().with_name("startup_path")
+#: s that tests wait for what will happen: no machine is so busy
+PATIENCE = 600.0
 #: ranks of Open MPI 4 and 5: more than cores, as root in a container
 RANKS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -24,6 +30,12 @@ def environment(**variables: str) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *paths])} | variables
 
 
+def startup() -> dict[str, str]:
+    """Variables of processes that run STARTUP's sitecustomize."""
+    paths = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path not in ("", str(STARTUP))]
+    return {"PYTHONPATH": os.pathsep.join([str(STARTUP), *paths])}
+
+
 def vanedamp(*arguments, cwd, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
     words = [sys.executable, "-m", "vanedamp", *arguments]
@@ -32,6 +44,14 @@ def vanedamp(*arguments, cwd, **variables: str) -> subprocess.CompletedProcess[s
     return done
 
 
+def until(condition: Callable[[], object]) -> None:
+    """Wait for what will happen, such as a file."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
 def without_stages(error: str) -> str:
-    """Standard error without the lines that name what takes longer than 2 s, as all does on a busy machine."""
-    return re.sub(r"^vanedamp: .* \.\.\.\n", "", error, flags=re.MULTILINE)
+    """Standard error without the lines on stages and progress of what takes long, as all does on a busy machine."""
+    return re.sub(r"^vanedamp: .*( \.\.\.|: \d+ of \d+(, .* min left)?)\n", "", error, flags=re.MULTILINE)

@@ -43,13 +43,16 @@ def stamp(path):
 
 
 def kill_after_a_flush(folder, delay, *arguments):
-    """Kill the sweep some time after its next checkpoint. Returns whether it was still running."""
-    partial = folder / "sweep.h5.partial"
-    before = stamp(partial)
-    process = command(folder, *arguments)
-    while stamp(partial) == before and process.poll() is None:
-        time.sleep(0.005)
-    time.sleep(delay)
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    return process.returncode == -signal.SIGKILL
+    """Kill the sweep some time after its next checkpoint; one that has ended before begins again."""
+    output, partial = folder / "sweep.h5", folder / "sweep.h5.partial"
+    while True:
+        before = stamp(partial)
+        process = command(folder, *arguments)
+        while stamp(partial) == before and process.poll() is None:
+            time.sleep(0.005)
+        time.sleep(delay)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        if process.returncode == -signal.SIGKILL and partial.exists():
+            return
+        output.unlink()

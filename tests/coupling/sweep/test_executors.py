@@ -14,7 +14,7 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from tests.tools.processes import RANKS, environment
+from tests.tools.processes import PATIENCE, RANKS, environment, until
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep import worker as points
 from vanedamp.coupling.sweep.schedule import TaskSize
@@ -49,7 +49,7 @@ def test_mpi_ranks(whole, tmp_path):
     (tmp_path / "program.py").write_text(PROGRAM.format(changes=whole[0]))
     command = ["mpirun", "-n", "3", sys.executable, "program.py"]
     done = subprocess.run(
-        command, cwd=tmp_path, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=300
+        command, cwd=tmp_path, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=PATIENCE
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "mpi.h5").read_bytes() == whole[1]
@@ -114,11 +114,11 @@ def test_a_cancelled_call_is_none_of_a_broken_pools(monkeypatch):
     errors = []
     monkeypatch.setattr(threading, "excepthook", errors.append)
     with WorkerPool(1) as pool:
-        calls = [pool.submit(time.sleep, 60.0)] + [pool.submit(end_at_once) for _ in range(20)]
+        calls = [pool.submit(time.sleep, PATIENCE)] + [pool.submit(end_at_once) for _ in range(20)]
         assert calls[-2].cancel()  # of a standard pool, it stops the thread before the last one
         next(iter(pool._pool._processes.values())).kill()
         with pytest.raises(BrokenExecutor):
-            calls[-1].result(30.0)
+            calls[-1].result(PATIENCE)
     assert not errors
 
 
@@ -144,7 +144,7 @@ from vanedamp.studies.workers import WorkerPool
 if __name__ == "__main__":
     pool = WorkerPool(2)
     print(*{future.result() for future in [pool.submit(os.getpid) for _ in range(50)]}, flush=True)
-    time.sleep(600)
+    time.sleep(86400)
 """
 
 
@@ -155,11 +155,7 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     assert workers and all(running(worker) for worker in workers)
     parent.kill()
     parent.communicate()
-    for _ in range(1000):
-        if not any(running(worker) for worker in workers):
-            return
-        time.sleep(0.02)
-    pytest.fail("workers outlive their parent")
+    until(lambda: not any(running(worker) for worker in workers))
 
 
 def running(process):

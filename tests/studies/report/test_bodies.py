@@ -372,7 +372,7 @@ def test_browser_plays_the_motion(page, folder):
             "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=3000", "--dump-dom",
             f"file://{folder / name}.html",
         ]  # fmt: skip
-        finished = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+        finished = subprocess.run(command, capture_output=True, text=True, check=True)
         assert [line for line in finished.stderr.splitlines() if "CONSOLE" in line] == []
         shown[name] = finished.stdout
     data = player_data(page)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import OSCILLATOR, RESONANCE
+from tests.tools.processes import PATIENCE
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
@@ -209,9 +210,9 @@ def test_browser_shows_the_page_without_a_complaint(page, results):
     command = [
         "chromium", "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
         "--enable-unsafe-swiftshader", "--enable-logging=stderr", "--host-resolver-rules=MAP * ~NOTFOUND",
-        "--timeout=60000", "--dump-dom", f"file://{results / 'report.html'}",
+        f"--timeout={1000 * PATIENCE:.0f}", "--dump-dom", f"file://{results / 'report.html'}",
     ]  # fmt: skip
-    finished = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    finished = subprocess.run(command, capture_output=True, text=True, check=True)
     assert finished.stdout.count("main-svg") >= 2 * len(charts(page))
     told = [line for line in finished.stderr.splitlines() if "CONSOLE" in line and "willReadFrequently" not in line]
     assert told == []

@@ -1,0 +1,7 @@
+"""Python runs this at its start where the folder is on PYTHONPATH: options of the tests reach commands and workers."""
+
+import last_bits_imports
+import slow_clock
+
+last_bits_imports.install()
+slow_clock.install()
