@@ -182,7 +182,8 @@ class IdentificationStudy:
         return {
             "scene": self.scene.to_dict(), "numbers": {path: tables(one) for path, one in self.numbers.items()},
             "measured": [
-                {"kind": one.kind, "name": one.name, "set": dict(one.changes), "measure": one.measure}
+                {"kind": one.kind, "name": one.name, "set": dict(one.changes), "measure": one.measure,
+                 "source": one.source}
                 for one in self.measured
             ],
             "search": tables(self.search), "propose": plain(self.propose),

@@ -52,7 +52,7 @@ class MeasuredTable:
     """A measurement: its file, and how the scene differs from that of the study as it was made."""
 
     file: str
-    """CSV file, relative to this one"""
+    """table of measured values (CSV or other text), relative to this one; its header names columns and units"""
     set: dict[str, Real] = Field(default_factory=dict)
     """numbers of the scene as the measurement was made, by their dotted paths [units of the numbers]"""
     noise: Annotated[Real, Field(gt=0, lt=1)] | None = None
@@ -63,8 +63,11 @@ class MeasuredTable:
 class ForcedTable(MeasuredTable):
     """A forced response: frequency_hz, amplitude_m and, if measured, phase_rad and direction (up or down)."""
 
-    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] = "amplitude_mean"
-    """which amplitude of a response was measured, by its name there"""
+    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] | None = None
+    """which amplitude of a response was measured, by its name there (default: amplitude_rms if the header says rms, or
+    else amplitude_mean)"""
+    conjugate: bool = False
+    """whether phases are those of exp(-iwt), which rise through a resonance"""
     deviation: Positive | None = None
     """standard deviation of an amplitude in place of a relative one [m]"""
     phase_deviation: Positive | None = None
