@@ -63,7 +63,8 @@ class Measured:
 
     name: for people; changes: of the scene as it was made, by paths; at: (n,) frequencies, Hz, or times, s; channels:
     what was measured there; measure: of a forced response, which amplitude; direction: of a forced response, (n,) "up",
-    "down" or "": from where each frequency was reached; source: how its file was read, in words.
+    "down" or "": from where each frequency was reached; source: how its file was read, in words; levels: numbers of the
+    scene that differ from place to place, (n,) by paths; remarks: what to know before it is used.
     """
 
     kind: Kind
@@ -74,6 +75,8 @@ class Measured:
     measure: str = "amplitude_mean"
     direction: Sequence[str] = field(default_factory=tuple)
     source: str = ""
+    levels: Mapping[str, np.ndarray] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
 
     @property
     def unit(self) -> str:
@@ -85,10 +88,11 @@ def forced(
     name: str, frequency: Sequence[float] | np.ndarray, amplitude: Sequence[float] | np.ndarray,
     changes: Mapping[str, float], table: ForcedTable | None = None, phase: np.ndarray | None = None,
     direction: Sequence[str] = (), noise: float | None = None, measure: str | None = None, source: str = "",
+    levels: Mapping[str, np.ndarray] | None = None, remarks: Sequence[str] = (),
 ) -> Measured:  # fmt: skip
     """Return a forced response: frequencies (n,) Hz, amplitudes (n,) m, phases (n,) rad; noise as in its table.
 
-    measure: which amplitude (default: the table's, or else amplitude_mean); source: as of `Measured`.
+    measure: which amplitude (default: the table's, or else amplitude_mean); source, levels, remarks: as of `Measured`.
     """
     table = table or ForcedTable("", noise=noise)
     channels = [_sized("amplitude", "m", amplitude, table.noise, table.deviation)]
@@ -99,6 +103,7 @@ def forced(
     return Measured(
         "forced", name, dict(changes), frequencies, tuple(channels),
         measure or table.measure or "amplitude_mean", tuple(direction) or ("",) * len(frequencies), source,
+        levels or {}, remarks,
     )  # fmt: skip
 
 

@@ -53,7 +53,8 @@ def outcome(
 
     others: (o, P) numbers of other minima that are as good; cold: misfit of runs from the scene's own start.
     """
-    notes = list(_notes(study, opened, interval, test, converged, others, cold, misfit))
+    notes = [remark for measured in study.measured for remark in measured.remarks]
+    notes += list(_notes(study, opened, interval, test, converged, others, cold, misfit))
     if not converged:
         return IdentificationStatus.NOT_CONVERGED, tuple(notes)
     if test.larger:

@@ -78,6 +78,26 @@ class ForcedTable(MeasuredTable):
 
 
 @dataclass(frozen=True, config=STRICT)
+class SineSweepTable(MeasuredTable):
+    """A history of a slow sine sweep: time_s, force_N or base_acceleration_m_s2, and displacement_m, velocity_m_s or
+    acceleration_m_s2 of the response. Each run up or down becomes a forced response at the level of the excitation."""
+
+    relative: bool | None = None
+    """whether the response to a base acceleration was measured relative to the base; needed with that"""
+    cycles: Annotated[Whole, Field(ge=2, le=1000)] = 16
+    """cycles of the excitation from which each value is taken: more for noise, fewer for a narrow resonance"""
+    points: Annotated[Whole, Field(ge=5, le=1000)] = 30
+    """frequencies of each run that are compared with the model, most where the response changes"""
+    deviation: Positive | None = None
+    """standard deviation of an amplitude in place of a relative one [m]"""
+    phase_deviation: Positive | None = None
+    """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
+
+    def __post_init__(self) -> None:
+        _one_noise(self)
+
+
+@dataclass(frozen=True, config=STRICT)
 class DecayTable(MeasuredTable):
     """A decay as the scene's [ring_down] says: time_s, and amplitude_m, half a swing between turning points, or the
     history displacement_m, velocity_m_s or acceleration_m_s2."""
@@ -129,6 +149,8 @@ class IdentificationFile:
     """the numbers that are sought, by their dotted paths as axes of a sweep have them"""
     forced: tuple[ForcedTable, ...] = ()
     """forced responses, one table each"""
+    sine_sweep: tuple[SineSweepTable, ...] = ()
+    """slow sine sweeps, one table each"""
     decay: tuple[DecayTable, ...] = ()
     """decays, one table each"""
     impacts: tuple[ImpactsTable, ...] = ()
@@ -140,5 +162,7 @@ class IdentificationFile:
     frequencies around the measured ones)"""
 
     def __post_init__(self) -> None:
-        if not (self.forced or self.decay or self.impacts):
-            raise ValueError("forced: missing; give a measurement: [[forced]], [[decay]] or [[impacts]]")
+        if not (self.forced or self.sine_sweep or self.decay or self.impacts):
+            raise ValueError(
+                "forced: missing; give a measurement: [[forced]], [[sine_sweep]], [[decay]] or [[impacts]]"
+            )
