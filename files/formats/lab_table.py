@@ -27,7 +27,7 @@ _REMARK = ("#", "%", "!", "//")
 #: what headers call a column, without its unit
 _NAMES = {
     "frequency": r"f|freq\w*|frequen[zc]\w*|omega|ω", "time": r"t|time|zeit", "direction": "direction",
-    "amplitude": r"ampl?(itude)?|half swing", "displacement": r"x|displ?(acement)?|weg", "speed": "speed",
+    "amplitude": r"ampl?(itude)?|(half )?swing", "displacement": r"x|displ?(acement)?|weg", "speed": "speed",
     "velocity": r"v|vel(ocity)?", "acceleration": r"a|acc(el(eration)?)?", "force": r"force|kraft",
     "base_acceleration": r"base([ _]?acc(el(eration)?)?)?", "phase": r"phase|angle|arg\w*", "sector": "sector",
     "real": r"re(al)?( ?part|teil)?", "imaginary": r"im(ag(inary)?)?( ?part|teil)?",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from tests.studies.identification.oscillator import MASS, OMEGA, RATIO, STIFFNESS, scene
+from tests.studies.identification.oscillator import MASS, OMEGA, RATIO, SCENE, STIFFNESS
 from tests.studies.identification.test_study import write
 from vanedamp.coupling.transients.lewis import chirp_response
 from vanedamp.files.toml_input import InputError
@@ -35,7 +35,7 @@ def test_the_closed_form_of_a_sweep(error):
     (run,) = track(*chirp(error), cycles=4)
     off = np.abs(run.response - receptance(run.frequency)).max() / PEAK
     assert run.error == pytest.approx(error, rel=0.2) and off == pytest.approx(run.error, rel=0.05)
-    assert run.bandwidth == pytest.approx(2 * HALF, rel=0.1) and run.up and not len(run.jumps)
+    assert run.bandwidth == pytest.approx(2 * HALF, rel=0.15) and run.up and not len(run.jumps)
     assert any("too fast" in remark for remark in run.remarks()) == (error > 0.05)
 
 
@@ -72,7 +72,8 @@ def sweep(folder, text, **options):
         del data["forced"]
         data["sine_sweep"] = [{"file": "swept.csv", "noise": 0.02, "cycles": 4} | options]
 
-    return IdentificationStudy.load(write(folder, change))
+    shaken = SCENE | {"excitation": {"frequency": 15.9, "base_acceleration": 1.0}}
+    return IdentificationStudy.load(write(folder, change, scene=shaken if "base" in text[:40] else None))
 
 
 @pytest.mark.parametrize(
@@ -126,7 +127,7 @@ def test_a_jump_is_left_out():
             "unknown column 'force_2'; expected time_s, force_N or base_accel",
         ),
         (history(lambda t, f, x: (t**2, f, x)), {}, "swept.csv: time: expected equidistant samples"),
-        (history(lambda t, f, x: (t[::10], f[::10], x[::10])), {}, "samples a cycle at"),
+        (history(lambda t, f, x: (t[::4], f[::4], x[::4])), {}, "samples a cycle at"),
         (history(lambda t, f, x: (t, 0 * f, x)), {}, "the excitation or the response is zero"),
         (history(lambda t, f, x: (t, np.sin(100 * t), x)), {}, "no run up or down of 20 windows"),
         (history(), {"cycles": 500}, "no run up or down of 20 windows of 500 cycles"),
@@ -153,4 +154,3 @@ def test_an_identification_finds_the_oscillator_from_a_sweep(tmp_path):
     study = sweep(tmp_path, history(), phase_deviation=0.05)
     found = identify(study)
     assert found.best == pytest.approx([RATIO, STIFFNESS], rel=0.03)
-    assert scene().structure.stiffness == STIFFNESS
