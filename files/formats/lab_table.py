@@ -2,9 +2,9 @@
 
 Columns stand between semicolons, tabs, commas or blanks. Numbers have decimal points or, unless commas separate
 columns, decimal commas; complex ones have an i or j. Text is UTF-8, UTF-16 or Latin-1. Data begin at the first line of
-two or more cells whose first is a number; of the lines before, those with as many cells are headers, joined by column,
-the others remarks. Lines that begin with #, %, ! or // are remarks, too, unless the last one before the data names its
-columns.
+two or more cells whose first is a number; the last line before them with as many cells names the columns, or gives
+their units below the names; the others are remarks. Lines that begin with #, %, ! or // are remarks, too, unless the
+last one before the data names its columns.
 """
 
 from __future__ import annotations
@@ -190,7 +190,9 @@ def _table(path: str | os.PathLike[str], error: type[VanedampError], text: str, 
         remarks = [line.lstrip("".join(_REMARK)) for n, line in lines if n < first and line.startswith(_REMARK)]
         titles = _titles(remarks[-1], separator) if remarks else []
         named = [titles] if len(titles) == width and _column(titles[0], 0).role in ("frequency", "time") else []
-    titles = [" ".join(filter(None, each)) for each in zip(*named, strict=True)] if named else [""] * width
+    titles = named[-1] if named else [""] * width
+    if len(named) > 1 and all(not _column(title, 0).name for title in titles):  # units below names
+        titles = [" ".join(filter(None, each)) for each in zip(*named[-2:], strict=True)]
     if not titles[-1] and not any(row[-1] for _, row in body):  # a separator at the end of every line
         titles.pop()
     rows = [row for _, row in body]
@@ -254,7 +256,7 @@ def _column(header: str, place: int) -> Column:
             text, kind = f"{text[: found.start()]} {text[found.end() :]}", name
             break
     text = re.sub(r"[\[(]\s*[\])]", "", text).strip(" _,")
-    for cut in [found.start() for found in re.finditer(r"[\s_/,:(\[]", text)] + [0]:
+    for cut in [0, *(found.start() for found in re.finditer(r"[\s_/,:(\[]", text))]:
         end = text[cut:].strip(" ,:")
         tried = [end, end[1:]] if end[:1] in "/" else [end[1:].replace("_", "/")] if end[:1] == "_" else [end]
         if end[:1] == "[" and end[-1:] == "]":

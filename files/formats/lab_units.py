@@ -11,7 +11,7 @@ from typing import NamedTuple
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXED = ("m", "N", "s", "g", "Hz", "rad")
 #: symbols in SI, with the powers of kg, m, s and cycles: an angle is a number of cycles, so that rad/s is a frequency
-_SYMBOLS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
+_SYMBOLS: dict[str, tuple[float, tuple[int, ...]]] = {
     "kg": (1.0, (1, 0, 0, 0)), "m": (1.0, (0, 1, 0, 0)), "inch": (0.0254, (0, 1, 0, 0)), "ft": (0.3048, (0, 1, 0, 0)),
     "s": (1.0, (0, 0, 1, 0)), "min": (60.0, (0, 0, 1, 0)), "N": (1.0, (1, 1, -2, 0)),
     "lbf": (4.4482216152605, (1, 1, -2, 0)), "g": (9.80665, (0, 1, -2, 0)), "Hz": (1.0, (0, 0, -1, 1)),
@@ -25,7 +25,7 @@ _RAISED = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _DECIBELS = re.compile(r"[(\[]?\s*db\b[\s,]*(?:\(?\s*re(?:f\b|l\b)?\.?:?\s*(?P<of>.+?))?\s*[)\]]?", re.I)
 _LEVEL = re.compile(r"(?P<size>\d[\d.]*(?:[eE][-+]?\d+)?)?\s*(?P<unit>.+)")
 #: what measured columns are of, by the powers of their units
-QUANTITIES = {
+QUANTITIES: dict[tuple[int, ...], str] = {
     (0, 0, -1, 1): "frequency", (0, 0, 1, 0): "time", (0, 0, 0, 1): "phase", (0, 1, 0, 0): "displacement",
     (0, 1, -1, 0): "velocity", (0, 1, -2, 0): "acceleration", (1, 1, -2, 0): "force", (-1, 0, 2, 0): "receptance",
     (-1, 0, 1, 0): "mobility", (-1, 0, 0, 0): "accelerance",

@@ -99,7 +99,7 @@ def followed(page, folder):
     ("page", "told"),
     [
         ("frf", ["'Betrag [g/N] and Phase [deg]' as magnitude-degrees in g/N; accelerance", "give conjugate = true"]),
-        ("decay", ["'swing [mm pk-pk]' as amplitude in mm pk-pk", "structure.damping_ratio = 0.010"]),
+        ("decay", ["'swing [mm pk-pk]' as amplitude in mm pk-pk", "structure.damping_ratio = 0.02"]),
         ("sweep", ["up at 0.0125 Hz/s, 8 points", "structure.damping_ratio = 0.01", "structure.stiffness = 1e+04"]),
     ],
 )

@@ -187,7 +187,7 @@ SPELLINGS = {
     "plain": (spelt(PARTS), {}),
     "semicolons, decimal commas": (spelt(PARTS, "Frequenz [Hz];Realteil [m/N];Imaginärteil [m/N]\n", ";", ","), {}),
     "tabs, lines of remarks, units below": (
-        spelt((PARTS[0] / 1e3, *PARTS[1:]), "Test 7: tip\nDate\t3.4.2024\nFreq\tReal\tImag\nkHz\tm/N\tm/N\n", "\t"), {},
+        spelt((PARTS[0] / 1e3, *PARTS[1:]), "Test 7\nDate\tof\ttest\nFreq\tReal\tImag\nkHz\tm/N\tm/N\n", "\t"), {},
     ),
     "blanks, decimal commas": (spelt(PARTS, "Frequency (Hz) Real (m/N) Imag (m/N)\n", " ", ","), {}),
     "numpy": (spelt(PARTS, "# saved by numpy\n# f (Hz) real imag\n", " "), {}),
