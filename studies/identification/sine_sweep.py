@@ -98,7 +98,10 @@ def read_sine_sweep(table: SineSweepTable, folder: Path) -> list[Measured]:
         raise InputError(f"{own.path}: {path} is a column of the file; leave it out of `set`")
     quantities = {"time": "time", driven: driven.removeprefix("base_"), moved: moved}
     time, excitation, response = (own.si(found[role], of, "s" * (of == "time")) for role, of in quantities.items())
-    told = {found[role].header: role for role in quantities}
+    told = {
+        found[role].header: f"{role} in {own.unit_of(found[role], of, 's' * (of == 'time')).text}"
+        for role, of in quantities.items()
+    }
     stem, source = Path(table.file).stem, own.reading(told)
     noise = ForcedTable("", noise=table.noise, deviation=table.deviation, phase_deviation=table.phase_deviation)
     measured = []
@@ -168,15 +171,21 @@ def _windows(
         own = slice(begin, end)
         half = (time[end - 1] - time[begin]) / 2.0
         tau = (time[own] - time[begin]) / half - 1.0
-        weight = np.cos((turned[own] - middle) / (2.0 * cycles)).clip(0.0)  # the root of Hann's
+        weight = np.cos((turned[own] - middle) / (2.0 * cycles)) ** 2  # Hann's
         # harmonics and noise ripple the phase
-        smooth = np.polynomial.Polynomial.fit(tau, turned[own], 2, w=weight, domain=[-1, 1])
-        cosine, sine = np.cos(smooth(tau)), np.sin(smooth(tau))
+        smooth = _fitted(np.column_stack([np.ones(len(tau)), tau, tau**2]), weight, turned[own] - middle)
+        phi = middle + smooth[0] + tau * (smooth[1] + tau * smooth[2])
+        cosine, sine = np.cos(phi), np.sin(phi)
         base = np.column_stack([cosine, sine, tau * cosine, tau * sine, np.ones(len(tau))])
-        both = np.column_stack([excitation[own], response[own]])
-        cosines, sines = np.linalg.lstsq(weight[:, None] * base, weight[:, None] * both, rcond=None)[0][:2]
+        cosines, sines = _fitted(base, weight, np.column_stack([excitation[own], response[own]]))[:2]
         driven, moved = cosines - 1j * sines
-        yield float(smooth.deriv()(0.0)) / (2.0 * np.pi * half), moved / driven, driven, float(time[begin] + half)
+        yield float(smooth[1]) / (2.0 * np.pi * half), moved / driven, driven, float(time[begin] + half)
+
+
+def _fitted(base: np.ndarray, weight: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the coefficients of columns (m, k) that fit values (m, ...) best with weights (m,) of their squares."""
+    weighted = (base * weight[:, None]).T
+    return np.asarray(np.linalg.solve(weighted @ base, weighted @ values))
 
 
 def _runs(frequency: np.ndarray) -> Iterator[np.ndarray]:
