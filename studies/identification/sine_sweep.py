@@ -78,7 +78,8 @@ class Swept(NamedTuple):
                 "fewer cycles"
             )
         if len(self.jumps):
-            yield f"{run}: jumps at {', '.join(f'{one:.6g}' for one in self.jumps)} Hz, points there are left out"
+            where = ", ".join(f"{one:.6g}" for one in self.jumps)
+            yield f"{run}: jumps at {where} Hz: points there are left out"
 
 
 def read_sine_sweep(table: SineSweepTable, folder: Path) -> list[Measured]:
@@ -217,10 +218,11 @@ def _swept(frequency: np.ndarray, response: np.ndarray, level: np.ndarray, time:
     lag = max(int(_OVER * bandwidth / (abs(frequency[-1] - frequency[0]) / (n - 1))), 1)
     slope = np.abs(response[lag:] - response[:-lag]) / np.abs(frequency[lag:] - frequency[:-lag])
     steep = np.flatnonzero(slope > _JUMP * size[top] * 2.0 / bandwidth)
-    kept = np.ones(n, bool)
-    for place in steep.tolist():  # and until the motion has settled
-        kept &= (time < time[place]) | (time > time[place + lag] + 4.0 / (np.pi * bandwidth))
-    first = steep[np.diff(steep, prepend=-n) > lag]
+    settling = 4.0 / (np.pi * bandwidth)
+    kept = time > time[0] + settling
+    for place in steep.tolist():
+        kept &= (time < time[place]) | (time > time[place + lag] + settling)
+    first = steep[(np.diff(steep, prepend=-n) > lag) & (time[steep] > time[0] + settling)]
     return Swept(
         up, frequency[kept], response[kept], level[kept], time[kept], bandwidth, rate,
         2.0 * rate / (np.pi * bandwidth**2), rate * cycles / float(frequency[top]), frequency[first],

@@ -1,12 +1,18 @@
 """Histories of sine sweeps: the tracked response is the oscillator's, and what is no slow sweep is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
 
-from tests.studies.identification.oscillator import MASS, OMEGA, RATIO, SCENE, STIFFNESS
+from tests.studies.identification.oscillator import MASS, OMEGA, RATIO, SCENE, STIFFNESS, scene
 from tests.studies.identification.test_study import write
+from vanedamp.coupling.scene.scene import Time
+from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.transients.lewis import chirp_response
+from vanedamp.coupling.transients.ramp import ramp
+from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.identification.sine_sweep import track
 from vanedamp.studies.identification.study import IdentificationStudy
@@ -146,6 +152,26 @@ def test_histories_that_are_no_sweep(tmp_path, text, options, told):
     with pytest.raises(InputError) as error:
         sweep(tmp_path, text, **options)
     assert told in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bodies", [[], [{"cavity": "c1", "mass": 0.02, "friction": 0.2, "restitution": 0.6}]])
+def test_a_ramp_of_the_engine(bodies):
+    """Its largest displacements, period by period, are the tracked amplitudes, also with impacts."""
+    table = {"from": 15.2, "to": 16.6, "rate": [0.02]}
+    one, state, parts = scene(damper=bodies, ramp=table), None, []
+    run, (course,), base = ramp(one).runs[0], courses(one), ramped(one)
+    for begin, frequency, value in zip(course.time, course.frequency, course.value.tolist(), strict=True):
+        period = replace(scene_at(base, one.ramp, value), time=Time(periods=1, transient=0))
+        response = simulate(period, samples_per_period=32, start=state)
+        state, part = response.final, np.arange(32) / 32
+        parts.append([begin + part / frequency, 0.5 * np.sin(2 * np.pi * part), response.displacement[:32]])
+    time, force, x = np.concatenate(parts, axis=1)
+    even = np.arange(time[0], time[-1], 1 / 512)
+    (tracked,) = track(even, np.interp(even, time, force), np.interp(even, time, x), cycles=8)
+    peaks = np.interp(tracked.time, run.time[: len(run.amplitude)], run.amplitude)
+    assert np.abs(tracked.response) * tracked.level == pytest.approx(peaks, abs=0.01 * peaks.max())
+    assert (run.impacts.sum() > 1000) == bool(bodies)
 
 
 def test_an_identification_finds_the_oscillator_from_a_sweep(tmp_path):
