@@ -40,12 +40,14 @@ class Frf:
     values          (k, n) complex, of a displacement, velocity or acceleration per force (or per any one excitation)
     quantity        "receptance", "mobility" or "accelerance"
     labels          (k,) names of the responses
+    source          where they come from and how the file was read, in words
     """
 
     frequencies_hz: np.ndarray
     values: np.ndarray
     quantity: str = "receptance"
     labels: tuple[str, ...] = ()
+    source: str = ""
 
     def __post_init__(self) -> None:
         frequencies = frozen(self.frequencies_hz)
@@ -77,7 +79,7 @@ class Frf:
         if inside.sum() < 2:
             span = f"{self.frequencies_hz[0]:.6g} to {self.frequencies_hz[-1]:.6g} Hz"
             raise FrfError(f"band: {low:.6g} to {high:.6g} Hz holds {inside.sum()} lines; the response covers {span}")
-        return Frf(self.frequencies_hz[inside], self.values[:, inside], self.quantity, self.labels)
+        return Frf(self.frequencies_hz[inside], self.values[:, inside], self.quantity, self.labels, self.source)
 
 
 @dataclass(frozen=True, eq=False)

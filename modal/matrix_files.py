@@ -1,4 +1,4 @@
-"""System matrices from and for other codes: Matrix Market, scipy's .npz, MATLAB or CSV, with nodes and sets as CSV.
+"""System matrices from and for other codes, with nodes and sets as CSV.
 
 A folder holds stiffness.mtx, mass.mtx, nodes.csv (node, x, y, z), sets.csv (set, node, weight) and fixed.csv (node,
 components); the degrees of freedom are x, y, z of the nodes in the order of nodes.csv.
@@ -18,7 +18,7 @@ from scipy import io, sparse
 from vanedamp.files.csv_input import csv_table
 from vanedamp.files.foreign import existing
 from vanedamp.files.formats.matrices.matlab import read_mat
-from vanedamp.files.formats.matrices.registry import read_npz
+from vanedamp.files.formats.matrices.registry import read_mtx, read_npz
 from vanedamp.files.formats.matrices.table import read_table
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.algebra import symmetric_part
@@ -29,8 +29,10 @@ FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
 _LETTERS = {"stiffness": "K", "mass": "M"}
 _READERS: dict[str, Callable[[str], Any]] = {
-    ".npz": read_npz, ".mtx": io.mmread, ".mat": read_mat, ".csv": read_table,
+    ".npz": read_npz, ".mtx": read_mtx, ".mat": read_mat, ".csv": read_table, ".sti": read_mtx, ".mas": read_mtx,
 }  # fmt: skip
+#: endings of CalculiX's matrices of the coordinates that its .dof file names
+_CALCULIX = (".sti", ".mas")
 
 
 def read_matrices(
@@ -45,9 +47,11 @@ def read_matrices(
 ) -> SystemMatrices:
     """Read the matrices of another code.
 
-    stiffness, mass  .mtx (Matrix Market, symmetric or general), .npz (scipy.sparse.save_npz), .csv (dense) or .mat,
-                     N/m and kg; of a .mat with several matrices those named stiffness and mass, or K and M
-    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
+    stiffness, mass  .mtx (Matrix Market, symmetric or general, or Abaqus), .npz (scipy.sparse.save_npz), .csv (dense),
+                     .mat, or CalculiX's .sti and .mas with their .dof, N/m and kg; of a file with several matrices
+                     those named stiffness and mass, or K and M
+    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, of
+                     CalculiX in any order. Degrees of freedom that its .dof leaves out are held
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
     scale            metres per unit of length of the nodes: 1e-3 for mm
@@ -63,7 +67,7 @@ def read_matrices(
             raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
         held += [3 * patches[name].nodes + _component(sets, component) for component in components]
     fixed_dofs = np.concatenate(held)
-    return _system(stiffness, mass, coordinates, fixed_dofs, patches, damping_ratio, scale, mass_scale)
+    return _system(stiffness, mass, labels, coordinates, fixed_dofs, patches, damping_ratio, scale, mass_scale)
 
 
 def read_folder(
@@ -83,7 +87,7 @@ def read_folder(
         ]
         fixed = np.array(held, dtype=int)
     stiffness, mass = (_either(home, name) for name in ("stiffness", "mass"))
-    return _system(stiffness, mass, coordinates, fixed, patches, damping_ratio, scale, mass_scale)
+    return _system(stiffness, mass, labels, coordinates, fixed, patches, damping_ratio, scale, mass_scale)
 
 
 def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:
@@ -112,6 +116,7 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
 def _system(
     stiffness: str | os.PathLike[str],
     mass: str | os.PathLike[str],
+    labels: Mapping[int, int],
     coordinates: np.ndarray,
     fixed: np.ndarray,
     patches: dict[str, Patch],
@@ -123,7 +128,11 @@ def _system(
     provenance = {"stiffness": os.path.basename(stiffness), "mass": os.path.basename(mass)}
     loaded = {}
     for name, path in (("stiffness", stiffness), ("mass", mass)):
-        loaded[name] = matrix = _matrix(Path(path), name)
+        matrix = _matrix(Path(path), name)
+        if Path(path).suffix.lower() in _CALCULIX:
+            matrix, held = _placed(Path(path).with_suffix(".dof"), matrix, labels)
+            fixed = np.union1d(fixed, held)
+        loaded[name] = matrix
         if matrix.shape != (coordinates.size, coordinates.size):
             raise MatricesError(
                 f"{path}: shape {matrix.shape} for {len(coordinates)} nodes; expected "
@@ -156,17 +165,35 @@ def _system(
 
 def _matrix(path: Path, name: str) -> sparse.csr_array:
     existing(path, MatricesError, "matrix file")
-    if path.suffix not in _READERS:
+    if path.suffix.lower() not in _READERS:
         raise MatricesError(
-            f"{path}: expected a matrix as .mtx (Matrix Market), .npz (scipy.sparse.save_npz), .mat (MATLAB) or .csv"
+            f"{path}: expected a matrix as .mtx (Matrix Market, Abaqus), .npz (scipy.sparse.save_npz), .mat (MATLAB), "
+            ".csv, or .sti and .mas (CalculiX)"
         )
     try:
-        found = _READERS[path.suffix](str(path))
+        found = _READERS[path.suffix.lower()](str(path))
         return sparse.csr_array(_named(path, name, found) if isinstance(found, dict) else found)
     except MatricesError:
         raise
     except Exception as error:  # the readers raise what they stumble over
         raise MatricesError(f"{path}: not a readable matrix ({error})") from error
+
+
+def _placed(path: Path, matrix: sparse.csr_array, labels: Mapping[int, int]) -> tuple[sparse.csr_array, np.ndarray]:
+    """Return a matrix among all degrees of freedom, and those that a .dof file, lines of node.direction, leaves out."""
+    words = existing(path, MatricesError, "file of the matrix's coordinates").read_text(errors="replace").split()
+    places = []
+    for number, word in enumerate(words, 1):
+        node, _, direction = word.partition(".")
+        if direction not in ("1", "2", "3"):
+            raise MatricesError(f"{path}: line {number}: expected node.direction with directions 1 to 3, not {word!r}")
+        places.append(3 * _index(path, labels, node) + int(direction) - 1)
+    if len(set(places)) < len(places) or matrix.shape != (len(places), len(places)):
+        raise MatricesError(f"{path}: {len(set(places))} different coordinates for a matrix {matrix.shape}")
+    entries, size = sparse.coo_array(matrix), 3 * len(labels)
+    rows, columns = (np.array(places)[index] for index in (entries.row, entries.col))
+    placed = sparse.csr_array((entries.data, (rows, columns)), shape=(size, size))
+    return placed, np.setdiff1d(np.arange(size), places)
 
 
 def _named(path: Path, name: str, found: Mapping[str, Any]) -> Any:

@@ -11,13 +11,18 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.files.csv_input import csv_table
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing, reading
+from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
+from vanedamp.files.formats.lab_units import Unit
+from vanedamp.files.formats.lab_units import unit as lab_unit
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
     FORCE,
@@ -34,7 +39,7 @@ from vanedamp.files.formats.universal_datasets import (
 )
 from vanedamp.files.store import write_csv
 from vanedamp.modal.correlation import MeasuredShapes
-from vanedamp.modal.frf import Frf
+from vanedamp.modal.frf import QUANTITIES, UNITS, Frf
 from vanedamp.modal.temperature import Temperature
 
 _NO_UNIVERSAL = "not a universal file that pyuff can read"
@@ -42,6 +47,15 @@ _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
 #: meanings of the two columns of a response in a CSV
 COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
+#: parts of a response by words of a header, and the part that completes each
+_PARTS = {
+    "phase": r"phase|(?<![a-z])arg|angle|winkel", "real": r"(?<![a-z])re(al[a-z]*)?(?![a-z])( part)?",
+    "imaginary": r"(?<![a-z])im(ag[a-z]*)?(?![a-z])( part)?",
+    "magnitude": r"mag(nitude)?|modulus|abs|ampl[a-z]*|betrag|gain|\|.*\|",
+}  # fmt: skip
+#: fraction of all turns of the phase, weighted by the response's square, that upward ones exceed downward ones by
+_RISES = 0.5
+_PARTNERS = {"real": "imaginary", "magnitude": "phase"}
 # specific data types of UFF 58, record 9
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 
@@ -78,77 +92,186 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
     write_csv(target, [*_PLACE, *names], rows)
 
 
-def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns: str | None = None) -> Frf:
-    """Read a frequency response from a CSV or universal file (dataset 58, function type 4).
+def read_frf(
+    path: str | os.PathLike[str], quantity: str | None = None, columns: str | None = None, unit: str | None = None,
+    conjugate: bool = False,
+) -> Frf:  # fmt: skip
+    """Read a frequency response from a table (files.formats.lab_table) or a universal file (dataset 58, type 4).
 
-    CSV: the frequency (Hz), then two columns for every response; `quantity` says of which kind. A universal file
-    says so itself.
+    A table has a column of frequencies, then of every response one column of complex numbers, or two: real and
+    imaginary part, or magnitude and phase. The header says which, with units; values are converted to SI.
 
-    columns  one of COLUMNS; left out: as the header line says (real, imag; magnitude, phase in deg or
-             rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
-             says so, are rejected
+    quantity   receptance, mobility or accelerance (default: that of the unit, or else receptance)
+    columns    one of COLUMNS where the header does not say; columns that look like magnitude and phase, without a word
+               that says so, are rejected
+    unit       of the values, where the file gives none: "g/N", "dB re 1 m/N"
+    conjugate  whether phases are those of exp(-iwt) and rise through a resonance; a response that looks otherwise than
+               this says is rejected
 
     Raises MeasurementError.
     """
+    if columns is not None and columns not in COLUMNS:
+        raise MeasurementError(f"{path}: columns: expected one of {', '.join(COLUMNS)}, not {columns!r}")
     file = existing(path, MeasurementError)
     if file.suffix.lower() in _UNIVERSAL:
         with reading(file, MeasurementError, _NO_UNIVERSAL):
-            return _frf_of_universal(file)
-    header, rows = _numbers(file)
-    if rows.shape[1] < 3 or rows.shape[1] % 2 == 0:
+            frequencies, responses, source = _frf_of_universal(file, unit)
+    else:
+        frequencies, responses, source = _frf_of_table(lab_table(file, MeasurementError), columns, unit)
+    quantities = {own.of.quantity: own for own in responses if own.of is not None}
+    if len(quantities) > 1 or (quantity and quantities and quantity not in quantities):
+        told = ", ".join(f"{own.label or 'response'} in {own.of.text}" for own in quantities.values() if own.of)
         raise MeasurementError(
-            f"{file}: expected the columns frequency, real part, imaginary part (or magnitude and phase; and more "
-            f"pairs), not {rows.shape[1]}"
+            f"{file}: quantity: expected responses of one kind, {quantity or 'by their units'}; got {told}"
         )
+    values = np.array([own.values for own in responses])
+    labels = [own.label for own in responses]
     with _of(file):
-        first, second = rows[:, 1::2].T, rows[:, 2::2].T
-        frf = Frf(rows[:, 0], first + 1j * second, quantity)
-        kind = _columns(columns, header, first, second)
-        if kind == "real-imaginary":
-            return frf
-        angle = np.radians(second) if kind == "magnitude-degrees" else second
-        return Frf(rows[:, 0], first * np.exp(1j * angle), quantity)
+        frf = Frf(
+            frequencies, values.conj() if conjugate else values, next(iter(quantities), quantity or "receptance"),
+            tuple(labels) if len(set(labels)) == len(labels) and all(labels) else (),
+        )  # fmt: skip
+    check_phase(file, MeasurementError, frf.values, conjugate)
+    return replace(frf, source=source + ("; conjugated" if conjugate else "") + f"; {frf.quantity}")
 
 
-def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
-    """Return which of COLUMNS the pairs (k, n) of a CSV are."""
-    if given is not None and given not in COLUMNS:
-        raise MeasurementError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
-    for name in header[1::2]:
-        if re.search(r"(\b|_|\d|mag|amp)db(\b|_)|decibel", name.lower()):
-            raise MeasurementError(f"columns: {name!r}: expected linear magnitudes, not decibels")
-    kind = given or _header_kind(header, second)
-    if kind is None:
-        one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
-        turns = (np.abs(second).max(axis=1) <= 361.0) & (np.ptp(second, axis=1) > 0.1)
-        if np.any(one_sign & turns):
-            raise MeasurementError(
-                "columns: a response's first column keeps its sign, its second one looks like a phase; say what they "
-                f"are by a header line or by columns = one of {', '.join(COLUMNS)}"
+class _Response(NamedTuple):
+    """Complex values (n,) of a response in SI, its name, and the unit that the file gives or None."""
+
+    label: str
+    values: np.ndarray
+    of: Unit | None
+
+
+def _frf_of_table(table: LabTable, columns: str | None, given: str | None) -> tuple[np.ndarray, list[_Response], str]:
+    """Return frequencies (n,) Hz, responses, and how they were read."""
+    axis = next((column for column in table.columns if column.role == "frequency"), table.columns[0])
+    if axis.header and axis.role != "frequency" and (axis.unit or axis.unknown):
+        raise table.error(f"{table.path}: {axis.header!r}: expected the frequency, such as 'frequency [Hz]'")
+    default = "" if re.match(r"omega|ω", axis.name.lower()) else "Hz"
+    frequencies, rest = table.si(axis, "frequency", default), [column for column in table.columns if column is not axis]
+    told = {
+        axis.header or "first column": f"frequency in {(axis.unit or table.unit_of(axis, 'frequency', default)).text}"
+    }
+    responses = list[_Response]()
+    for label, kind, first, second in _pairs(table, rest, columns):
+        of = _unit_of(table, first, second, given)
+        values, scale = table.numbers(first), 1.0 if of is None else of.factor
+        text = "in SI" if of is None else f"in {of.text}"
+        if of is not None and of.decibels:
+            if not kind.startswith("magnitude"):
+                raise table.error(f"{table.path}: columns: {of.text!r}: {kind} has no decibels; expected a magnitude")
+            values = 10.0 ** (values / 20.0)
+        elif kind.startswith("magnitude") and np.any(values < 0.0):
+            raise table.error(
+                f"{table.path}: columns: a magnitude is negative; for decibels give unit, such as dB re 1 m/N"
             )
-        kind = "real-imaginary"
-    if kind != "real-imaginary" and np.any(first < 0.0):
-        raise MeasurementError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
-    return kind
+        if second is not None:
+            if kind == "real-imaginary":
+                values = values + 1j * table.numbers(second)
+            else:
+                values = values * np.exp(
+                    1j * table.si(second, "phase", "deg" if kind == "magnitude-degrees" else "rad")
+                )
+        responses.append(_Response(label, scale * values, of))
+        headers = [column.header for column in (first, second) if column is not None]
+        told[" and ".join(headers) if all(headers) else f"columns {first.place + 1} on"] = f"{kind} {text}"
+    return frequencies, responses, table.reading(told)
 
 
-def _header_kind(header: Sequence[str], second: np.ndarray) -> str | None:
-    """Return which of COLUMNS the header line says that the first pair is; None where it does not say."""
-    if len(header) < 3:
-        return None
-    one, other = header[1].lower(), header[2].lower()
-    if re.search(r"phase|\barg|angle", other):
-        if re.search(r"deg|\u00b0", other):
-            return "magnitude-degrees"
-        if "rad" in other:
-            return "magnitude-radians"
-        if np.abs(second).max() > 2.02 * np.pi:
-            return "magnitude-degrees"
-        raise MeasurementError(
-            f"columns: {header[2]!r}: in degrees or radians? Say so there, or by columns = magnitude-degrees or "
-            "magnitude-radians"
+def _pairs(
+    table: LabTable, rest: list[Column], columns: str | None
+) -> Iterator[tuple[str, str, Column, Column | None]]:
+    """Yield label, one of COLUMNS or "complex", and the columns of each response."""
+    left = list(rest)
+    while left:
+        first = left.pop(0)
+        if table.is_complex(first):
+            yield _label(first), "complex", first, None
+            continue
+        part = _part(first)
+        fits = [column for column in left if _part(column) == _PARTNERS.get(part, "") and not table.is_complex(column)]
+        second = next((column for column in fits if _label(column) == _label(first)), None) or next(
+            (column for column in left[:1] if column in fits), None
         )
-    return "real-imaginary" if re.match(r"re", one) and re.match(r"im", other) else None
+        if second is None:
+            of = f" of {first.header!r}" if first.header else ""
+            raise table.error(
+                f"{table.path}: expected the columns frequency, real part, imaginary part (or magnitude and phase, or "
+                f"complex numbers; and more pairs), not {len(table.columns)} columns: no other part{of}"
+            )
+        left.remove(second)
+        yield _label(first), _columns(table, columns, first, second), first, second
+
+
+def _columns(table: LabTable, given: str | None, first: Column, second: Column) -> str:
+    """Return which of COLUMNS two columns are."""
+    if given is not None:
+        return given
+    if _part(first) == "real":
+        return "real-imaginary"
+    one, other = table.numbers(first), table.numbers(second)
+    if _part(first) == "magnitude":
+        if second.unit is not None:
+            return "magnitude-radians" if second.unit.factor > 0.5 else "magnitude-degrees"
+        if np.abs(other).max() > 2.02 * np.pi:
+            return "magnitude-degrees"
+        raise table.error(
+            f"{table.path}: columns: {second.header!r}: in degrees or radians? Say so there, or by columns = "
+            "magnitude-degrees or magnitude-radians"
+        )
+    if (np.all(one > 0.0) or np.all(one < 0.0)) and np.abs(other).max() <= 361.0 and np.ptp(other) > 0.1:
+        raise table.error(
+            f"{table.path}: columns: a response's first column keeps its sign, its second one looks like a phase; say "
+            f"what they are by a header line or by columns = one of {', '.join(COLUMNS)}"
+        )
+    return "real-imaginary"
+
+
+def _unit_of(table: LabTable, first: Column, second: Column | None, given: str | None) -> Unit | None:
+    """Return the unit of a response, by its header or as given."""
+    units = {own.unit for own in (first, second) if own is not None and own.unit and own.unit.quantity != "phase"}
+    unknown = [own.unknown for own in (first, second) if own is not None and own.unknown]
+    if not units and not given and not unknown:
+        return None
+    where = f"{table.path}: {first.header!r}: " if first.header else f"{table.path}: "
+    key = None if given is None else lab_unit(given)
+    own = next(iter(units), key)
+    if own is not None and own.decibels and not own.quantity and key is not None:
+        own = key
+    if len(units) > 1 or own is None or own.quantity not in QUANTITIES or (key is not None and own[1:] != key[1:]):
+        got = ", ".join([*(one.text for one in units), *unknown, *([] if given is None else [f"unit = {given!r}"])])
+        what = "decibels of what? E" if own is not None and own.decibels and not own.quantity else f"got {got}; e"
+        raise table.error(
+            f"{where}{what}xpected one unit per force, such as g/N, (m/s^2)/N, mm/N, dB re 1 m/N, there or by unit"
+        )
+    return own
+
+
+def _part(column: Column) -> str:
+    """Return which part of a response a column is, by its header; "" if that does not say."""
+    return next((part for part, pattern in _PARTS.items() if re.search(pattern, column.name, re.I)), "")
+
+
+def _label(column: Column) -> str:
+    """Return a column's header without unit and part."""
+    return re.sub("|".join(_PARTS.values()), "", column.name, flags=re.I).strip(" _-.:,()|")
+
+
+def check_phase(path: object, error: type[VanedampError], values: np.ndarray, conjugate: bool) -> None:
+    """Raise `error` if the phase of responses (k, n) at ascending frequencies rises where they are large.
+
+    Every stable pole turns the phase of exp(iwt) down by about half a turn: they are those of exp(-iwt), or have been
+    conjugated without need.
+    """
+    steps = values[:, 1:] * values[:, :-1].conj()
+    turns = np.abs(steps) * np.angle(steps)
+    if np.sum(turns) > _RISES * np.sum(np.abs(turns)):
+        sign, way, other = ("", "falls", "false") if conjugate else ("-", "rises", "true")
+        raise error(
+            f"{path}: conjugate: looks like exp({sign}iwt): the phase {way} through the resonance; give conjugate = "
+            f"{other}"
+        )
 
 
 def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
@@ -168,49 +291,27 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
     reference: temperature without thermal stress. Raises MeasurementError.
     """
     file = existing(path, MeasurementError)
-    rows = _numbers(file)[1]
-    if rows.shape[1] != 4:
-        raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {rows.shape[1]}")
+    table = lab_table(file, MeasurementError)
+    if len(table.columns) != 4:
+        raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {len(table.columns)}")
+    points = np.transpose([table.si(column, "displacement", "m") for column in table.columns[:3]])
     with _of(file):
-        return Temperature(reference, rows[:, 3], rows[:, :3])
+        return Temperature(reference, table.numbers(table.columns[3]), points)
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
-    rows = csv_table(file, MeasurementError)
-    header = rows[0][1] if rows else []
-    if header[:6] != list(_PLACE) or len(header) < 7:
-        raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
-    names, body = header[6:], rows[1:]
-    values = np.empty((len(body), len(header)), dtype=complex)
-    for place, (number, row) in enumerate(body):
-        if len(row) != len(header):
-            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(header)}")
-        try:
-            values[place] = [complex(word.replace(" ", "")) for word in row]
-        except ValueError as error:
-            raise MeasurementError(f"{file}: line {number}: expected numbers ({error})") from error
-    shapes = values[:, 6:].T
+    table = lab_table(file, MeasurementError)
+    names = [column.name for column in table.columns]
+    if [name.lower() for name in names[:6]] != list(_PLACE) or len(names) < 7:
+        raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... above the numbers")
+    shapes = np.array([table.numbers(column) for column in table.columns[6:]])
     with _of(file):
         return MeasuredShapes(
-            points=values[:, :3].real,
-            directions=values[:, 3:6].real,
+            points=np.transpose([table.si(column, "displacement", "m") for column in table.columns[:3]]),
+            directions=np.transpose([table.numbers(column) for column in table.columns[3:6]]),
             shapes=shapes if np.any(shapes.imag) else shapes.real,
-            frequencies_hz=np.array([_number(name) for name in names]),
+            frequencies_hz=np.array([_number(name) for name in names[6:]]),
         )
-
-
-def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
-    """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
-    rows, header = [words for _, words in csv_table(file, MeasurementError)], []
-    if rows and np.isnan(_number(rows[0][0])):
-        header, rows = rows[0], rows[1:]
-    try:
-        values = np.array([[float(word) for word in row] for row in rows])
-    except ValueError as error:
-        raise MeasurementError(f"{file}: expected rows of numbers, all of the same length ({error})") from error
-    if values.ndim != 2:
-        raise MeasurementError(f"{file}: holds no rows of numbers")
-    return header, values
 
 
 def _number(word: str) -> float:
@@ -287,22 +388,39 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
     write_universal(sets, target)
 
 
-def _frf_of_universal(file: Path) -> Frf:
+def _frf_of_universal(file: Path, given: str | None) -> tuple[np.ndarray, list[_Response], str]:
+    """Return frequencies (n,) Hz, responses, and how they were read."""
     found = [d for d in datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
     if not found:
         raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {FRF})")
-    kinds = {int(d["ordinate_spec_data_type"]) for d in found}
-    if len(kinds) > 1 or not kinds <= set(_QUANTITIES):
-        raise MeasurementError(
-            f"{file}: expected responses of one kind, displacement (8), velocity (11) or acceleration (12)"
-        )
     frequencies = np.asarray(found[0]["x"], dtype=float)
+    responses = list[_Response]()
     for dataset in found:
         if not np.array_equal(np.asarray(dataset["x"], dtype=float), frequencies):
             raise MeasurementError(f"{file}: the responses have different frequencies; export them over one axis")
-    labels = tuple(f"{d['rsp_node']}:{d['rsp_dir']}/{d['ref_node']}:{d['ref_dir']}" for d in found)
-    with _of(file):
-        return Frf(frequencies, np.array([d["data"] for d in found]), _QUANTITIES[kinds.pop()], labels)
+        label = f"{dataset['rsp_node']}:{dataset['rsp_dir']}/{dataset['ref_node']}:{dataset['ref_dir']}"
+        of = _universal_unit(file, dataset, given)
+        responses.append(_Response(label, of.factor * np.asarray(dataset["data"]), of))
+    return (
+        frequencies,
+        responses,
+        f"{file}: universal file; in {', '.join(dict.fromkeys(own.of.text for own in responses if own.of))}",
+    )
+
+
+def _universal_unit(file: Path, dataset: Mapping[str, Any], given: str | None) -> Unit:
+    """Return the unit of dataset 58: as given, by the labels of its axes, or by its data type in SI."""
+    top, below = (str(dataset.get(f"{axis}_axis_units_lab", "")).strip() for axis in ("ordinate", "orddenom"))
+    top, below = (text if re.search(r"[A-Za-z]", text) and text.upper() != "NONE" else "" for text in (top, below))
+    kind = _QUANTITIES.get(int(dataset["ordinate_spec_data_type"]))
+    label = f"({top})/({below})" if below and (alone := lab_unit(top)) and alone.quantity not in QUANTITIES else top
+    of = lab_unit(given or label or (UNITS[kind] if kind else ""))
+    if of is None or of.quantity not in QUANTITIES or (not given and kind not in (None, of.quantity)):
+        raise MeasurementError(
+            f"{file}: unit {label or 'missing'!r} of data type {dataset['ordinate_spec_data_type']}: expected "
+            "displacement (8), velocity (11) or acceleration (12) per force; give unit, such as g/N"
+        )
+    return of
 
 
 def _frf_to_universal(frf: Frf, target: Path) -> None:

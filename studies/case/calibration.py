@@ -158,6 +158,7 @@ class Calibration:
             measured = self.damping
             damping |= {
                 "source": "frf",
+                "reading": measured.response.source,
                 "deviation": measured.deviation,
                 "frequency_hz": measured.frequency_hz,
                 "misfit": measured.poles.misfit,
@@ -261,7 +262,7 @@ def _tuned(structure: Structure, table: TuneTable, keep: Keep) -> Tuning:
 @stage("damping of the measured response")
 def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, list[str]]:
     """Return the damping of the mode nearest to a computed frequency, Hz, and anything odd about it."""
-    frf = read_frf(table.frf, table.quantity, table.columns)
+    frf = read_frf(table.frf, table.quantity, table.columns, table.unit, table.conjugate)
     low, high = band = table.band or (0.95 * frequency, 1.05 * frequency)
     poles = _poles(frf, band, table.modes, frequency)
     around = frf.band(low - (high - low) / 2.0, high + (high - low) / 2.0)

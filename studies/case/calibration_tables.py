@@ -15,11 +15,15 @@ class DampingTable:
     """A measured frequency response, which gives the damping ratio of the first bending."""
 
     frf: str
-    """file with the response, relative to the case's: CSV with Hz and two columns per response, or UFF 58"""
-    quantity: Literal["receptance", "mobility", "accelerance"] = "receptance"
-    """what a CSV's columns are, per force: displacement, velocity or acceleration"""
+    """file with the response, relative to the case's: a table with frequencies and responses, or UFF 58"""
+    quantity: Literal["receptance", "mobility", "accelerance"] | None = None
+    """what it is, per force: displacement, velocity or acceleration (default: by its unit, or else receptance)"""
     columns: Literal["real-imaginary", "magnitude-degrees", "magnitude-radians"] | None = None
-    """form of a CSV's columns (default: its header says)"""
+    """form of a table's columns (default: its header says)"""
+    unit: str | None = None
+    """unit of the response if the file gives none, such as "g/N" or "dB re 1 m/N" """
+    conjugate: bool = False
+    """whether phases are those of exp(-iwt), which rise through a resonance"""
     band: tuple[Positive, Positive] | None = None
     """frequencies between which modes are fitted (default: 5 % to either side of the first bending) [Hz]"""
     modes: Annotated[Whole, Field(ge=1)] = 1

@@ -42,6 +42,8 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name}: times {factor:.5g} (+- {tuning['deviation'][name]:.1%} for 0.1 % of the frequencies)"
     rigid, damping, excitation = result["rigid"], result["damping"], result["excitation"]
     deviation = f" +- {damping['deviation']:.1g}" if "deviation" in damping else ""
+    if "reading" in damping:
+        yield f"read {damping['reading']}"
     yield f"damping ratio: {damping['ratio']:.4g}{deviation}, from the {damping['source']}"
     yield (
         f"rigid model at {rigid['at']}: {rigid['frequency_hz']:.2f} Hz, mass {rigid['mass']:.5g} kg, "

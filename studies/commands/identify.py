@@ -61,6 +61,7 @@ def _deviations(arguments: Namespace) -> None:
 
 def _summary(found: Identification) -> Iterator[str]:
     yield f"status {found.status.value}, {found.counts['runs']} runs, {found.wall_time_s:.0f} s"
+    yield from (f"read {one['source']}" for one in found.study["measured"] if one["source"])
     yield from number_texts(found)
     if found.proposal is not None:
         yield proposal_text(found.paths, found.proposal)

@@ -1,4 +1,4 @@
-"""Measurements of an identification, in memory and from CSV files."""
+"""Measurements of an identification, in memory and from files (files.formats.lab_table)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from vanedamp.files.csv_input import CsvRow, csv_table, read_csv
+from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.measurements import check_phase
 from vanedamp.studies.identification.tables import DecayTable, ForcedTable, ImpactsTable
 
 #: rows of one file
@@ -62,7 +63,8 @@ class Measured:
 
     name: for people; changes: of the scene as it was made, by paths; at: (n,) frequencies, Hz, or times, s; channels:
     what was measured there; measure: of a forced response, which amplitude; direction: of a forced response, (n,) "up",
-    "down" or "": from where each frequency was reached.
+    "down" or "": from where each frequency was reached; source: how its file was read, in words; levels: numbers of the
+    scene that differ from place to place, (n,) by paths; remarks: what to know before it is used.
     """
 
     kind: Kind
@@ -72,6 +74,9 @@ class Measured:
     channels: tuple[Channel, ...]
     measure: str = "amplitude_mean"
     direction: Sequence[str] = field(default_factory=tuple)
+    source: str = ""
+    levels: Mapping[str, np.ndarray] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
 
     @property
     def unit(self) -> str:
@@ -82,9 +87,13 @@ class Measured:
 def forced(
     name: str, frequency: Sequence[float] | np.ndarray, amplitude: Sequence[float] | np.ndarray,
     changes: Mapping[str, float], table: ForcedTable | None = None, phase: np.ndarray | None = None,
-    direction: Sequence[str] = (), noise: float | None = None,
+    direction: Sequence[str] = (), noise: float | None = None, measure: str | None = None, source: str = "",
+    levels: Mapping[str, np.ndarray] | None = None, remarks: Sequence[str] = (),
 ) -> Measured:  # fmt: skip
-    """Return a forced response: frequencies (n,) Hz, amplitudes (n,) m, phases (n,) rad; noise as in its table."""
+    """Return a forced response: frequencies (n,) Hz, amplitudes (n,) m, phases (n,) rad; noise as in its table.
+
+    measure: which amplitude (default: the table's, or else amplitude_mean); source, levels, remarks: as of `Measured`.
+    """
     table = table or ForcedTable("", noise=noise)
     channels = [_sized("amplitude", "m", amplitude, table.noise, table.deviation)]
     if phase is not None:
@@ -92,15 +101,16 @@ def forced(
         channels.append(Channel("phase", "rad", frozen(phase), "angle", deviation))
     frequencies = frozen(frequency)
     return Measured(
-        "forced", name, dict(changes), frequencies, tuple(channels), table.measure,
-        tuple(direction) or ("",) * len(frequencies),
+        "forced", name, dict(changes), frequencies, tuple(channels),
+        measure or table.measure or "amplitude_mean", tuple(direction) or ("",) * len(frequencies), source,
+        levels or {}, remarks,
     )  # fmt: skip
 
 
 def decay(
     name: str, time: Sequence[float] | np.ndarray, values: Sequence[float] | np.ndarray,
     changes: Mapping[str, float], table: DecayTable | None = None, noise: float | None = None,
-    quantity: str = "amplitude",
+    quantity: str = "amplitude", source: str = "",
 ) -> Measured:  # fmt: skip
     """Return a decay: times (n,) s since its start, amplitudes (n,) m or a history of MOTION; noise as in its table."""
     table = table or DecayTable("", noise=noise)
@@ -108,18 +118,18 @@ def decay(
         channel = _sized(quantity, "m", values, table.noise, table.deviation)
     else:
         channel = Channel(quantity, _UNITS[quantity], frozen(values), "difference", table.deviation)
-    return Measured("decay", name, dict(changes), frozen(time), (channel,))
+    return Measured("decay", name, dict(changes), frozen(time), (channel,), source=source)
 
 
 def impacts(
     name: str, time: Sequence[float] | np.ndarray, speed: Sequence[float] | np.ndarray,
-    changes: Mapping[str, float], table: ImpactsTable | None = None, noise: float | None = None,
+    changes: Mapping[str, float], table: ImpactsTable | None = None, noise: float | None = None, source: str = "",
 ) -> Measured:  # fmt: skip
     """Return impacts of a steady motion: times (n,) s, speeds (n,) m/s before them; noise as in its table."""
     table = table or ImpactsTable("", noise=noise)
     speeds = _sized("speed", "m/s", speed, table.noise, table.deviation)
     times = Channel("time", "s", frozen(time), "difference", table.time_deviation)
-    return Measured("impacts", name, dict(changes), frozen(time), (speeds, times))
+    return Measured("impacts", name, dict(changes), frozen(time), (speeds, times), source=source)
 
 
 def _sized(
@@ -132,65 +142,107 @@ def _sized(
 
 def read_forced(table: ForcedTable, folder: Path) -> Measured:
     """Return the forced response in a table's file. Raises InputError."""
-    rows = _rows(folder / table.file, ("frequency_hz", "amplitude_m"), ("phase_rad", "direction"))
-    frequency, amplitude = (_positive(rows, column) for column in ("frequency_hz", "amplitude_m"))
-    given = rows[0].words
-    phase = np.array([row.number("phase_rad") for row in rows]) if "phase_rad" in given else None
-    for row in rows if "direction" in given else ():
-        if row.words["direction"] not in ("up", "down", ""):
-            raise InputError(f"{row.place}: direction: expected up or down (got {row.words['direction']!r})")
-    direction = [row.words.get("direction", "") for row in rows]
-    return forced(Path(table.file).stem, frequency, amplitude, table.set, table, phase, direction)
+    own = _rows(folder / table.file)
+    found = own.taken([("frequency",), ("amplitude", *MOTION)], ("phase", "direction"))
+    frequency = _positive(own, found["frequency"], "frequency", "Hz")
+    motion = next(column for role, column in found.items() if role in ("amplitude", *MOTION))
+    amplitude, measure, told = _amplitude(own, motion, table.measure, 2 * np.pi * frequency)
+    direction, phase = [""] * len(frequency), None
+    if "phase" in found:
+        phase = own.si(found["phase"], "phase") * (-1.0 if table.conjugate else 1.0)
+        told[found["phase"].header] = f"phase in {own.unit_of(found['phase'], 'phase').text}"
+        if motion.unit and motion.unit.quantity in MOTION:  # each derivative is a quarter of a turn ahead
+            phase = phase - MOTION.index(motion.unit.quantity) * np.pi / 2
+    if "direction" in found:
+        direction = own.words(found["direction"])
+        for row, word in enumerate(direction):
+            if word not in ("up", "down", ""):
+                raise InputError(f"{own.place(row)}: direction: expected up or down (got {word!r})")
+    if phase is not None:
+        order = np.lexsort((frequency, direction))
+        check_phase(own.path, InputError, (amplitude * np.exp(1j * phase))[None, order], table.conjugate)
+    told[found["frequency"].header] = f"frequency in {own.unit_of(found['frequency'], 'frequency', 'Hz').text}"
+    return forced(
+        Path(table.file).stem, frequency, amplitude, table.set, table, phase, direction, measure=measure,
+        source=own.reading(told),
+    )  # fmt: skip
+
+
+def _amplitude(
+    table: LabTable, column: Column, measure: str | None, omega: np.ndarray
+) -> tuple[np.ndarray, str, dict[str, str]]:
+    """Return amplitudes (n,) m at angular frequencies (n,), the measure that they are, and how they were read.
+
+    A root mean square is that of any motion, which a model has, too, or of a sine; one of velocity or acceleration is
+    that of a displacement for a sine only. Raises InputError for others.
+    """
+    quantity = column.unit.quantity if column.unit and column.unit.quantity in MOTION else "displacement"
+    values, kind = _positive(table, column, quantity), column.kind or "pk"
+    measure = measure or ("amplitude_rms" if kind == "rms" else "amplitude_mean")
+    sine, where = measure == "amplitude_harmonic", f"{table.path}: {column.header!r}: measure"
+    if quantity != "displacement" and not sine:
+        raise InputError(f'{where}: {quantity} gives the displacement of a sine only; take "amplitude_harmonic"')
+    if (kind == "rms") != (measure == "amplitude_rms") and not (sine and kind == "rms"):
+        raise InputError(f'{where}: "{measure}" is no {kind} value; take "amplitude_harmonic" for that of a sine')
+    scale = {"pk-pk": 0.5, "rms": np.sqrt(2.0) if sine else 1.0, "pk": 1.0}[kind]
+    text = f"{measure} of {quantity} in {table.unit_of(column, quantity).text}, {kind}"
+    return scale * values / omega ** MOTION.index(quantity), measure, {column.header: text}
 
 
 def read_decay(table: DecayTable, folder: Path) -> Measured:
     """Return the decay in a table's file. Raises InputError."""
-    path = folder / table.file
-    columns = {f"{name}_{unit}".replace("/", "_").replace("^", ""): name for name, unit in _UNITS.items()}
-    header = next((words for _, words in csv_table(path, InputError)), [])
-    given = next((column for column in columns if column in header), "amplitude_m")
-    rows, quantity = _rows(path, ("time_s", given), instead=tuple(columns)), columns[given]
+    own = _rows(folder / table.file)
+    found = own.taken([("time",), tuple(_UNITS)])
+    quantity, column = next(item for item in found.items() if item[0] != "time")
     if quantity != "amplitude" and table.noise is not None:
         raise InputError(f"decay '{Path(table.file).stem}': noise is relative; for a history give deviation")
-    values = _positive(rows, given) if quantity == "amplitude" else np.array([row.number(given) for row in rows])
-    return decay(Path(table.file).stem, _rising(rows, "time_s"), values, table.set, table, quantity=quantity)
+    if column.kind == "rms" or (column.kind == "pk-pk" and quantity != "amplitude"):
+        raise InputError(f"{own.path}: {column.header!r}: expected amplitudes or a history, not {column.kind} values")
+    values = own.si(column, quantity) if quantity != "amplitude" else _positive(own, column, "displacement")
+    told = {
+        found["time"].header: f"time in {own.unit_of(found['time'], 'time', 's').text}",
+        column.header: f"{quantity} in {column.unit.text if column.unit else ''} {column.kind}".strip(),
+    }
+    return decay(
+        Path(table.file).stem, _rising(own, found["time"]), values * (0.5 if column.kind == "pk-pk" else 1.0),
+        table.set, table, quantity=quantity, source=own.reading(told),
+    )  # fmt: skip
 
 
 def read_impacts(table: ImpactsTable, folder: Path) -> Measured:
     """Return the impacts in a table's file. Raises InputError."""
-    rows = _rows(folder / table.file, ("time_s", "speed_m_s"))
-    return impacts(Path(table.file).stem, _rising(rows, "time_s"), _positive(rows, "speed_m_s"), table.set, table)
+    own = _rows(folder / table.file)
+    found = own.taken([("time",), ("speed", "velocity")])
+    time, speed = found.pop("time"), next(iter(found.values()))
+    speeds = _positive(own, speed, "velocity")
+    told = {
+        time.header: f"time in {own.unit_of(time, 'time', 's').text}",
+        speed.header: f"speed in {own.unit_of(speed, 'velocity').text}",
+    }
+    return impacts(
+        Path(table.file).stem, _rising(own, time), speeds, table.set, table, source=own.reading(told)
+    )  # fmt: skip
 
 
-def _rows(path: Path, columns: Sequence[str], further: Sequence[str] = (), instead: Sequence[str] = ()) -> list[CsvRow]:
-    """Return the rows of a file with some columns, and further ones if they are there. Raises InputError.
-
-    instead: of which the last column is one.
-    """
-    table = csv_table(path, InputError)
-    header = table[0][1] if table else []
-    wrong = [name for name in header if name not in (*columns, *further)]
-    if wrong:
-        known = ", ".join((*columns, *(f"{name} (if measured)" for name in further)))
-        known += "".join(f" or {name}" for name in instead if name not in columns)
-        raise InputError(f"{path}: line {table[0][0]}: unknown column '{wrong[0]}'; expected {known}")
-    rows = read_csv(path, [*columns, *(name for name in further if name in header)])
-    if len(rows) > _MOST_ROWS:
-        raise InputError(f"{path}: has {len(rows)} rows; at most {_MOST_ROWS}: leave some out")
-    return rows
+def _rows(path: Path) -> LabTable:
+    """Return the table in a file. Raises InputError."""
+    table = lab_table(path, InputError)
+    if len(table.rows) > _MOST_ROWS:
+        raise InputError(f"{path}: has {len(table.rows)} rows; at most {_MOST_ROWS}: leave some out")
+    return table
 
 
-def _positive(rows: Sequence[CsvRow], column: str) -> np.ndarray:
-    values = np.array([row.number(column) for row in rows])
-    for row, value in zip(rows, values.tolist(), strict=True):
+def _positive(table: LabTable, column: Column, quantity: str, default: str = "") -> np.ndarray:
+    values = table.si(column, quantity, default)
+    for row, value in enumerate(values.tolist()):
         if value <= 0.0:
-            raise InputError(f"{row.place}: {column}: expected a positive number, not {value:g}")
+            raise InputError(f"{table.place(row)}: {column.header}: expected a positive number, not {value:g}")
     return values
 
 
-def _rising(rows: Sequence[CsvRow], column: str) -> np.ndarray:
-    values = np.array([row.number(column) for row in rows])
-    for row, value, step in zip(rows, values.tolist(), np.diff(values, prepend=-np.inf).tolist(), strict=True):
+def _rising(table: LabTable, column: Column) -> np.ndarray:
+    values = table.si(column, "time", "s")
+    for row, (value, step) in enumerate(zip(values.tolist(), np.diff(values, prepend=-np.inf).tolist(), strict=True)):
         if value < 0.0 or step <= 0.0:
-            raise InputError(f"{row.place}: {column}: expected times from 0 that rise, not {value:g}")
+            raise InputError(f"{table.place(row)}: {column.header}: expected times from 0 that rise, not {value:g}")
     return values

@@ -12,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files import store
-from vanedamp.files.csv_input import read_csv
+from vanedamp.files.formats.lab_table import lab_table
 from vanedamp.files.toml_input import STRICT, InputError, Whole, read_toml, validate
 from vanedamp.rom.ring.deviations import RingError
 from vanedamp.rom.ring.identification import Identified, deviations_of_modes, deviations_of_responses
@@ -82,16 +82,21 @@ def save(path: str | os.PathLike[str], found: Identified, provenance: dict[str, 
 def _motions(file: str, sectors: int) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies (m,) and complex motions (m, N) of a CSV file. Raises InputError."""
     found: dict[float, dict[int, complex]] = {}
-    for row in read_csv(file, ("frequency_hz", "sector", "real", "imaginary")):
-        frequency, sector = row.number("frequency_hz"), row.number("sector")
+    table = lab_table(file, InputError)
+    own = table.taken([("frequency",), ("sector",), ("real",), ("imaginary",)])
+    numbers = [table.numbers(own[role]).tolist() for role in ("sector", "real", "imaginary")]
+    axis = table.si(own["frequency"], "frequency", "Hz").tolist()
+    for row, (frequency, sector, real, imaginary) in enumerate(zip(axis, *numbers, strict=True)):
         if not frequency > 0.0:
-            raise InputError(f"{row.place}: frequency_hz: expected a number above 0 (got {frequency:g})")
+            raise InputError(f"{table.place(row)}: frequency_hz: expected a number above 0 (got {frequency:g})")
         if not 0 <= sector < sectors or sector != int(sector):
-            raise InputError(f"{row.place}: sector: expected a whole number from 0 to {sectors - 1} (got {sector:g})")
+            raise InputError(
+                f"{table.place(row)}: sector: expected a whole number from 0 to {sectors - 1} (got {sector:g})"
+            )
         values = found.setdefault(frequency, {})
         if int(sector) in values:
-            raise InputError(f"{row.place}: sector: {int(sector)} is given twice at {frequency:g} Hz")
-        values[int(sector)] = complex(row.number("real"), row.number("imaginary"))
+            raise InputError(f"{table.place(row)}: sector: {int(sector)} is given twice at {frequency:g} Hz")
+        values[int(sector)] = complex(real, imaginary)
     for frequency, values in found.items():
         missing = sorted(set(range(sectors)) - set(values))
         if missing:

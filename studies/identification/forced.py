@@ -93,7 +93,8 @@ class Forced(Model):
         return self._figures(self.followers[place].beside(self._at(moved, place)) or motion)[0]
 
     def _at(self, values: np.ndarray, place: int) -> Scene | None:
-        return self.scene(values, {FREQUENCY: float(self.measured.at[place])})
+        levels = {path: float(each[place]) for path, each in self.measured.levels.items()}
+        return self.scene(values, levels | {FREQUENCY: float(self.measured.at[place])})
 
     def _figures(self, steady: Steady) -> tuple[np.ndarray, float]:
         """Return the measured quantities (c,) of a motion, and the relative error of the amplitude."""

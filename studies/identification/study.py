@@ -18,6 +18,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.transients.ring_down_start import table_of
 from vanedamp.files.toml_input import InputError, plain, read_toml, tables, validate
 from vanedamp.studies.identification.data import Measured, read_decay, read_forced, read_impacts
+from vanedamp.studies.identification.sine_sweep import read_sine_sweep
 from vanedamp.studies.identification.tables import IdentificationFile, Number, SearchTable
 from vanedamp.studies.scene_checks import check_moved, load_scene
 
@@ -103,6 +104,7 @@ class IdentificationStudy:
         file, folder = validate(IdentificationFile, dict(data), str(path)), Path(path).parent
         measured = [
             *(read_forced(table, folder) for table in file.forced),
+            *(one for table in file.sine_sweep for one in read_sine_sweep(table, folder)),
             *(read_decay(table, folder) for table in file.decay),
             *(read_impacts(table, folder) for table in file.impacts),
         ]
@@ -182,7 +184,8 @@ class IdentificationStudy:
         return {
             "scene": self.scene.to_dict(), "numbers": {path: tables(one) for path, one in self.numbers.items()},
             "measured": [
-                {"kind": one.kind, "name": one.name, "set": dict(one.changes), "measure": one.measure}
+                {"kind": one.kind, "name": one.name, "set": dict(one.changes), "measure": one.measure,
+                 "source": one.source}
                 for one in self.measured
             ],
             "search": tables(self.search), "propose": plain(self.propose),

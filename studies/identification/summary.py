@@ -54,7 +54,8 @@ def outcome(
     others: (o, P) numbers of other minima that are as good; cold: misfit of runs from the scene's own start; over: what
     its budget of time has cut, in words, or "".
     """
-    notes = list(_notes(study, opened, interval, test, converged or bool(over), others, cold, misfit))
+    notes = [remark for measured in study.measured for remark in measured.remarks]
+    notes += _notes(study, opened, interval, test, converged or bool(over), others, cold, misfit)
     if over:
         return IdentificationStatus.BUDGET, (f"the budget of time is over: {over}", *notes)
     if not converged:

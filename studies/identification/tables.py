@@ -52,7 +52,7 @@ class MeasuredTable:
     """A measurement: its file, and how the scene differs from that of the study as it was made."""
 
     file: str
-    """CSV file, relative to this one"""
+    """table of measured values (CSV or other text), relative to this one; its header names columns and units"""
     set: dict[str, Real] = Field(default_factory=dict)
     """numbers of the scene as the measurement was made, by their dotted paths [units of the numbers]"""
     noise: Annotated[Real, Field(gt=0, lt=1)] | None = None
@@ -63,8 +63,31 @@ class MeasuredTable:
 class ForcedTable(MeasuredTable):
     """A forced response: frequency_hz, amplitude_m and, if measured, phase_rad and direction (up or down)."""
 
-    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] = "amplitude_mean"
-    """which amplitude of a response was measured, by its name there"""
+    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] | None = None
+    """which amplitude of a response was measured, by its name there (default: amplitude_rms if the header says rms, or
+    else amplitude_mean)"""
+    conjugate: bool = False
+    """whether phases are those of exp(-iwt), which rise through a resonance"""
+    deviation: Positive | None = None
+    """standard deviation of an amplitude in place of a relative one [m]"""
+    phase_deviation: Positive | None = None
+    """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
+
+    def __post_init__(self) -> None:
+        _one_noise(self)
+
+
+@dataclass(frozen=True, config=STRICT)
+class SineSweepTable(MeasuredTable):
+    """A history of a slow sine sweep: time_s, force_N or base_acceleration_m_s2, and displacement_m, velocity_m_s or
+    acceleration_m_s2 of the response. Each run up or down becomes a forced response at the level of the excitation."""
+
+    relative: bool | None = None
+    """whether the response to a base acceleration was measured relative to the base; needed with that"""
+    cycles: Annotated[Whole, Field(ge=2, le=1000)] = 16
+    """cycles of the excitation from which each value is taken: more for noise, fewer for a narrow resonance"""
+    points: Annotated[Whole, Field(ge=5, le=1000)] = 30
+    """frequencies of each run that are compared with the model, most where the response changes"""
     deviation: Positive | None = None
     """standard deviation of an amplitude in place of a relative one [m]"""
     phase_deviation: Positive | None = None
@@ -128,6 +151,8 @@ class IdentificationFile:
     """the numbers that are sought, by their dotted paths as axes of a sweep have them"""
     forced: tuple[ForcedTable, ...] = ()
     """forced responses, one table each"""
+    sine_sweep: tuple[SineSweepTable, ...] = ()
+    """slow sine sweeps, one table each"""
     decay: tuple[DecayTable, ...] = ()
     """decays, one table each"""
     impacts: tuple[ImpactsTable, ...] = ()
@@ -139,5 +164,7 @@ class IdentificationFile:
     frequencies around the measured ones)"""
 
     def __post_init__(self) -> None:
-        if not (self.forced or self.decay or self.impacts):
-            raise ValueError("forced: missing; give a measurement: [[forced]], [[decay]] or [[impacts]]")
+        if not (self.forced or self.sine_sweep or self.decay or self.impacts):
+            raise ValueError(
+                "forced: missing; give a measurement: [[forced]], [[sine_sweep]], [[decay]] or [[impacts]]"
+            )

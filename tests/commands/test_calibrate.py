@@ -214,7 +214,7 @@ def test_a_band_without_the_peak_is_refused_with_the_peak(measured, capfd):
     ("values", "told"),
     [
         (lambda f: 0.0 * f, "values: all are zero; a response without motion has no modes"),
-        (lambda f: np.where(f > f[5], np.nan, f), "values: expected finite frequencies and values"),
+        (lambda f: np.where(f > f[5], np.nan, f), "real: expected a finite number (got 'nan')"),
         (lambda f: 1.0 + 0.0 * f, "of the band"),
     ],
 )

@@ -21,7 +21,8 @@ from vanedamp.modal.matrix_files import write_folder
 
 #: of the repository, whose parts may take those of other packages
 PARTS = ("files", "modal", "rom", "coupling", "studies", "benchmarks")
-TUTORIAL = ROOT / "docs" / "tutorial" / "index.md"
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorial" / "index.md"
 
 
 @pytest.fixture(scope="module")
@@ -108,21 +109,41 @@ def blocks(text: str):
         yield kind, argument.strip(), options, "\n".join(lines).strip("\n")
 
 
+def followed(page, folder):
+    """Run a page in a folder. Returns its session and what its commands print."""
+    session, printed = Session(folder), []
+    for kind, argument, options, text in blocks(page.read_text(encoding="utf-8")):
+        for name in options.get("files", "").split():
+            shutil.copy(page.parent / name, session.folder)
+        if kind == "file":
+            session.write(argument, text, "append" in options)
+        elif kind == "shell":
+            printed.append(session.shell(text))
+        else:
+            told, pictures = session.python(text)
+            printed.append(told)
+            assert "alt" not in options or pictures
+    return session, printed
+
+
+@pytest.mark.parametrize(
+    ("page", "told"),
+    [
+        ("frf", ["'Betrag [g/N] and Phase [deg]' as magnitude-degrees in g/N; accelerance", "give conjugate = true"]),
+        ("decay", ["'swing [mm pk-pk]' as amplitude in mm pk-pk", "structure.damping_ratio = 0.02"]),
+        ("sweep", ["up at 0.00286 Hz/s, 8 points", "structure.damping_ratio = 0.01", "status ok"]),
+    ],
+)
+def test_measured_data_come_in_as_their_pages_say(tmp_path, page, told):
+    _, printed = followed(DOCS / "howto" / f"measured_{page}.md", tmp_path / "work")
+    assert all(one in "\n".join(printed) for one in told)
+
+
 @pytest.mark.slow
 def test_tutorial_leads_to_a_decision(tmp_path):
     """Word by word; the chosen design halves the resonance from every start."""
     pytest.importorskip("dolfinx", reason="needs dolfinx")
-    session, printed = Session(tmp_path / "work"), ""
-    for kind, argument, options, text in blocks(TUTORIAL.read_text(encoding="utf-8")):
-        for name in options.get("files", "").split():
-            shutil.copy(TUTORIAL.parent / name, session.folder)
-        if kind == "file":
-            session.write(argument, text, "append" in options)
-        elif kind == "shell":
-            printed = session.shell(text)
-        else:
-            printed, pictures = session.python(text)
-            assert "alt" not in options or pictures
+    session, (*_, printed) = followed(TUTORIAL, tmp_path / "work")
     shares = [int(share) for share in re.findall(r"(\d+)% of that without bodies", printed)]
     assert len(shares) == 3 and max(shares) < 50
     with (session.folder / "chosen.toml").open("rb") as file:

@@ -121,3 +121,44 @@ def test_matrices_in_tonnes_and_millimetres(tmp_path):
     assert solve_modes(again, 3).frequencies_hz == pytest.approx(solve_modes(given, 3).frequencies_hz, rel=1e-9)
     with pytest.raises(MatricesError, match="mass_scale: expected a positive number, not 0"):
         read_folder(tmp_path, mass_scale=0.0)
+
+
+def test_matrices_of_calculix_leave_held_coordinates_out(folder, tmp_path):
+    """Lines of row, column and entry of one triangle, and a .dof file; the nodes in another order than there."""
+    given = truss()
+    order = given.free[::-1]
+    for name, ending in (("stiffness", "sti"), ("mass", "mas")):
+        entries = sparse.coo_array(sparse.triu(getattr(given, name)[order][:, order]))
+        lines = [
+            f"{r + 1} {c + 1} {v:20.13e}\n" for r, c, v in zip(entries.row, entries.col, entries.data, strict=True)
+        ]
+        (tmp_path / f"job.{ending}").write_text("".join(lines))
+    (tmp_path / "job.dof").write_text("".join(f"{dof // 3 + 1}.{dof % 3 + 1}\n" for dof in order))
+    files = tmp_path / "job.sti", tmp_path / "job.mas", folder / "nodes.csv"
+    again = read_matrices(*files)
+    assert np.array_equal(again.fixed, given.fixed)
+    assert solve_modes(again, 3).frequencies_hz == pytest.approx(solve_modes(given, 3).frequencies_hz, rel=1e-9)
+    for text, told in (
+        ("1.1\n", "1 different coordinates for a matrix"),
+        ("1.4\n", "line 1: expected node.direction"),
+        ("999.1\n", "node '999' is not among the nodes"),
+    ):
+        (tmp_path / "job.dof").write_text(text)
+        with pytest.raises(MatricesError, match=told):
+            read_matrices(*files)
+    (tmp_path / "job.dof").unlink()
+    with pytest.raises(MatricesError, match=r"job\.dof: no such file"):
+        read_matrices(*files)
+
+
+def test_matrices_of_abaqus_may_have_the_ending_of_matrix_market(folder, tmp_path):
+    given = truss()
+    for name, file in (("stiffness", "job_STIF1.mtx"), ("mass", "job_MASS1.mtx")):
+        entries = sparse.coo_array(getattr(given, name))
+        lines = [
+            f"{r + 1}, {c + 1}, {v!r}\n"
+            for r, c, v in zip(entries.row, entries.col, entries.data.tolist(), strict=True)
+        ]
+        (tmp_path / file).write_text("".join(lines))
+    again = read_matrices(tmp_path / "job_STIF1.mtx", tmp_path / "job_MASS1.mtx", folder / "nodes.csv")
+    assert abs(again.stiffness - given.stiffness).max() <= 1e-15 * abs(given.stiffness).max()

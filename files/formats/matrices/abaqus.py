@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
+from scipy import sparse
 
 from vanedamp.files.formats.matrices import MatrixFileError
 
@@ -48,11 +49,12 @@ def _text(value: float) -> str:
     return f"{value:.14E}" if value >= 0.0 else f"{value:.13E}"
 
 
-def read_matrices(path: Path) -> dict[str, np.ndarray]:
-    """Read stiffness, mass and damping of a substructure by name; one global matrix has the name "".
+def read_matrices(path: Path) -> dict[str, Any]:
+    """Read stiffness, mass and damping of a substructure by name; one global matrix, sparse, has the name "".
 
     Global matrices come from *MATRIX OUTPUT: FORMAT=MATRIX INPUT (node, freedom, node, freedom, entry), of nodes
-    that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry). Raises MatrixFileError.
+    that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry), as CalculiX writes .sti and .mas.
+    Raises MatrixFileError.
     """
     lines = list(_lines(path))
     if any(line.startswith("*USER ELEMENT") for _, line in lines):
@@ -125,7 +127,7 @@ def _unpacked(name: str, entries: np.ndarray, whole: bool) -> np.ndarray:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def _global(places: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _global(places: np.ndarray, values: np.ndarray) -> sparse.csr_array:
     if places.shape[1] == 4:
         freedoms, index = np.unique(places.reshape(-1, 2), axis=0, return_inverse=True)
         nodes, kinds = (len(np.unique(freedoms[:, column])) for column in (0, 1))
@@ -140,7 +142,8 @@ def _global(places: np.ndarray, values: np.ndarray) -> np.ndarray:
             raise MatrixFileError("rows and columns count from 1")
         rows, columns = places.T - 1
     size = int(max(rows.max(), columns.max())) + 1
-    matrix = np.zeros((size, size))
-    matrix[rows, columns] = values
-    triangle = not np.any(np.triu(matrix, 1)) or not np.any(np.tril(matrix, -1))
-    return np.asarray(matrix + matrix.T - np.diag(np.diag(matrix))) if triangle else matrix
+    # lists of entries may hold one twice, of which the last counts
+    last = len(rows) - 1 - np.unique((rows * size + columns)[::-1], return_index=True)[1]
+    matrix = sparse.csr_array((values[last], (rows[last], columns[last])), shape=(size, size))
+    triangle = not sparse.triu(matrix, 1).count_nonzero() or not sparse.tril(matrix, -1).count_nonzero()
+    return sparse.csr_array(matrix + matrix.T - sparse.diags(matrix.diagonal())) if triangle else matrix

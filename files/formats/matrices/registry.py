@@ -25,10 +25,11 @@ from vanedamp.files.sparse_indices import within_shape
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
 
-    That in .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
-    entries (.pch, .dmig), of which all have the same rows, by grid point and component, and .mtx of Abaqus, of whose
-    substructures the names are stiffness, mass and damping. Entries of a file that are no numbers are left out. Raises
-    MatrixFileError for a missing, damaged or unknown file, and for Nastran files without the package pyyeti.
+    That in .mtx, .npy, .csv, CalculiX's .sti and .mas or scipy's save_npz is "". Several hold .npz, MATLAB's .mat,
+    Nastran's OP4, OP2 and DMIG entries (.pch, .dmig), of which all have the same rows, by grid point and component, and
+    .mtx of Abaqus, of whose substructures the names are stiffness, mass and damping. Entries of a file that are no
+    numbers are left out. Raises MatrixFileError for a missing, damaged or unknown file, and for Nastran files without
+    the package pyyeti.
     """
     file = Path(path)
     if file.suffix.lower() not in _READERS:
@@ -68,7 +69,8 @@ def _dense(matrix: Any) -> Any:
     return matrix.toarray() if sparse.issparse(matrix) else matrix
 
 
-def _mtx(path: str) -> dict[str, Any]:
+def read_mtx(path: str) -> dict[str, Any]:
+    """Return the matrices of Matrix Market or Abaqus by name, "" for the only one."""
     return {"": io.mmread(path)} if is_matrix_market(Path(path)) else read_abaqus(Path(path))
 
 
@@ -80,7 +82,9 @@ _READERS = {
     ".op2": read_op2,
     ".pch": read_dmig,
     ".dmig": read_dmig,
-    ".mtx": _mtx,
+    ".mtx": read_mtx,
+    ".sti": read_mtx,
+    ".mas": read_mtx,
     ".npy": lambda path: {"": np.load(path, allow_pickle=False)},
     ".csv": lambda path: {"": read_table(path)},
 }

@@ -44,7 +44,7 @@ def test_command(folder: Path, capsys):
     [
         (",5,", ",6,", "expected a whole number from 0 to 5 (got 6)"),
         (",5,", ",4,", "is given twice"),
-        ("imaginary", "phase", "expected the header"),
+        ("imaginary", "phase", "unknown column 'phase'; expected frequency_hz, sector, real, imaginary"),
     ],
 )
 def test_wrong_measurements_in_a_line(folder: Path, capsys, given, put, message):

@@ -1,5 +1,6 @@
 """Studies and their measurements: bad input ends in one line that names the file, the key and the remedy."""
 
+import numpy as np
 import pytest
 import tomli_w
 
@@ -18,6 +19,8 @@ STUDY = {
     },
     "forced": [{"file": "forced.csv", "noise": 0.02}], "decay": [{"file": "decay.csv", "noise": 0.02}],
 }  # fmt: skip
+RMS = {"change": lambda data: data["forced"][0].update(measure="amplitude_max")}
+PHASES = "f [Hz];x [mm];phase [deg]\n15,3;0,1;5\n15,6;0,2;10\n15,9;2,0;90\n16,2;0,1;170\n"
 
 
 def write(folder, change=lambda data: None, forced=FORCED, decay=DECAY, scene=None):
@@ -82,13 +85,50 @@ def test_bad_studies_end_in_one_line(tmp_path, change, told):
 
 
 @pytest.mark.parametrize(
+    ("header", "options", "scale", "measure"),
+    [
+        ("frequency_hz,amplitude_m", {}, 1.0, "amplitude_mean"),
+        ("f [Hz],x [mm pk-pk]", {}, 0.5e-3, "amplitude_mean"),
+        ("f,Peak (µm)", {"measure": "amplitude_max"}, 1e-6, "amplitude_max"),
+        ("f,x_rms_mm", {}, 1e-3, "amplitude_rms"),
+        ("f,x [mm rms]", {"measure": "amplitude_harmonic"}, 2**0.5 * 1e-3, "amplitude_harmonic"),
+        ("f,Laser [mm/s]", {"measure": "amplitude_harmonic"}, 1e-3 / (2 * np.pi * 15.3), "amplitude_harmonic"),
+        ("f,acc_g", {"measure": "amplitude_harmonic"}, 9.80665 / (2 * np.pi * 15.3) ** 2, "amplitude_harmonic"),
+    ],
+)
+def test_amplitudes_as_headers_say(tmp_path, header, options, scale, measure):
+    text = FORCED.replace("frequency_hz,amplitude_m", header)
+    read = IdentificationStudy.load(write(tmp_path, lambda data: data["forced"][0].update(options), text)).measured[0]
+    assert read.channels[0].values[0] == pytest.approx(1e-4 * scale, rel=1e-12) and read.measure == measure
+    assert f"{header.split(',')[1]!r} as {measure} of " in read.source and "'f" in read.source
+
+
+@pytest.mark.parametrize("conjugate", [False, True])
+@pytest.mark.parametrize(("unit", "turned"), [("mm", 0.0), ("mm/s", 90.0), ("g", 180.0)])
+def test_phases_of_a_displacement(tmp_path, unit, turned, conjugate):
+    """That of a velocity is a quarter of a turn ahead of it, that of an acceleration half a turn."""
+    lags = np.array([-5.0, -10.0, -90.0, -170.0])
+    given = (lags + turned) * (-1.0 if conjugate else 1.0)
+    rows = [f"{f};1e-4;{phase}" for f, phase in zip((15.3, 15.6, 15.9, 16.2), given.tolist(), strict=True)]
+    text = "\n".join([f"f [Hz];x [{unit}];phase [deg]", *rows])
+    options = {"measure": "amplitude_harmonic", "conjugate": conjugate}
+    read = IdentificationStudy.load(write(tmp_path, lambda data: data["forced"][0].update(options), text)).measured[0]
+    assert np.angle(np.exp(1j * (read.channels[1].values - np.radians(lags)))) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
     ("files", "told"),
     [
-        ({"forced": FORCED.replace("amplitude_m", "amplitude_mm")}, "unknown column 'amplitude_mm'; expected frequenc"),
+        ({"forced": FORCED.replace("amplitude_m", "size_kg")}, "unknown column 'size_kg'; expected frequency_hz, ampl"),
+        ({"forced": FORCED.replace("amplitude_m", "amplitude")}, "no unit; write one such as 'amplitude [m]'"),
+        ({"forced": FORCED.replace("amplitude_m", "amplitude [mm rms]")} | RMS, "no rms value; take \"amplitude_har"),
+        ({"forced": FORCED.replace("amplitude_m", "acc [g]")}, "acceleration gives the displacement of a sine only"),
+        ({"forced": FORCED.partition("\n")[2]}, "forced.csv: names no columns; expected the header frequency_hz, ampl"),
+        ({"forced": PHASES}, "looks like exp(-iwt): the phase rises through the resonance; give conjugate = true"),
         ({"forced": FORCED.replace("2e-3", "-2e-3")}, "forced.csv: line 4: amplitude_m: expected a positive number"),
         ({"forced": FORCED.replace("2e-3", "x")}, "line 4: amplitude_m: expected a finite number"),
         ({"decay": DECAY.replace("0.06", "0.02")}, "decay.csv: line 3: time_s: expected times from 0 that rise"),
-        ({"decay": ""}, "decay.csv: is empty"),
+        ({"decay": ""}, "decay.csv: holds no rows of numbers"),
         ({"scene": {k: v for k, v in SCENE.items() if k != "ring_down"}}, "decay 'decay': ring_down: missing"),
         ({"scene": SCENE | {"solver": {"method": "moreau"}}}, 'solver.method: identification takes "exact"'),
     ],
