@@ -52,7 +52,8 @@ class WorkerPool(Executor):
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """End the workers; in the middle of their work after an error or an interrupt."""
         if kind is not None:
-            for process in list((self._pool._processes or {}).values()):
+            # no public name before Python 3.14; without it, their tasks end first
+            for process in list((getattr(self._pool, "_processes", None) or {}).values()):
                 process.terminate()
         self.shutdown(cancel_futures=kind is not None)
 
