@@ -131,7 +131,11 @@ def followed(page, folder):
     [
         ("frf", ["'Betrag [g/N] and Phase [deg]' as magnitude-degrees in g/N; accelerance", "give conjugate = true"]),
         ("decay", ["'swing [mm pk-pk]' as amplitude in mm pk-pk", "structure.damping_ratio = 0.02"]),
-        ("sweep", ["up at 0.00286 Hz/s, 8 points", "structure.damping_ratio = 0.01", "status ok"]),
+        pytest.param(
+            "sweep",
+            ["up at 0.00286 Hz/s, 8 points", "structure.damping_ratio = 0.01", "status ok"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_measured_data_come_in_as_their_pages_say(tmp_path, page, told):

@@ -172,11 +172,3 @@ def test_a_ramp_of_the_engine(bodies):
     peaks = np.interp(tracked.time, run.time[: len(run.amplitude)], run.amplitude)
     assert np.abs(tracked.response) * tracked.level == pytest.approx(peaks, abs=0.01 * peaks.max())
     assert (run.impacts.sum() > 1000) == bool(bodies)
-
-
-def test_an_identification_finds_the_oscillator_from_a_sweep(tmp_path):
-    from vanedamp.studies.identification.search import identify
-
-    study = sweep(tmp_path, history(), phase_deviation=0.05)
-    found = identify(study)
-    assert found.best == pytest.approx([RATIO, STIFFNESS], rel=0.03)
