@@ -59,7 +59,7 @@ def signals_kept() -> Iterator[None]:
         yield
         return
     libc = ctypes.CDLL(None)
-    kept = {number: ctypes.create_string_buffer(1024) for number in range(1, signal.SIGRTMIN)}  # of any sigaction
+    kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # of any sigaction
     for number, action in kept.items():
         libc.sigaction(number, None, action)
     try:
