@@ -244,7 +244,7 @@ def _patches(path: Path, labels: dict[int, int]) -> dict[str, Patch]:
         raise MatricesError(f"{path}: {error}") from error
 
 
-def _index(path: Path, labels: dict[int, int], word: str) -> int:
+def _index(path: Path, labels: Mapping[int, int], word: str) -> int:
     if not word.strip().isdecimal() or int(word) not in labels:
         raise MatricesError(f"{path}: node {word!r} is not among the nodes")
     return labels[int(word)]

@@ -159,7 +159,7 @@ def read_forced(table: ForcedTable, folder: Path) -> Measured:
             if word not in ("up", "down", ""):
                 raise InputError(f"{own.place(row)}: direction: expected up or down (got {word!r})")
     if phase is not None:
-        order = np.lexsort((frequency, direction))
+        order = np.lexsort((frequency, np.array(direction)))
         check_phase(own.path, InputError, (amplitude * np.exp(1j * phase))[None, order], table.conjugate)
     told[found["frequency"].header] = f"frequency in {own.unit_of(found['frequency'], 'frequency', 'Hz').text}"
     return forced(
