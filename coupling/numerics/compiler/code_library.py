@@ -230,7 +230,7 @@ if (
 
 arrayobj.fix_integer_index = _index
 #: options of njit by kind of function
-COMPILERS = {
+COMPILERS: dict[str, dict[str, Any]] = {
     "entry": {"pipeline_class": _compiler(_Entry, "entry")},
     "kernel": {"pipeline_class": _compiler(_Kernel, "kernel")},
     "inlined": {"pipeline_class": _compiler(_Kernel, "inlined", inline=True)},
