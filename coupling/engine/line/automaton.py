@@ -74,7 +74,7 @@ from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANE
 from vanedamp.coupling.response.records import FRICTION
 
 #: segments after which a run returns to Python, which sees interrupts
-_SLICE = 4096
+SLICE = 4096
 
 
 @kernel
@@ -100,7 +100,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             return DONE
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
-        if segments == _SLICE or st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
+        if segments == SLICE or st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
             return PAUSED
         segments += 1
         tau, event, side = next_event(system, flows, st, watched)

@@ -12,13 +12,14 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.automaton import advance, begin
+from vanedamp.coupling.engine.line.automaton import SLICE, advance, begin
 from vanedamp.coupling.engine.line.flow_assembly import add_known
 from vanedamp.coupling.engine.line.gap_kinematics import rigid
 from vanedamp.coupling.engine.line.recording import structure_state
 from vanedamp.coupling.numerics.codes import (
     COAST,
     DONE,
+    EVENTS,
     LOGGED,
     LONGER,
     NEEDS_FLOW,
@@ -36,13 +37,13 @@ from vanedamp.coupling.response.steadiness import judged, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
 from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
 
-#: slices of a run (line.automaton) after which Python sees interrupts
-_SLICES = 64
+#: segments of motion after which Python sees interrupts: some 0.1 s
+_SEGMENTS = 8 * SLICE
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
-# those left out and the longest run; the code that ends it; slices since Python has seen it; whether a scene begins
+# those left out and the longest run; the code that ends it; segments since Python has seen it; whether a scene begins
 # with the state that the one before has left; the number of the last scene that has left one, from 1, 0: none
-COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SLICES, LINKED, LEFT = range(10)
+COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SEGMENTS, LINKED, LEFT = range(10)
 #: what comes next with a scene: it begins, goes on, or leaves its state in its columns
 BEGINS, RUNS, LEAVES = range(3)
 
@@ -119,12 +120,8 @@ def run(
             return code
         if code == PAUSED:
             st.counters[LOGGED] = 0
-            at[SLICES] += 1
-            if at[SLICES] == _SLICES:
-                at[SLICES] = 0
-                return PAUSED
-            continue
-        if _end(job, setup, free, stuck, measured, rec, st.counters[PERIOD], code):
+            at[SEGMENTS] += SLICE
+        elif _end(job, setup, free, stuck, measured, rec, st.counters[PERIOD], code):
             if at[LINKED]:
                 if code == DONE:
                     _leave(system, flows, st, scratch, columns, k + 1)
@@ -132,6 +129,10 @@ def run(
                 else:  # a run that broke off within a period leaves the state that it began with
                     _repeat(columns, k)
             at[PLACE], at[STAGE], at[CODE] = k + 1, BEGINS, DONE
+            at[SEGMENTS] += st.counters[EVENTS] + st.counters[PERIOD]
+        if at[SEGMENTS] >= _SEGMENTS:
+            at[SEGMENTS] = 0
+            return PAUSED
 
 
 @kernel
