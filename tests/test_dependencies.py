@@ -39,9 +39,10 @@ def imported(folders):
     found = {}
     for folder in folders:
         for path in (ROOT / folder).rglob("*.py"):  # without the links to the parts
-            if {"_build", "auto_gallery", "last_bits_path"}.isdisjoint(path.parts):
+            if {"_build", "auto_gallery"}.isdisjoint(path.parts):
                 found |= {name.partition(".")[0]: path for name in names(ast.parse(path.read_text(encoding="utf-8")))}
-    own = {*PRODUCT, *EVIDENCE, *sys.stdlib_module_names, "last_bits_imports"}
+    beside = {path.stem for path in (ROOT / "tests" / "tools").glob("*_path/*.py")}
+    own = {*PRODUCT, *EVIDENCE, *sys.stdlib_module_names, *beside}
     return {name: path for name, path in found.items() if name not in own}
 
 
