@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing
 from vanedamp.files.reference import FileKind
 from vanedamp.files.store import kind_of as kind_of_record
 from vanedamp.files.toml_input import InputError, read_toml
@@ -117,17 +118,19 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
     taken: names of KINDS, RESULT, ANY.
     """
     file = Path(path)
-    if not file.is_file() or file.name.endswith(".claims.json"):
+    try:
+        with existing(file, InputError).open("rb") as stream:
+            is_record = stream.read(8) == b"\x89HDF\r\n\x1a\n"
+    except (OSError, InputError):
         return ""
-    with file.open("rb") as stream:
-        is_record = stream.read(8) == b"\x89HDF\r\n\x1a\n"
     if is_record:
         return "" if RESULT in taken else f"is HDF5 of the kind {kind_of_record(file)}: vanedamp info {path}"
     try:
         tables = read_toml(file)
         kind = kind_of(tables, str(path))
     except VanedampError:
-        return f"is {_OTHERS[file.suffix]}" if file.suffix in _OTHERS else ""
+        known = file.suffix in _OTHERS and not file.name.endswith(".claims.json")
+        return f"is {_OTHERS[file.suffix]}" if known else ""
     own = {table for name in taken if name in KINDS for table in KINDS[name].tables}
     if ANY in taken or kind.name in taken or (not own.isdisjoint(tables) and kind.name not in _WITH_SCENE):
         return ""

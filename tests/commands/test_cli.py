@@ -327,7 +327,7 @@ def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, fold
         (["run", "scene.toml", "--json", "."], "is a folder"),
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
-        (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
+        (["report", "case.toml", "-o", "report.html"], "case.toml: is a case ([mesh]): vanedamp modal"),
         (
             ["report", ".", "-o", "report.html"],
             "no results that a report shows (modes, ring-modes, ",

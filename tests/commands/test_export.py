@@ -607,7 +607,7 @@ def test_damaged_matrices_of_abaqus(tmp_path, text, told):
         ("rom.h5 -o out.mtx --coordinates modal", "--coordinates: expected own or natural"),
         ("rom.h5 -o out.mtx --description out.txt", "--description"),
         ("rom.h5 -o rom.h5", "is an input"),
-        ("case.toml -o out.mat", "case.toml: not a readable HDF5 file"),
+        ("case.toml -o out.mat", "case.toml: is a case ([mesh]): vanedamp modal"),
         ("nothing.h5 -o out.mat", "nothing.h5: no such file"),
         ("damaged.h5 -o out.mat", "damaged.h5: "),
         ("sweep.h5 -o none/out.csv", "folder"),

@@ -172,7 +172,7 @@ def test_foreign_and_broken_files_are_rejected(folder, monkeypatch, capfd):
     (folder / "hit.h5").write_bytes(whole[:9000] + bytes([whole[9000] ^ 255]) + whole[9001:])
     capfd.readouterr()
     for file, reason in {
-        "scene.toml": "not a readable HDF5 file", "missing.h5": "no such file", "foreign.h5": "no record of ours",
+        "scene.toml": "is a scene ([structure])", "missing.h5": "no such file", "foreign.h5": "no record of ours",
         "hollow.h5": "holds no", "cut.h5": "not a readable HDF5 file", "hit.h5": "damaged",
     }.items():  # fmt: skip
         assert main(["info", file]) == BAD_INPUT

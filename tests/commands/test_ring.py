@@ -215,7 +215,7 @@ def test_info(folder, found, capsys):
         (
             DISK.replace("[ring]\nsectors = 6", "[ring]\nsectors = 7"),
             [],
-            "ring.sectors: the faces are 60 degrees apart",
+            "ring.sectors: the mesh is a sector of 6, not of 7",
         ),
         (DISK + TURNING.replace("[1, 4, 5, 7, 10]", "[1.5]"), [], "engine orders: expected whole numbers from 1"),
     ],
