@@ -31,7 +31,8 @@ def test_rigid_demo_needs_no_finite_elements(tmp_path):
     stems = ["fig9", "fig10_single", "fig10_separate", "fig10_shared"]
     names = {f"{stem}{suffix}" for stem in stems for suffix in (".toml", ".h5")}
     names |= {f"{figure}{suffix}" for figure in ("fig9", "fig10") for suffix in (".png", ".claims.json")}
-    names |= {"fig10_single_peak.h5", "report.html", "pipeline.toml", "pipeline.schema.json", "scene.schema.json"}
+    names |= {"fig10_single_peak.h5", "report.html", "scene.schema.json"}
+    names |= {"pipeline.toml", "pipeline.schema.json", "pipeline.record.json"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == names
 
 
