@@ -12,7 +12,7 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.nodes import nested_parse_with_titles
 
-from vanedamp.studies.cli import _parser
+from vanedamp.studies.cli import _parsers
 from vanedamp.studies.commands import COMMANDS
 
 
@@ -20,7 +20,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     """Return the parsers of our own commands by name, in the order of --help."""
     found = {}
     for name in COMMANDS.own():
-        (places,) = (a for a in _parser(name)._actions if isinstance(a, argparse._SubParsersAction))
+        (places,) = (a for a in _parsers(name)[0]._actions if isinstance(a, argparse._SubParsersAction))
         found[name] = places.choices[name]
     return found
 

@@ -151,7 +151,7 @@ class LabTable:
 
     def reading(self, taken: Mapping[str, str]) -> str:
         """Return how the file was read, in words; taken: what was made of headers."""
-        return f"{self.path}: {self._spelling}; " + ", ".join(f"{key!r} as {value}" for key, value in taken.items())
+        return f"{self.path.name}: {self._spelling}; " + ", ".join(f"{key!r} as {value}" for key, value in taken.items())
 
 
 def _title(role: str) -> str:

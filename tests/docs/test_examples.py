@@ -26,7 +26,7 @@ from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.external_model import External
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.cli import _parser, main
+from vanedamp.studies.cli import _parsers, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.identification.deviations import load_table
@@ -274,7 +274,7 @@ def test_commands_are_understood(example):
         words = shlex.split(line, comments=True) if "<(" not in line else []
         if "vanedamp" in words:
             arguments = words[words.index("vanedamp") + 1 :]
-            assert _parser(arguments[0]).parse_args(arguments).command == arguments[0]
+            assert _parsers(arguments[0])[0].parse_args(arguments).command == arguments[0]
         elif words[:1] == ["make"]:
             assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
