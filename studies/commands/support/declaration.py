@@ -78,17 +78,14 @@ class Command:
 
         The arguments get `outputs`, the files that are written, and `checkpoint`, one of them or None.
         """
+        if self.writes is not None:
+            Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
         try:
-            self._run(arguments)
+            given = () if self.reads is None else (self.reads(arguments),)
+            self.work(arguments, *given)
         except VanedampError:
             self._refuse_other_kinds(arguments)
             raise
-
-    def _run(self, arguments: Namespace) -> None:
-        if self.writes is not None:
-            Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
-        given = () if self.reads is None else (self.reads(arguments),)
-        self.work(arguments, *given)
 
     def _refuse_other_kinds(self, arguments: Namespace) -> None:
         """Raise InputError for an input file that another command takes."""
