@@ -151,7 +151,8 @@ class LabTable:
 
     def reading(self, taken: Mapping[str, str]) -> str:
         """Return how the file was read, in words; taken: what was made of headers."""
-        return f"{self.path.name}: {self._spelling}; " + ", ".join(f"{key!r} as {value}" for key, value in taken.items())
+        told = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
+        return f"{self.path.name}: {self._spelling}; {told}"
 
 
 def _title(role: str) -> str:

@@ -52,7 +52,11 @@ def test_files_with_a_mark_of_their_encoding(command, folder):
         ('name = "c1"', 'name = ""', "cavity[0].name: expected a word of at most 200 characters that is no number"),
         ('name = "c1"', 'name = "1"', "cavity[0].name: expected a word of at most 200 characters that is no number"),
         ('name = "c1"', 'name = "a.b"', "cavity[0].name: expected a word of at most 200 characters that is no number"),
-        ('name = "c1"', 'name = "gap"', "cavity[0].name: expected a word of at most 200 characters that is no number and no key"),
+        (
+            'name = "c1"',
+            'name = "gap"',
+            "cavity[0].name: expected a word of at most 200 characters that is no number and no",
+        ),
         ("mass = 0.05", "mass = 1e300", "damper[0].mass: expected a number up to 1e+40 in SI units"),
         ("mass = 0.05", "mass = 1e-300", "damper[0].mass: expected at least 1e-40 in SI units"),
         ("resonance_amplitude = 1e-3", "", "excitation: nothing moves the structure; give force"),

@@ -196,7 +196,7 @@ CHANGES = [
     ("case.toml", "poisson = 0.3", "poisson = 0.29", [*ALL[:5], "report"], "material.default.poisson 0.3 -> 0.29"),
     ("case.toml", "strength = 4e8", "strength = 5e8", [*ALL[:2], ALL[3], "report"], "fatigue_strength 4e+08 -> 5e+08"),
     ("case.toml", "share = 0.5", "share = 0.6", [*ALL[:2], ALL[3], "report"], "calibration.share 0.5 -> 0.6"),
-    ("tip.csv", "f", "frequency", ["calibrate"], "file tip.csv changed"),
+    ("tip.csv", "", "", ["calibrate"], "file tip.csv changed"),
     ("gaps.toml", "gap = 2e-4", "gap = 3e-4", [ALL[3], "report"], "gaps.toml changed: cavity.c1.gap 0.0002 -> 0.0003"),
     ("gaps.toml", "[time]", '[structure]\nmodel = "rigid"\nmass = 3\nstiffness = 1\n[time]', [], ""),
     ("reduced.toml", "modes = 1", "modes = 2", ["sweep reduced", "report"], "structure.modes 1 -> 2"),
@@ -210,9 +210,8 @@ CHANGES = [
 
 @pytest.mark.parametrize(("file", "old", "new", "done", "told"), CHANGES)
 def test_a_change_redoes_what_depends_on_it(folder, file, old, new, done, told):
-    if file == "tip.csv":  # only its header, so that the calibration is as it was
-        lines = (folder / file).read_text().splitlines()
-        (folder / file).write_text("\n".join(["f,real,imag", *lines[1:]]) + "\n")
+    if file == "tip.csv":  # an empty line, so that the calibration is as it was
+        (folder / file).write_text((folder / file).read_text() + "\n")
     else:
         replace_in(folder / file, old, new)
     plan = vd.pipeline("pipeline.toml", dry_run=True)
