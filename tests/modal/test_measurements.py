@@ -223,7 +223,7 @@ def test_spellings_of_one_response_are_the_same_numbers(tmp_path, name, encoding
     power = {"receptance": 0, "mobility": 1, "accelerance": 2}[read.quantity]
     assert read.values[0] / (2j * np.pi * LINES) ** power == pytest.approx(SPELT, rel=1e-10)
     assert power == 2 * (name in ("g/N", "(m/s^2)/N")) + (name == "mobility")
-    assert str(tmp_path / "frf.csv") in read.source and read.quantity in read.source
+    assert read.source.startswith("frf.csv: ") and read.quantity in read.source
 
 
 def test_directions_are_the_names_of_responses(tmp_path):
