@@ -33,7 +33,7 @@ ENDINGS = ("csv", "mat", "mtx", "pch", "op4", "uff", "vtkhdf")
 CALLS = """
 run scene.toml -o mine.h5; sweep swept.toml --workers 2 -o mine_sweep.h5; ramp ramp.toml; ringdown down.toml
 orbits orbit.toml; optimise optimise.toml --workers 1; import external.toml -o mine_rom.h5
-new scene -o new.toml; check new.toml; run new.toml; new contact -o pair.toml; contact pair.toml; schema scene
+new scene -o new.toml; check new.toml; run new.toml; schema scene
 """
 
 

@@ -22,7 +22,9 @@ from tests.tools.archives import ansys_archive, labelled
 from tests.tools.fuzz import CASE, OPTIMISE, RING, SCENE, WRONG, places
 from tests.tools.op2_file import write_op2
 from tests.tools.rings import Chain
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import Variable, save, write_csv, write_json
+from vanedamp.files.toml_input import validate
 from vanedamp.rom.ring.deviations import Deviations
 
 #: what takes the place of a number in a text
@@ -154,7 +156,8 @@ def _write_measurements() -> None:
             for sector, value in enumerate(shape)]  # fmt: skip
     write_csv("waves.csv", ("frequency_hz", "sector", "real", "imaginary"), rows)
     write_csv("decay.csv", ("time_s", "amplitude_m"), zip(*oscillator.half_swings(), strict=True))
-    save("part.h5", "sweep-checkpoint", {"point": Variable(np.arange(3), ("point",))}, {"scene": SCENE, "model": {}})
+    scene = validate(Scene, SCENE, "scene").to_dict()
+    save("part.h5", "sweep-checkpoint", {"point": Variable(np.arange(3), ("point",))}, {"scene": scene, "model": {}})
     claim = {"claim": "it damps", "ours": "it does", "verdict": "shown", "figures": {"reduction": 0.5}}
     study = {"study": "one", "title": "One", "sources": ["sweep.h5"], "claims": [claim]}
     write_json("study.claims.json", study)
