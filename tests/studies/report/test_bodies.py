@@ -37,14 +37,14 @@ DAMPERS = [
     BODY | {"cavity": "row", "shape": "block", "length": 0.008, "height": 0.014},
     BODY | {"cavity": "discs", "shape": "disc", "radius": 0.01},
     BODY | {"cavity": "discs", "shape": "disc", "radius": 0.01, "restitution": 0.3},
-    BODY | {"cavity": "slider </script>"},
+    BODY | {"cavity": "slider <!--<script>"},
 ]
 RIGID = {
     "structure": {"model": "rigid", "mass": 20.0, "stiffness": 8e5, "damping_ratio": 0.01},
     "excitation": {"frequency": 31.0, "force": 60.0}, "initial": {"velocity": 0.2},
     "cavity": [
         {"name": "row", "gap": GAP, "play": PLAY, "normal_motion": 0.2, "rotation": 3.0},
-        {"name": "discs", "gap": GAP, "play": PLAY}, {"name": "slider </script>", "gap": GAP},
+        {"name": "discs", "gap": GAP, "play": PLAY}, {"name": "slider <!--<script>", "gap": GAP},
     ],
     "damper": DAMPERS, "time": {"periods": PERIODS, "transient": DROPPED}, "solver": {"linearisation": 1.0},
 }  # fmt: skip
