@@ -22,7 +22,7 @@ import tempfile
 import time
 import tomllib
 import traceback
-from importlib.metadata import distribution
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -192,7 +192,7 @@ def main() -> int:
             tutorial(trial, checkout)
     for text in trial.failed:
         print(f"failed: {text}")
-    versions = ", ".join(f"{name} {distribution(name).version}" for name in ("numpy", "scipy", "numba", "h5py"))
+    versions = ", ".join(f"{name} {import_module(name).__version__}" for name in ("numpy", "scipy", "numba", "h5py"))
     print(f"Python {sys.version.split()[0]}, {versions}, {'with' if trial.fem else 'without'} finite elements:")
     counts = f"{trial.tried} tried, {trial.refused} refused in words, {len(trial.failed)} failed"
     print(f"{counts}; {time.monotonic() - begun:.0f} s")
