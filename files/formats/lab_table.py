@@ -14,6 +14,7 @@ import csv
 import os
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -152,7 +153,7 @@ class LabTable:
     def reading(self, taken: Mapping[str, str]) -> str:
         """Return how the file was read, in words; taken: what was made of headers."""
         told = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
-        return f"{self.path.name}: {self._spelling}; {told}"
+        return f"{Path(self.path).name}: {self._spelling}; {told}"
 
 
 def _title(role: str) -> str:
