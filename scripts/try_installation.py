@@ -26,8 +26,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-#: commands that solve finite elements; bench and paper ask for a checkout
-SOLVERS = {"mesh", "modal", "campbell", "ring", "calibrate", "matrices", "reduce", "pipeline", "bench", "paper"}
+#: commands that solve finite elements, and those that ask for a checkout
+SOLVERS = {"mesh", "modal", "campbell", "ring", "calibrate", "matrices", "reduce", "pipeline"}
+OF_CHECKOUT = {"bench", "paper"}
 ENDINGS = ("csv", "mat", "mtx", "pch", "op4", "uff", "vtkhdf")
 #: what a user without finite elements does with the sample files
 CALLS = """
@@ -57,7 +58,7 @@ class Trial:
         command = words[0] if words else ""
         if status == 2 and "Traceback" not in error:
             self.refused += 1
-            if not needs or (command in SOLVERS and not self.fem):
+            if not needs or command in OF_CHECKOUT or (command in SOLVERS and not self.fem):
                 return
             if command == "export" and needs[1] and needs[1].replace("_", "-").lower() in self.formats:
                 return
