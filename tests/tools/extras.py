@@ -1,8 +1,7 @@
 """Modules that the product imports from optional groups of pyproject.toml, and processes that do not have them."""
 
-import os
-
-from tests.tools.processes import ROOT, environment
+from tests.tools.processes import environment, startup
+from tests.tools.startup_path.absent_modules import VARIABLE
 
 #: of the wheel of dolfinx; apt's packages have them one by one
 FINITE_ELEMENTS = ("dolfinx", "dolfinx_solver", "petsc4py", "slepc4py", "mpi4py", "ufl", "basix", "ffcx")
@@ -16,4 +15,4 @@ EXTRAS = dict.fromkeys(FINITE_ELEMENTS, "fem") | {
 
 def bare() -> dict[str, str]:
     """Variables of processes, and of their workers, that cannot import the modules."""
-    return environment(PYTHONPATH=os.pathsep.join([str(ROOT / "tests" / "tools" / "bare_path"), str(ROOT)]))
+    return environment(**startup(), **{VARIABLE: ",".join(EXTRAS)})

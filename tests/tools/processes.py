@@ -32,8 +32,8 @@ def environment(**variables: str) -> dict[str, str]:
 
 def startup() -> dict[str, str]:
     """Variables of processes that run STARTUP's sitecustomize."""
-    paths = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path not in ("", str(STARTUP))]
-    return {"PYTHONPATH": os.pathsep.join([str(STARTUP), *paths])}
+    own = environment()["PYTHONPATH"].split(os.pathsep)
+    return {"PYTHONPATH": os.pathsep.join([str(STARTUP), *(path for path in own if path not in ("", str(STARTUP)))])}
 
 
 def vanedamp(*arguments, cwd, **variables: str) -> subprocess.CompletedProcess[str]:

@@ -6,9 +6,13 @@ package, so that they run with any numba: put it first in PYTHONPATH.
 
 import inspect
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+
+from tests.tools.processes import environment
 
 _CHECKS = {}
 
@@ -501,6 +505,33 @@ def test_the_package_compiles_by_its_own_code_library():
     from vanedamp.coupling.numerics.compiler import code_library, jit
 
     assert jit.COMPILERS is code_library.COMPILERS
+
+
+def test_another_numba_compiles_by_its_own_means(tmp_path):
+    """Without the modules that stand on what it does not document; nothing is kept then, as its date would not do."""
+    (tmp_path / "compiled.py").write_text("""
+import sys
+
+for name in ("code_library", "code_file"):
+    sys.modules[f"vanedamp.coupling.numerics.compiler.{name}"] = None
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x
+
+@entry
+def more(x):
+    return twice(x) + 1.0
+
+print(more(3.0))
+""")
+    folder = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run(
+        [sys.executable, "compiled.py"], cwd=tmp_path, env=environment(**folder), capture_output=True, text=True
+    )
+    assert (done.stdout, done.stderr) == ("7.0\n", "")
+    assert not list(tmp_path.rglob("*.nb?"))
 
 
 def test_other_code_counts_negative_indices_from_the_end():
