@@ -110,6 +110,13 @@ def column_signs(shapes: np.ndarray) -> np.ndarray:
     return np.array([leading_sign(shape) for shape in shapes.T])
 
 
+def von_mises(components: np.ndarray) -> np.ndarray:
+    """Return the von Mises stress (...) of stresses xx, yy, zz, xy, yz, zx (6, ...)."""
+    xx, yy, zz, xy, yz, zx = components
+    normal = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+    return np.asarray(np.sqrt(normal + 3.0 * (xy**2 + yz**2 + zx**2)))
+
+
 def cross_matrix(axis: np.ndarray) -> np.ndarray:
     """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
     return np.cross(np.eye(3), axis)

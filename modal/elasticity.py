@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,13 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
-from vanedamp.modal.algebra import cross_matrix
+from vanedamp.modal.algebra import cross_matrix, von_mises
 from vanedamp.modal.eigen import SolverError
 from vanedamp.modal.fenicsx import ufl
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product
 from vanedamp.modal.statics import Statics
+from vanedamp.modal.stress_recovery import StressRecovery
 from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
@@ -237,15 +239,17 @@ class Solid:
         stiffness = sum(self._material_stiffness(measure) for measure in measures)
         return sparse.csr_array(stiffness), sparse.csr_array(sum(fenicsx.matrix(inertia * one) for one in measures))
 
+    @cached_property
+    def recovery(self) -> StressRecovery:
+        """The places where stresses are given, and how they are recovered."""
+        return StressRecovery(self.domain, self.degree)
+
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
-        """Return von Mises stresses, Pa, of displacements (N,) at the corners of all cells, each from its own cell."""
-        self._check_size(displacement)
-        deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
-        equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        return np.array(fenicsx.evaluator(equivalent, fenicsx.discontinuous_space(self.domain, 1))().x.array)
+        """Return von Mises stresses (k,), Pa, of displacements (N,) at the places of `recovery`."""
+        return von_mises(self.stress_components(displacement))
 
     def stress_components(self, displacements: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
-        """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,), where `von_mises` has its values.
+        """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,) at the places of `recovery`.
 
         Of several displacements (m, N) the stresses (m, 6, k). points: indices of the places wanted; default: all. They
         are linear in the displacements.
@@ -253,22 +257,38 @@ class Solid:
         self._check_size(displacements, 2)
         given = np.atleast_2d(displacements)
         moved = fenicsx.field(self.space, given[0])
-        components, found = self._components(self.stress(moved), points), []
+        components, found = self.recovery.mean(self.recovery.of_cells(self.stress(moved)), points), []
         for displacement in given:
             moved.x.array[:] = displacement
             found.append(components())
         return np.array(found[0] if np.ndim(displacements) == 1 else found)
 
-    def static_stresses(self, points: np.ndarray) -> dict[str, np.ndarray]:
+    def stress_errors(self, displacement: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return an estimate (k,), Pa, of the error of von Mises stresses of displacements (N,) at places (indices)."""
+        self._check_size(displacement)
+        moved = fenicsx.field(self.space, displacement)
+        return self.recovery.errors(self.recovery.of_cells(self.stress(moved)), points)
+
+    def static_stresses(self, points: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """Return stresses (6, k), as stress_components, of the static solutions that have given geometric stiffness.
 
         By cause: "temperature" in Pa, of `assemble`, and "rotation" in Pa per squared speed (rad/s), of `rotating`.
         """
-        return {name: np.array(self._components(stress, points)()) for name, stress in self._static_stresses.items()}
+        return {
+            name: self.recovery.mean(self.recovery.of_cells(stress), points)()
+            for name, stress in self._static_stresses.items()
+        }
+
+    def static_errors(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        """Return estimates (k,) of the errors of the von Mises stress of `static_stresses`, by cause."""
+        return {
+            name: self.recovery.errors(self.recovery.of_cells(stress), points)
+            for name, stress in self._static_stresses.items()
+        }
 
     def stress_points(self) -> np.ndarray:
         """Return the places (k, 3), m, of the values of `von_mises`."""
-        return fenicsx.node_coordinates(fenicsx.discontinuous_space(self.domain, 1))
+        return self.recovery.places
 
     def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return cells, VTK cell types and points in the order of the nodes, for pyvista.UnstructuredGrid."""
@@ -285,15 +305,6 @@ class Solid:
         assert self.temperature is not None
         at = self.temperature.at
         return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
-
-    def _components(self, stress: Any, points: np.ndarray | None) -> Callable[[], list[np.ndarray]]:
-        """Return what evaluates the six components of a UFL stress at corners of cells (points; None: at all)."""
-        space = fenicsx.discontinuous_space(self.domain, 1)
-        cells = None if points is None else fenicsx.cells_of(space, np.asarray(points))
-        places = slice(None) if points is None else np.asarray(points)
-        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-        components = [fenicsx.evaluator(stress[pair], space, cells) for pair in pairs]
-        return lambda: [np.array(component().x.array[places]) for component in components]
 
     def _heated(self, matrices: SystemMatrices, statics: Statics) -> SystemMatrices:
         """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import inspect
 import logging
 import os
 import warnings
@@ -180,16 +181,21 @@ def node_coordinates(space: Any) -> np.ndarray:
     return np.array(space.tabulate_dof_coordinates())
 
 
+def linear_shapes(points: np.ndarray, corners: int) -> np.ndarray:
+    """Return the linear shape functions (n, corners) of a tetrahedron (4) or hexahedron (8) at its own points (n, 3)."""
+    if corners == 4:
+        return np.column_stack([1.0 - points.sum(axis=1), points])
+    # the first coordinate changes the fastest from vertex to vertex
+    x, y, z = (np.column_stack([1.0 - points[:, axis], points[:, axis]]) for axis in range(3))
+    return np.asarray(np.einsum("nk,nj,ni->nkji", z, y, x).reshape(len(points), -1))
+
+
 def vertex_weights(space: Any) -> sparse.csr_array:
     """Return the linear shape functions of the vertices at the nodes, (n_nodes, n_vertices)."""
     topology = space.mesh.topology
     points = space.element.interpolation_points
     points = np.asarray(points() if callable(points) else points)
-    if topology.cell_name() == "tetrahedron":
-        shapes = np.column_stack([1.0 - points.sum(axis=1), points])
-    else:  # the first coordinate changes the fastest from vertex to vertex
-        x, y, z = (np.column_stack([1.0 - points[:, axis], points[:, axis]]) for axis in range(3))
-        shapes = np.einsum("nk,nj,ni->nkji", z, y, x).reshape(len(points), -1)
+    shapes = linear_shapes(points, 4 if topology.cell_name() == "tetrahedron" else 8)
     nodes = _cell_dofs(space)
     topology.create_connectivity(3, 0)
     corners = _array(topology.connectivity(3, 0)).reshape(len(nodes), -1)
@@ -262,27 +268,31 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     return found
 
 
-def evaluator(expression: Any, space: Any, cells: np.ndarray | None = None) -> Callable[[], Any]:
-    """Return a call that gives the function of a space with the values of a UFL expression at the space's own points.
+def sampler(expression: Any, mesh: Any, points: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a call that gives the values (cells, points, size) of a UFL expression at points of the reference cell.
 
-    It takes the functions in the expression as they are when it is called. cells: those in which the values are
-    wanted; default: all.
+    It takes cells (int32), and the functions in the expression as they are when it is called.
     """
-    points = space.element.interpolation_points
-    function = fem.Function(space)
     with _compiling():
-        compiled = fem.Expression(expression, points() if callable(points) else points)
+        compiled = fem.Expression(expression, points)
+    # the mesh is an argument since 0.7
+    of_mesh = () if "cells" in inspect.signature(compiled.eval).parameters else (mesh,)
 
-    def values() -> Any:
-        function.interpolate(compiled, *([] if cells is None else [cells]))
-        return function
+    def values(cells: np.ndarray) -> np.ndarray:
+        return np.array(compiled.eval(*of_mesh, cells)).reshape(len(cells), len(points), -1)
 
     return values
 
 
-def cells_of(space: Any, dofs: np.ndarray) -> np.ndarray:
-    """Return the sorted cells (int32) that have any of the DOFs of a discontinuous space."""
-    return np.flatnonzero(np.isin(_cell_dofs(space), dofs).any(axis=1)).astype(np.int32)
+def corners(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices (cells, k) of every cell, and their coordinates (n, 3), m."""
+    topology = mesh.topology
+    topology.create_connectivity(3, 0)
+    cells = topology.index_map(3).size_local
+    vertices = _array(topology.connectivity(3, 0)).reshape(cells, -1)
+    places = np.empty((topology.index_map(0).size_local, 3))
+    places[vertices] = mesh.geometry.x[_corner_nodes(mesh, *vertices.shape)]
+    return vertices, places
 
 
 def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
@@ -360,10 +370,7 @@ def _lower_groups(
     topology.create_connectivity(1, 0)
     cells = _array(topology.connectivity(3, 0))
     count = topology.index_map(3).size_local
-    # one for every kind of cell since 0.11
-    of_cells = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
-    # the vertices come first among the nodes of a cell, in the same order
-    corners = _array(of_cells).reshape(count, -1)[:, : cells.size // count].ravel()
+    corners = _corner_nodes(mesh, count, cells.size // count).ravel()
     tags = np.empty(topology.index_map(0).size_local, dtype=np.int64)
     tags[cells] = np.asarray(geometry.input_global_indices)[corners] + 1
     ends = tags[_array(topology.connectivity(1, 0)).reshape(-1, 2)]
@@ -371,6 +378,15 @@ def _lower_groups(
         {name: _found(ends, group, "edge", name) for name, group in lines.items()},
         {name: _found(tags[:, None], group, "point", name) for name, group in nodes.items()},
     )
+
+
+def _corner_nodes(mesh: Any, cells: int, corners: int) -> np.ndarray:
+    """Return the nodes of the geometry at the corners of every cell, (cells, corners)."""
+    geometry = mesh.geometry
+    # one for every kind of cell since 0.11
+    of_cells = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+    # the vertices come first among the nodes of a cell, in the same order
+    return _array(of_cells).reshape(cells, -1)[:, :corners]
 
 
 def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:

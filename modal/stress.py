@@ -1,4 +1,4 @@
-"""Where a mode is strained most: the hot spot that a fatigue strength is compared with."""
+"""Where a mode is strained most: the hot spot that a fatigue strength is compared with, and what its stress is worth."""
 
 from __future__ import annotations
 
@@ -13,14 +13,25 @@ from scipy.spatial import cKDTree
 from vanedamp.modal import fenicsx
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.elasticity import ElasticityError, Solid
+from vanedamp.modal.matrices import SystemMatrices
+
+#: estimated relative error of a stress above which commands warn
+DOUBTFUL = 0.3
+# degrees inside the body from which an edge counts as a re-entrant corner: one that a fillet of three cells has not
+_SHARP = 215.0
 
 
 class PeakStress(NamedTuple):
-    """The largest von Mises stress in a volume group, Pa for the displacements as given, and its place, m."""
+    """The largest von Mises stress in a volume group, Pa for the displacements as given, and its place, m.
+
+    error: estimated, relative; singular: the singular point of elasticity that the place is at, in words ("": none).
+    """
 
     stress: float
     coordinates: tuple[float, float, float]
     group: str
+    error: float = 0.0
+    singular: str = ""
 
 
 @dataclass(frozen=True)
@@ -31,36 +42,63 @@ class HotSpot:
     strength     Pa, of its volume group
     coordinates  m
     group        volume group
+    error        of the stress, estimated, relative
+    singular     the singular point of elasticity that it is at ("": none)
     """
 
     stress: float
     strength: float
     coordinates: tuple[float, float, float]
     group: str
+    error: float = 0.0
+    singular: str = ""
 
 
-def peak_stresses(solid: Solid, displacement: np.ndarray) -> list[PeakStress]:
-    """Return the corner of a cell with the largest von Mises stress of displacements (N,), of every volume group."""
-    groups, places = list(solid.domain.volumes), solid.stress_points()
-    stress, group = solid.von_mises(displacement), corner_groups(solid)
+def peak_stresses(
+    solid: Solid, displacement: np.ndarray, matrices: SystemMatrices | None = None, excluded: np.ndarray | None = None
+) -> list[PeakStress]:
+    """Return the place with the largest von Mises stress of displacements (N,), of every volume group.
+
+    matrices: with supports, whose edges are singular; excluded: places (k,) that do not count.
+    """
+    recovery, stress = solid.recovery, solid.von_mises(displacement)
+    counted = stress if excluded is None else np.where(excluded, 0.0, stress)
+    members = [np.flatnonzero(recovery.groups == number) for number in range(len(solid.domain.volumes))]
+    worst = np.array([places[first_largest(counted[places])] for places in members])
+    errors = solid.stress_errors(displacement, worst) / np.maximum(stress[worst], np.finfo(float).tiny)
     peaks = []
-    for number, name in enumerate(groups):
-        corners = np.flatnonzero(group == number)
-        worst = corners[first_largest(stress[corners])]
-        x, y, z = places[worst].tolist()
-        peaks.append(PeakStress(float(stress[worst]), (x, y, z), name))
+    for name, place, error in zip(solid.domain.volumes, worst, errors, strict=True):
+        x, y, z = recovery.places[place].tolist()
+        found = singular_point(solid, int(place), matrices)
+        peaks.append(PeakStress(float(counted[place]), (x, y, z), name, float(error), found))
     return peaks
 
 
-def corner_groups(solid: Solid) -> np.ndarray:
-    """Return the number (k,) of the volume group, in the order of `domain.volumes`, of the corners of all cells."""
-    groups = list(solid.domain.volumes)
-    numbers = fenicsx.cell_functions(solid.domain, lambda name, places: np.full(len(places), groups.index(name)))
-    return np.asarray(numbers.x.array.astype(int))
+def singular_point(solid: Solid, point: int, matrices: SystemMatrices | None = None) -> str:
+    """Return the singular point of elasticity within a cell of a place (index), in words; "" for none."""
+    angle = solid.recovery.interior_angle(point)
+    if angle > _SHARP:
+        return f"a re-entrant corner of {angle:.0f} degrees"
+    if matrices is not None:
+        nodes, counts = np.unique(matrices.fixed // 3, return_counts=True)
+        held = matrices.coordinates[nodes[counts == 3]]
+        size = np.ptp(matrices.coordinates, axis=0).max()
+        if len(held) and cKDTree(held).query(solid.recovery.around(point))[0].min() < 1e-9 * size:
+            return "a clamped support"
+    return ""
+
+
+def near_groups(solid: Solid, matrices: SystemMatrices, distances: Mapping[str, float]) -> np.ndarray:
+    """Return whether places (k,) are within distances (m) of groups of facets, edges or points, by group."""
+    near = np.zeros(len(solid.recovery.places), dtype=bool)
+    for group, distance in distances.items():
+        nodes = cKDTree(matrices.coordinates[matrices.patches[group].nodes])
+        near |= nodes.query(solid.recovery.places, distance_upper_bound=distance)[0] <= distance
+    return near
 
 
 def nodal_von_mises(solid: Solid, displacement: np.ndarray) -> np.ndarray:
-    """Return von Mises stresses (n,), Pa, at the nodes that are corners: the largest of their cells; 0 at others."""
+    """Return von Mises stresses (n,), Pa, at the nodes that are corners: the largest of the groups'; 0 at others."""
     nodes = fenicsx.node_coordinates(solid.space)
     stress = np.zeros(len(nodes))
     np.maximum.at(stress, cKDTree(nodes).query(solid.stress_points())[1], solid.von_mises(displacement))
@@ -74,8 +112,7 @@ def hot_spot(
 
     peaks         one for every volume group of the mesh
     strengths     Pa, by volume group; groups that are not named do not count
-    within        volume groups to look in; left out: all of `strengths`. Sharp corners at supports and where the mesh
-                  has no fillets are singular points of elasticity: their stress grows with refinement, leave these out
+    within        volume groups to look in; left out: all of `strengths`
 
     Raises ElasticityError for a group that the mesh does not have, a strength that is no positive number, no strain.
     """
@@ -92,7 +129,9 @@ def hot_spot(
             raise ElasticityError(f"hot spot: strength of {name!r}: expected a positive number, not {strengths[name]}")
     ratios = [peak.stress / strengths[peak.group] if peak.group in looked_at else 0.0 for peak in peaks]
     worst = first_largest(np.array(ratios))
-    stress, coordinates, name = peaks[worst]
-    if name not in looked_at or not stress > 0.0:
-        raise ElasticityError("hot spot: the displacements strain none of the groups looked at")
-    return HotSpot(stress, float(strengths[name]), coordinates, name)
+    peak = peaks[worst]
+    if peak.group not in looked_at or not peak.stress > 0.0:
+        raise ElasticityError("hot spot: the displacements strain none of the places looked at")
+    return HotSpot(
+        peak.stress, float(strengths[peak.group]), peak.coordinates, peak.group, peak.error, peak.singular
+    )

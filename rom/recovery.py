@@ -89,13 +89,6 @@ def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
     return found
 
 
-def von_mises(components: np.ndarray) -> np.ndarray:
-    """Return the von Mises stress (...) of components (6, ...) in the order of COMPONENTS."""
-    xx, yy, zz, xy, yz, zx = components
-    normal = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-    return np.sqrt(normal + 3.0 * (xy**2 + yz**2 + zx**2))
-
-
 def _rows(stresses: Mapping[str, np.ndarray], size: int) -> dict[str, np.ndarray]:
     for name, values in stresses.items():
         if np.shape(values) != (6, size):

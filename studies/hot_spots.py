@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.rom.recovery import von_mises
+from vanedamp.modal.algebra import von_mises
 
 #: unit of the stress of a cause, and how many of them a Pa is
 _UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.rom.recovery import von_mises
+from vanedamp.modal.algebra import von_mises
 
 # |s1 + s3| / (|s1| + |s3|) below which the stress is pure shear to round-off, which has no sign of its own
 _PURE_SHEAR = 1e-9

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.response.spot_stress import MEASURES, SpotStress
-from vanedamp.rom.recovery import von_mises
+from vanedamp.modal.algebra import von_mises
 
 __all__ = ["MEASURES", "PeriodStress", "SpotStress", "period_stress", "scalar_stresses", "signs"]
 

@@ -14,7 +14,8 @@ from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.strength.assessment import fatigue_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.rom.recovery import COMPONENTS, von_mises
+from vanedamp.modal.algebra import von_mises
+from vanedamp.rom.recovery import COMPONENTS
 from vanedamp.studies.report.charts import COLOURS, DASHES, Chart, axis_title, dressed
 from vanedamp.studies.report.life_charts import wear_figure
 from vanedamp.studies.report.page import Page

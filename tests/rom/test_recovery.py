@@ -12,7 +12,8 @@ from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
-from vanedamp.rom.recovery import COMPONENTS, hot_spots, von_mises, with_displacements, with_outputs, with_stresses
+from vanedamp.modal.algebra import von_mises
+from vanedamp.rom.recovery import COMPONENTS, hot_spots, with_displacements, with_outputs, with_stresses
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.reduction import reduce
 from vanedamp.rom.truncation import truncated

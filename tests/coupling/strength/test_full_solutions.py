@@ -12,7 +12,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.files.toml_input import validate
-from vanedamp.rom.recovery import hot_spots, von_mises
+from vanedamp.modal.algebra import von_mises
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 
 SPOTS = 3

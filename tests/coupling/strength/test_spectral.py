@@ -19,7 +19,7 @@ from vanedamp.coupling.strength.spectral import (
     von_mises_components,
 )
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.recovery import von_mises
+from vanedamp.modal.algebra import von_mises
 
 CURVE = {"strength": 200e6, "knee": 1e6}
 FOUND = Moments(l0=(60e6) ** 2, l1=3.1e3 * (60e6) ** 2, l2=(3.3e3 * 60e6) ** 2, l4=(3.9e3) ** 4 * (60e6) ** 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.strength.stress import MEASURES, period_stress, scalar_stresses
-from vanedamp.rom.recovery import von_mises
+from vanedamp.modal.algebra import von_mises
 
 VON_MISES, PRINCIPAL = (MEASURES.index(name) for name in ("von_mises", "principal"))
 
