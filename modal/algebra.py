@@ -12,6 +12,8 @@ Matrix = TypeVar("Matrix")
 
 # fraction of a field (in its squared norm) that the others and the blocks must not determine
 _OWN_SHARE = 1e-10
+#: fraction of a field's largest displacement below which a coordinate does not measure it
+MOVES = 0.01
 
 
 def symmetric_part(matrix: Matrix) -> Matrix:

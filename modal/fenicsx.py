@@ -182,7 +182,7 @@ def node_coordinates(space: Any) -> np.ndarray:
 
 
 def linear_shapes(points: np.ndarray, corners: int) -> np.ndarray:
-    """Return the linear shape functions (n, corners) of a tetrahedron (4) or hexahedron (8) at its own points (n, 3)."""
+    """Return the linear shape functions (n, corners) of a tetrahedron (4) or hexahedron (8) at its points (n, 3)."""
     if corners == 4:
         return np.column_stack([1.0 - points.sum(axis=1), points])
     # the first coordinate changes the fastest from vertex to vertex
@@ -274,7 +274,7 @@ def sampler(expression: Any, mesh: Any, points: np.ndarray) -> Callable[[np.ndar
     It takes cells (int32), and the functions in the expression as they are when it is called.
     """
     with _compiling():
-        compiled = fem.Expression(expression, points)
+        compiled: Any = fem.Expression(expression, points)
     # the mesh is an argument since 0.7
     of_mesh = () if "cells" in inspect.signature(compiled.eval).parameters else (mesh,)
 

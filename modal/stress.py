@@ -1,4 +1,4 @@
-"""Where a mode is strained most: the hot spot that a fatigue strength is compared with, and what its stress is worth."""
+"""Where a mode is strained most: the hot spot that a fatigue strength is compared with, and how sure its stress is."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.elasticity import ElasticityError, Solid
 from vanedamp.modal.matrices import SystemMatrices
 
-#: estimated relative error of a stress above which commands warn
-DOUBTFUL = 0.3
 # degrees inside the body from which an edge counts as a re-entrant corner: one that a fillet of three cells has not
 _SHARP = 215.0
 
@@ -132,6 +130,4 @@ def hot_spot(
     peak = peaks[worst]
     if peak.group not in looked_at or not peak.stress > 0.0:
         raise ElasticityError("hot spot: the displacements strain none of the places looked at")
-    return HotSpot(
-        peak.stress, float(strengths[peak.group]), peak.coordinates, peak.group, peak.error, peak.singular
-    )
+    return HotSpot(peak.stress, float(strengths[peak.group]), peak.coordinates, peak.group, peak.error, peak.singular)

@@ -1,4 +1,4 @@
-"""Stress at the corners of cells: recovered from inside them, with an estimate of its error, and corners of the body."""
+"""Stress at the corners of cells: recovered from inside them, with an estimate of its error; corners of the body."""
 
 from __future__ import annotations
 

@@ -18,6 +18,8 @@ from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 
 #: components of a symmetric stress, in the order of the outputs "<name>.xx" ...
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
+#: fraction of a mode's largest stress over strength from which hot spots show it
+SHOWN = 0.9
 
 
 def with_outputs(
@@ -74,9 +76,11 @@ def with_stresses(
 def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
     """Return what the model's provenance has of the places with outputs of all six components: name -> facts.
 
-    coordinates (m), group (of the mesh's volumes), per_amplitude ("at", "von_mises": Pa/m of the first mode), static
-    (by cause, six components: "rotation" per squared speed in rad/s, "temperature"), fatigue (data of the material);
-    each where it is known.
+    coordinates (m), group (of the mesh's volumes), mode (that has its hot spot there: "number", from 1,
+    "frequency_hz", and the next), per_amplitude ("at", "von_mises": Pa/m of the first mode, "error": estimated,
+    relative), error (of the mode's stress), static (by cause, six components: "rotation" per squared speed in rad/s,
+    "temperature"), static_error (by cause, of von Mises stress in the same unit), singular (the singular point of
+    elasticity that it is at), fatigue (data of the material); each where it is known.
     """
     known, names = model.provenance.get("hot_spots", {}), [name.rpartition(".") for name in model.outputs]
     places = dict.fromkeys(place for place, _, component in names if component == COMPONENTS[0])
@@ -87,6 +91,14 @@ def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
             # of files before version 0.3 the coordinates only
             found[place] = dict(facts) if isinstance(facts, Mapping) else {"coordinates": list(facts)}
     return found
+
+
+def shown_modes(provenance: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Return the frequency, Hz, of every mode that strains a model, and the fraction of its largest stress over
+    strength that the hot spots show; empty for models without either.
+    """
+    modes = provenance.get("hot_spot_modes", {})
+    return list(zip(modes.get("frequency_hz", ()), modes.get("shown", ()), strict=True))
 
 
 def _rows(stresses: Mapping[str, np.ndarray], size: int) -> dict[str, np.ndarray]:

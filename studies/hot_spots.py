@@ -2,32 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from vanedamp.modal.algebra import von_mises
+from vanedamp.modal.algebra import MOVES, von_mises
+from vanedamp.rom.recovery import SHOWN, shown_modes
 
 #: unit of the stress of a cause, and how many of them a Pa is
 _UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}
 _MPA = ("MPa", 1e-6)
+#: estimated relative error of a stress above which commands warn
+DOUBTFUL = 0.3
 
 
 def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a line for each hot spot (rom.recovery.hot_spots): place, stress of the first mode, static stresses."""
+    """Yield a line for each hot spot (rom.recovery.hot_spots): place, stress of its mode and the first, static ones."""
     for name, facts in spots.items():
         line = name
         if "coordinates" in facts:
-            line += " at ({:.4g}, {:.4g}, {:.4g}) m".format(*facts["coordinates"])
+            line += _place(facts["coordinates"])
         line += f" in {facts['group']}" if facts.get("group") else ""
         parts = []
-        if mode := facts.get("per_amplitude"):
-            parts.append(f"first mode {mode['von_mises'] * 1e-12:.4g} MPa per um of {mode['at']}")
+        mode, first = facts.get("mode", {}), facts.get("per_amplitude")
+        if mode.get("number", 1) != 1:
+            told = f"mode {mode['number']} ({mode['frequency_hz']:.6g} Hz)"
+            parts.append(_of_amplitude(told, mode) if "at" in mode else f"{told}, which moves no interface coordinate")
+        if first:
+            parts.append(_of_amplitude("first mode", first))
         for cause, values in facts.get("static", {}).items():
             unit, factor = _UNITS.get(cause, _MPA)
-            parts.append(f"{cause} {von_mises(np.array(values)) * factor:.4g} {unit}")
+            stress, doubt = von_mises(np.array(values)), facts.get("static_error", {}).get(cause)
+            error = plus_minus(doubt / stress if doubt is not None and stress else None)
+            parts.append(f"{cause} {stress * factor:.4g} {unit}{error}")
         yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
+
+
+def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what to look at in the hot spots of a reduced model, by its provenance."""
+    for name, facts in provenance.get("hot_spots", {}).items():
+        if isinstance(facts, Mapping):
+            yield from _doubts(name, facts)
+    covered = provenance.get("estimate", {}).get("frequencies_hz", [0.0, 0.0])[1]
+    hidden = [
+        f"mode {number} ({frequency:.6g} Hz; {shown:.0%})"
+        for number, (frequency, shown) in enumerate(shown_modes(provenance), 1)
+        if shown < SHOWN and frequency <= covered
+    ]
+    if hidden:
+        yield (
+            f"hot spots: do not show the largest stress over strength of {', '.join(hidden)}; for scenes that excite "
+            "these ask for more --hot-spots"
+        )
+
+
+def level_warnings(level: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield what to look at in the amplitude at the fatigue strength (studies.case.stages.Fatigue), if there is one."""
+    if level is None:
+        return
+    further = f", and with it the amplitude at {level['share']:.0%} of the fatigue strength"
+    yield from _doubts("fatigue", level, further)
+    if (moved := level.get("moved", 1.0)) < MOVES:
+        yield (
+            f"fatigue: the coordinate of the amplitude moves by {moved:.1g} of the structure's largest displacement, so "
+            "that the mesh decides about it; name another interface coordinate in modes.at"
+        )
+
+
+def plus_minus(error: float | None) -> str:
+    """Return an estimated relative error in words, after the number that it is of; nothing where it is not known."""
+    return "" if error is None else f" (+- {100.0 * error:.2g} % by the mesh)"
+
+
+def _doubts(name: str, facts: Mapping[str, Any], further: str = "") -> Iterator[str]:
+    """Yield warnings of a stress that the mesh does not determine, and of one that no mesh does."""
+    place = _place(facts["coordinates"]) if "coordinates" in facts else ""
+    if facts.get("singular"):
+        yield (
+            f"{name}: the stress{place} is that beside {facts['singular']}, where it grows without limit as the mesh "
+            "is refined; model the fillet, or leave the place out (case: [hot_spots] exclude, calibration.hot_spot)"
+        )
+    if facts.get("error", 0.0) > DOUBTFUL:
+        yield (
+            f"{name}: the mesh leaves the stress{place} open by {facts['error']:.0%}{further}; refine it there "
+            "(docs/mesh_convergence.md)"
+        )
+
+
+def _place(coordinates: Sequence[float]) -> str:
+    return " at ({:.4g}, {:.4g}, {:.4g}) m".format(*coordinates)
+
+
+def _of_amplitude(mode: str, of: Mapping[str, Any]) -> str:
+    return f"{mode} {of['von_mises'] * 1e-12:.4g} MPa{plus_minus(of.get('error'))} per um of {of['at']}"
 
 
 def strength_lines(strengths: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:

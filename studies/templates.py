@@ -12,6 +12,7 @@ from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.studies.demo.figure_file import Structure
+from vanedamp.studies.hot_spots import plus_minus
 
 #: mass of the body over the structure's, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
@@ -86,7 +87,7 @@ def _notes(rom: Path | None) -> dict[str, str]:
     if rom is None:
         return {"structure": _STRUCTURE_NOTE}
     level = ReducedModel.load(rom).provenance.get("fatigue")
-    told = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level)
+    told = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level) + plus_minus(level.get("error"))
     return {"excitation": _LEVEL_NOTE.format(level=told), "contact": _CONTACT_NOTE}
 
 

@@ -40,6 +40,7 @@ class SpotStress:
     samples_per_period      from which the amplitudes are taken
     sampling_error          change of von Mises amplitudes by leaving out every other sample, relative: an upper bound
                             for the error of all of them, where stress is smooth
+    mesh_error              estimated relative error by the mesh; None: not known
     """
 
     name: str
@@ -59,6 +60,7 @@ class SpotStress:
     strength: Mapping[str, Any] = field(default_factory=dict)
     samples_per_period: int = 0
     sampling_error: float = 0.0
+    mesh_error: float | None = None
 
     @property
     def strength_fraction(self) -> float | None:
@@ -72,7 +74,8 @@ class SpotStress:
         place = "" if self.coordinates is None else " at ({:.4g}, {:.4g}, {:.4g}) m".format(*self.coordinates)
         inside, share = f" in {self.group}" if self.group else "", self.strength_fraction
         level = "" if share is None else f", {share:.3g} of the fatigue strength"
-        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{level}{self._life}"
+        mesh = "" if self.mesh_error is None else f" (+- {100.0 * self.mesh_error:.2g} % by the mesh)"
+        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{mesh}{level}{self._life}"
 
     @property
     def _life(self) -> str:
@@ -93,6 +96,7 @@ class SpotStress:
             "static": None if self.static is None else named(self.static), "undamped": self.undamped,
             "fixed": self.fixed, "strength_fraction": self.strength_fraction, "fatigue": dict(self.fatigue),
             "samples_per_period": self.samples_per_period, "sampling_error": self.sampling_error,
+            "mesh_error": self.mesh_error,
         }  # fmt: skip
         return data
 

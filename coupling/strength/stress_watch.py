@@ -91,7 +91,7 @@ def spot_stresses(
                 name=name, coordinates=None if coordinates is None else tuple(coordinates),
                 group=facts.get("group", ""), mean=mean, static=None if static is None else mean + static,
                 fatigue=facts.get("fatigue", {}), samples_per_period=each,
-                sampling_error=0.0 if error is None else float(error[place]), **of,
+                sampling_error=0.0 if error is None else float(error[place]), mesh_error=facts.get("error"), **of,
             )
         )  # fmt: skip
     return tuple(made)

@@ -176,6 +176,8 @@ class Calibration:
             "strength": fatigue.spot.strength,
             "coordinates": list(fatigue.spot.coordinates),
             "group": fatigue.spot.group,
+            "error": fatigue.spot.error,
+            "singular": fatigue.spot.singular,
         }
         return {"share": fatigue.share, "amplitude": fatigue.amplitude, "force": self.force, "hot_spot": spot}
 

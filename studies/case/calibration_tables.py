@@ -1,7 +1,8 @@
-"""The [calibration] table of a case file: measurements, and the values that may be tuned to them."""
+"""The tables [calibration] and [hot_spots] of a case: measurements, what is tuned to them, where strength counts."""
 
 from __future__ import annotations
 
+from dataclasses import field
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -63,8 +64,19 @@ class CalibrationTable:
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
     """fraction of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
     hot_spot: list[str] | None = None
-    """volume groups in which the largest stress is sought (default: all)"""
+    """volume groups in which the largest stress is sought, for the hot spots of `vanedamp reduce` too (default: all)"""
     damping: DampingTable | None = None
     """measured response, for the damping ratio"""
     tune: TuneTable | None = None
     """measured frequencies, for moduli and supports"""
+
+
+@dataclass(frozen=True, config=STRICT)
+class HotSpotTable:
+    """Where hot spots may lie: the one that sets the excitation, and those of a reduced model."""
+
+    exclude: dict[str, Positive] = field(default_factory=dict)
+    """groups of facets, edges or points near which stress does not count, and up to which distance: {clamp = 0.002}
+    [m]"""
+    distance: Positive | None = None
+    """least distance between two hot spots of a reduced model (default: 5 % of the structure's size) [m]"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -12,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, load_any, save
-from vanedamp.files.toml_input import InputError, tables
-from vanedamp.modal.algebra import first_largest
+from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.cyclic_campbell import ring_campbell
@@ -35,7 +34,7 @@ from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.statics import Statics
-from vanedamp.modal.stress import HotSpot, PeakStress, corner_groups, hot_spot, nodal_von_mises, peak_stresses
+from vanedamp.modal.stress import HotSpot, PeakStress, hot_spot, nodal_von_mises, peak_stresses
 from vanedamp.modal.temperature import Temperature
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis import BLOCKS, basis_ladder, basis_named
@@ -48,13 +47,14 @@ from vanedamp.rom.interface import (
     outward_normal,
     plane_motion,
 )
-from vanedamp.rom.recovery import von_mises, with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.checkpoint import CaseCheckpoint
+from vanedamp.studies.case.hot_spots import excluded_places, with_hot_spots
 from vanedamp.studies.case.operation_tables import TemperatureTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
+from vanedamp.studies.hot_spots import level_warnings, spot_warnings
 from vanedamp.studies.terminal import stage
 
 # a mode so near the first bending, relative, that moves its point with such a fraction of its compliance, is reported
@@ -68,8 +68,6 @@ _UNCOUNTED = (
 _SECTOR_ONLY = "ring: these are modes of one sector whose faces are free; `vanedamp ring` has those of the ring"
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
-# fraction of the interface's largest motion by a mode below which a coordinate does not show it
-_UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,28 +203,31 @@ class Fatigue:
     amplitude  m, displacement of the response coordinate
     spot       where the stress does; its stress is that of the amplitude 1 m
     peaks      of every volume group, for this amplitude, from which other strengths give another level
+    moved      displacement of the response coordinate over the structure's largest one
     """
 
     share: float
     amplitude: float
     spot: HotSpot
     peaks: Sequence[PeakStress]
+    moved: float
 
     @classmethod
-    def of(cls, case: Case, peaks: Sequence[PeakStress]) -> Fatigue | None:
+    def of(cls, case: Case, peaks: Sequence[PeakStress], moved: float) -> Fatigue | None:
         """Return the level of a case; None without a fatigue strength."""
         table, strengths = case.calibration or CalibrationTable(), case.strengths(peak.group for peak in peaks)
         if not strengths:
             return None
         spot = hot_spot(peaks, strengths, table.hot_spot)
-        return cls(table.share, fatigue_amplitude(spot.stress, spot.strength, table.share), spot, peaks)
+        return cls(table.share, fatigue_amplitude(spot.stress, spot.strength, table.share), spot, peaks, moved)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain data."""
         spot = self.spot
         return {
             "strength": spot.strength, "share": self.share, "amplitude": self.amplitude,
-            "coordinates": list(spot.coordinates), "group": spot.group,
+            "coordinates": list(spot.coordinates), "group": spot.group, "error": spot.error, "singular": spot.singular,
+            "moved": self.moved,
         }  # fmt: skip
 
 
@@ -306,11 +307,13 @@ class ModalAnalysis:
             field = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
             variables["von_mises"] = Variable(field, ("node",), "Pa/m")
         if self.fatigue is not None:
-            stress, places, groups = zip(*self.fatigue.peaks, strict=True)
+            stress, places, groups, errors, singular = zip(*self.fatigue.peaks, strict=True)
             variables |= {
                 "volume": Variable(np.array(groups, dtype=object), ("volume",)),
                 "stress_per_amplitude": Variable(np.array(stress), ("volume",), "Pa/m"),
                 "stress_place": Variable(np.array(places), ("volume", "axis"), "m"),
+                "stress_error": Variable(np.array(errors), ("volume",)),
+                "stress_singular": Variable(np.array(singular, dtype=object), ("volume",)),
             }
         result = self.to_json()
         kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
@@ -320,17 +323,18 @@ class ModalAnalysis:
         self.modes.save(path, variables, attributes)
 
 
-def set_level(path: Path, case: Case) -> bool:
-    """Write the fatigue level of a case into the file of its modes. Returns whether the file holds what that takes."""
+def set_level(path: Path, case: Case) -> Fatigue | None:
+    """Write the fatigue level of a case into the file of its modes, and return it; None if that lacks stresses."""
     kind, variables, attributes = load_any(path)
-    if "stress_per_amplitude" not in variables:
-        return False
-    columns = (variables[name].values.tolist() for name in ("stress_per_amplitude", "stress_place", "volume"))
-    level = Fatigue.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)])
-    if level is None:
-        return False
-    save(path, kind, variables, attributes | {"fatigue": level.to_json()})
-    return True
+    names = ("stress_per_amplitude", "stress_place", "volume", "stress_error", "stress_singular")
+    if not set(names) <= set(variables):
+        return None
+    moved = json.loads(attributes["fatigue"])["moved"]
+    columns = (variables[name].values.tolist() for name in names)
+    level = Fatigue.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)], moved)
+    if level is not None:
+        save(path, kind, variables, attributes | {"fatigue": level.to_json()})
+    return level
 
 
 def modal_analysis(structure: Structure) -> ModalAnalysis:
@@ -355,6 +359,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio, inertia)
         cavities = _cavities(case, matrices, modes.shapes[bending], functional)
         fatigue = _fatigue(structure, modes, bending, functional)
+        if fatigue is not None:
+            warnings += (*level_warnings(fatigue.to_json()), *strength_warnings(structure))
     gyroscopic = None
     if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
         with stage("gyroscopic modes"):
@@ -371,8 +377,21 @@ def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.nd
         return None
     shape = modes.shapes[bending]
     with stage("stress of the first bending"):
-        peaks = peak_stresses(structure.solid, shape / abs(float(functional @ shape)))
-    return Fatigue.of(structure.case, peaks)
+        unit = shape / abs(float(functional @ shape))
+        moved = 1.0 / float(np.linalg.norm(unit.reshape(-1, 3), axis=1).max())
+        peaks = peak_stresses(structure.solid, unit, structure.matrices, excluded_places(structure))
+    return Fatigue.of(structure.case, peaks, moved)
+
+
+def strength_warnings(structure: Structure) -> tuple[str, ...]:
+    """Return a warning of volume groups whose material has no fatigue strength, so that the least of all counts."""
+    groups = structure.case.without_strength(structure.solid.domain.volumes)
+    if not groups:
+        return ()
+    return (
+        f"material: {', '.join(groups)}: no fatigue_strength; the least of all, "
+        f"{structure.case.fatigue_strength:.4g} Pa, counts there",
+    )
 
 
 def _cavities(
@@ -471,62 +490,6 @@ def campbell_diagram(
     return replace(diagram, operating=table.operation, provenance=provenance)
 
 
-@stage("stresses at hot spots")
-def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) -> ReducedModel:
-    """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
-
-    A hot spot is where the first natural mode of the model at the case's speed has its largest von Mises stress, or the
-    largest one away from the spots before it. Of places with equal stress it is the first. Needs a model with its
-    recovery.
-    """
-    assert model.recovery is not None
-    solid = structure.solid
-    places = solid.stress_points()
-    apart = 0.02 * np.ptp(places, axis=0).max()
-    at_speed = model if structure.case.rotation is None else model.at_speed(structure.case.rotation.omega)
-    shape = linalg.eigh(at_speed.stiffness, at_speed.mass)[1][:, 0]
-    stress = np.array(solid.von_mises(model.recovery @ shape))
-    picked: list[int] = []
-    for _ in range(spots):
-        if not stress.any():
-            raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
-        picked.append(first_largest(stress))
-        stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
-    names, points = [f"hot{index + 1}" for index in range(spots)], np.array(picked)
-
-    def stresses(vectors: np.ndarray) -> dict[str, np.ndarray]:
-        values = solid.stress_components(vectors.T, points)
-        return {name: values[:, :, index].T for index, name in enumerate(names)}
-
-    residual = None if model.residual_recovery is None else stresses(model.residual_recovery)
-    facts = _facts_of_spots(structure, at_speed, shape, points)
-    provenance = dict(model.provenance) | {"hot_spots": dict(zip(names, facts, strict=True))}
-    return with_stresses(replace(model, provenance=provenance), stresses(model.recovery), residual)
-
-
-def _facts_of_spots(
-    structure: Structure, model: ReducedModel, shape: np.ndarray, points: np.ndarray
-) -> list[dict[str, Any]]:
-    """Return the facts (rom.recovery.hot_spots) of corners of cells, points (s,), with the first mode's shape (n,)."""
-    case, solid, label = structure.case, structure.solid, structure.case.response_label
-    assert model.recovery is not None
-    groups, numbers = list(solid.domain.volumes), corner_groups(solid)[points]
-    static = solid.static_stresses(points)
-    stress = von_mises(solid.stress_components(model.recovery @ shape, points))
-    moved = 0.0 if label is None else abs(float(model.row(label) @ shape))
-    seen = moved > _UNSEEN * np.abs(model.selection @ shape).max()
-    facts = []
-    for place, (number, coordinates) in enumerate(zip(numbers, solid.stress_points()[points], strict=True)):
-        spot: dict[str, Any] = {"coordinates": coordinates.tolist(), "group": groups[number]}
-        if seen:
-            spot["per_amplitude"] = {"at": label, "von_mises": float(stress[place]) / moved}
-        spot["static"] = {cause: values[:, place].tolist() for cause, values in static.items()}
-        data = case.fatigue(groups[number])
-        spot["fatigue"] = {} if data is None else tables(data)
-        facts.append(spot)
-    return facts
-
-
 def reduction(
     structure: Structure,
     modes: int | None,
@@ -592,6 +555,17 @@ def reduction(
     return model if keep_recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
 
 
+def reduction_warnings(structure: Structure, model: ReducedModel) -> tuple[str, ...]:
+    """Return what to look at in a reduced model: units, strengths, and stresses that the mesh does not determine."""
+    made = model.provenance
+    found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))
+    level = made.get("fatigue")
+    found += tuple(level_warnings(level))
+    if level is not None or "hot_spots" in made:
+        found += strength_warnings(structure)
+    return found + tuple(spot_warnings(made))
+
+
 def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, Any] | None:
     """Return the fatigue level of a model's mode of interest with its frequency, for scenes; needs its recovery."""
     assert model.recovery is not None
@@ -604,8 +578,7 @@ def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, A
     if level is None:
         return None
     return {
-        "at": at, "frequency_hz": float(frequency[0]), "share": level.share, "strength": level.spot.strength,
-        "amplitude": level.amplitude,
+        "at": at, "frequency_hz": float(frequency[0]), **level.to_json(),
     }  # fmt: skip
 
 

@@ -35,7 +35,7 @@ from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.sector import Sector
 from vanedamp.modal.units import absurdity
-from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.calibration_tables import CalibrationTable, HotSpotTable
 from vanedamp.studies.case.operation_tables import CampbellTable, RotationTable, TemperatureTable
 from vanedamp.studies.case.ring_tables import RingTable
 
@@ -438,6 +438,8 @@ class Case:
     """interface coordinates, by their labels: where loads and contacts act on a reduced model"""
     calibration: CalibrationTable | None = None
     """measurements of `vanedamp calibrate`"""
+    hot_spots: HotSpotTable = field(default_factory=HotSpotTable)
+    """where hot spots may lie"""
     rotation: RotationTable | None = None
     """axis and speed of rotation"""
     campbell: CampbellTable | None = None
@@ -520,6 +522,12 @@ class Case:
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
 
+    def without_strength(self, volumes: Iterable[str]) -> list[str]:
+        """Return the volume groups for which the least strength of the others counts; none without any strength."""
+        tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
+        known = self.fatigue_strength is not None
+        return [name for name, table in tables.items() if known and (table is None or table.fatigue_strength is None)]
+
     def fatigue(self, volume: str) -> Fatigue | None:
         """Return the complete fatigue data of a volume group's material; None without any.
 
@@ -542,10 +550,10 @@ class Case:
 
     @property
     def facet_groups(self) -> set[str]:
-        """Every group that supports, interfaces and the ring name."""
+        """Every group that supports, hot spots, interfaces and the ring name."""
         named = [group for table in self.interface.values() for group in (*table.groups, *table.guides.values())]
         ring = self.ring.groups.values() if self.ring is not None else ()
-        return {*self.support.clamped, *self.support.elastic, *named, *ring}
+        return {*self.support.clamped, *self.support.elastic, *self.hot_spots.exclude, *named, *ring}
 
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
@@ -555,6 +563,8 @@ class Case:
         known = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
         for group in self.support.clamped:
             _check_group("support.clamped", group, known)
+        for group in self.hot_spots.exclude:
+            _check_group("hot_spots.exclude", group, known)
         for group in self.support.elastic:
             _check_group(f"support.elastic.{group}", group, surfaces)
         for label, table in self.interface.items():

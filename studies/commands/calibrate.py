@@ -12,6 +12,7 @@ from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_
 from vanedamp.studies.case.calibration import calibrate
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import cavity_lines, write_result
+from vanedamp.studies.hot_spots import plus_minus
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -55,6 +56,7 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
         spot = excitation["hot_spot"]
         place = ", ".join(f"{value:.4g}" for value in spot["coordinates"])
         yield (
-            f"{excitation['share']:.0%} of the fatigue strength at {excitation['amplitude']:.4g} m, force "
-            f"{excitation['force']:.4g} N at resonance; hot spot at ({place}) m in {spot['group']}"
+            f"{excitation['share']:.0%} of the fatigue strength at {excitation['amplitude']:.4g} m"
+            f"{plus_minus(spot['error'])}, force {excitation['force']:.4g} N at resonance; hot spot at "
+            f"({place}) m in {spot['group']}"
         )

@@ -27,7 +27,7 @@ from vanedamp.rom.ring.study import MistuningStudy
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.file_kinds import RESULT_KINDS, ResultKind
-from vanedamp.studies.hot_spots import spot_lines
+from vanedamp.studies.hot_spots import plus_minus, spot_lines
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.designs import designs
 from vanedamp.studies.report.forced_response import forced_responses
@@ -128,7 +128,9 @@ def _modes(record: _Record) -> Iterator[Fact]:
 
 def _level(level: Mapping[str, Any] | None) -> Iterator[Fact]:
     if level:
-        yield Fact("fatigue_amplitude", level["amplitude"], "m", f"at {level['share']:.0%} of the fatigue strength")
+        error = level["error"] if "error" in level else level.get("hot_spot", {}).get("error")
+        note = f"at {level['share']:.0%} of the fatigue strength{plus_minus(error)}"
+        yield Fact("fatigue_amplitude", level["amplitude"], "m", note)
 
 
 def _calibration(record: _Record) -> Iterator[Fact]:
@@ -207,7 +209,7 @@ def _response(record: _Record) -> Iterator[Fact]:
     for name, spot in record.attributes.get("stress", {}).items():
         share = spot["strength_fraction"]
         level = "" if share is None else f"{share:.3g} of the fatigue strength"
-        yield Fact(f"{name}_von_mises", spot["von_mises"], "Pa", level)
+        yield Fact(f"{name}_von_mises", spot["von_mises"], "Pa", level + plus_minus(spot.get("mesh_error")))
 
 
 def _sweep(record: _Record) -> Iterator[Fact]:

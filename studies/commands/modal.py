@@ -11,6 +11,7 @@ from typing import Any
 from vanedamp.studies.case.stages import assemble, modal_analysis
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import cavity_lines, write_result
+from vanedamp.studies.hot_spots import plus_minus
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -60,4 +61,7 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
             yield "{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row)
     if "fatigue" in result:
         fatigue = result["fatigue"]
-        yield f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m"
+        yield (
+            f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m"
+            f"{plus_minus(fatigue['error'])}"
+        )

@@ -7,8 +7,11 @@ from pathlib import Path
 
 from vanedamp.files.toml_input import InputError
 from vanedamp.files.toml_output import schema_name, write_commented
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.commands.support.messages import print_warnings
 from vanedamp.studies.commands.support.outputs import check_outputs
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.templates import template
 
 
@@ -22,4 +25,6 @@ def run(arguments: Namespace) -> None:
         raise InputError(f"--output {path}: exists already, and may be yours; name another file")
     data, notes = template(kind, path, None if arguments.rom is None else Path(arguments.rom))
     write_commented(path, data, KINDS[kind], notes)
+    if arguments.rom is not None:
+        print_warnings(arguments.rom, level_warnings(ReducedModel.load(arguments.rom).provenance.get("fatigue")))
     print(f"{path}: a {kind} to start from; its keys complete in editors by {path.with_name(schema_name(kind))}")

@@ -14,7 +14,7 @@ from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
-from vanedamp.studies.hot_spots import strength_lines
+from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
@@ -46,7 +46,8 @@ def _summary(result: Ramp, seconds: float) -> Iterator[str]:
             f"{result.share(run):24.4f}  {run.status}"
         )
         for spot, of in result.tops_of_stress(run).items():
-            yield f"{'':18} {spot}: largest amplitude of von Mises stress {of['von_mises'] / 1e6:.4g} MPa"
+            error = plus_minus(result.provenance["hot_spots"][spot].get("error"))
+            yield f"{'':18} {spot}: largest amplitude of von Mises stress {of['von_mises'] / 1e6:.4g} MPa{error}"
         yield from strength_lines(result.strength(run))
     tops = result.tops
     for name, what in (("undamped", "without bodies"), ("fixed", "bodies fixed")):

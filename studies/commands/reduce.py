@@ -14,10 +14,10 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.ring_stages import ring_reduction
-from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
+from vanedamp.studies.case.stages import assemble, reduction, reduction_warnings, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
-from vanedamp.studies.hot_spots import spot_lines
+from vanedamp.studies.hot_spots import plus_minus, spot_lines
 from vanedamp.studies.terminal import progress
 
 #: defaults of the options that a case with [ring] does not take, and of the basis
@@ -44,7 +44,9 @@ def run(arguments: Namespace, case: Case) -> None:
         "outputs": list(model.outputs),
         "hot_spots": hot_spots(model),
         "estimate": model.provenance["estimate"],
-        "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
+        "hot_spot_modes": model.provenance.get("hot_spot_modes"),
+        "fatigue": model.provenance.get("fatigue"),
+        "warnings": list(reduction_warnings(structure, model)),
         "wall_time_s": time.perf_counter() - started,
     }
     fastest = model.at_speed(model.greatest_speed)
@@ -105,6 +107,11 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
         yield rotation["sentence"]
     yield "frequencies, Hz: " + _listed(model)
     yield from spot_lines(hot_spots(model))
+    if (level := model.provenance.get("fatigue")) is not None:
+        yield (
+            f"amplitude at {level['share']:.0%} of the fatigue strength: {level['amplitude']:.4g} m of {level['at']}"
+            f"{plus_minus(level['error'])}"
+        )
     if rotation is not None:
         yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest)
 

@@ -15,7 +15,7 @@ from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
-from vanedamp.studies.hot_spots import strength_lines
+from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 
@@ -55,8 +55,11 @@ def _summary(result: RingDown) -> Iterator[str]:
         )
     if result.stress is not None:
         begin, end = 1e-6 * result.stress[[0, -1], :, MEASURES.index("von_mises")]
-        for spot, first, last in zip(result.provenance["hot_spots"], begin, end, strict=True):
-            yield f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
+        for (spot, facts), first, last in zip(result.provenance["hot_spots"].items(), begin, end, strict=True):
+            yield (
+                f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
+                f"{plus_minus(facts.get('error'))}"
+            )
     yield from strength_lines(result.strength)
     if result.rest_time is not None:
         place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))

@@ -19,6 +19,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, load
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.case.tables import Case, check_interface, without_strengths
+from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.pipeline.record import Inputs, plain
 from vanedamp.studies.pipeline.tables import (
     CALIBRATION,
@@ -168,7 +169,8 @@ class Modal(CaseStage):
 
         case, now = Case.load(self.file), plain(self.inputs())
         same = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
-        if same and set_level(self.outputs[0], case):
+        if same and (level := set_level(self.outputs[0], case)) is not None:
+            tools.warn(level_warnings(level.to_json()))
             return "modes kept, only the amplitude at the fatigue strength is new"
         analysis = modal_analysis(assemble(case))
         analysis.save(self.outputs[0])
@@ -194,13 +196,13 @@ class Reduce(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
-        from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
+        from vanedamp.studies.case.stages import assemble, reduction, reduction_warnings
 
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
         model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
         model.save(self.outputs[0])
-        tools.warn(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
+        tools.warn(reduction_warnings(structure, model))
         return str(model.provenance["estimate"]["sentence"])
 
 

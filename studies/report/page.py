@@ -22,6 +22,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
 from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.hot_spots import plus_minus
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
@@ -155,6 +156,7 @@ def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     shared = environment()
     shared.filters |= {"ratio": lambda value: f"{value:z.3f}" if math.isfinite(value) else "none"}
     shared.filters["clean"] = without_round_off
+    shared.filters["plus_minus"] = lambda error: plus_minus(error or None)  # files before 0.4 have none
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return shared

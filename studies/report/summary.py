@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
+from vanedamp.studies.hot_spots import plus_minus
 from vanedamp.studies.report.designs import Design, designs
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
@@ -73,7 +74,7 @@ def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[
             if "fatigue" in attributes:
                 limit = json.loads(attributes["fatigue"])
                 name = f"amplitude at {limit['share']:.0%} of the fatigue strength"
-                facts[name] = f"{1e6 * limit['amplitude']:.4g} µm"
+                facts[name] = f"{1e6 * limit['amplitude']:.4g} µm{plus_minus(limit.get('error'))}"
             return None if png is None else base64.b64encode(png).decode(), facts, mass
     if scene is None:
         return None, {}, math.nan

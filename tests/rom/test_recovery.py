@@ -11,8 +11,8 @@ from tests.tools.small_structures import truss
 from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.modal.algebra import von_mises
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.recovery import COMPONENTS, hot_spots, with_displacements, with_outputs, with_stresses
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.reduction import reduce
@@ -70,7 +70,7 @@ def test_stress_components_are_those_of_von_mises(block):
 
 def test_stress_components_of_several_displacements_at_places(block):
     structure, modes, _ = block
-    places = np.array([200, 7, 8])
+    places = np.array([20, 7, 8])
     several = structure.solid.stress_components(modes.shapes[:3], places)
     assert several.shape == (3, 6, 3)
     for shape, found in zip(modes.shapes, several, strict=False):

@@ -13,6 +13,7 @@ from plotly.subplots import make_subplots
 
 from vanedamp.files.store import load as load_record
 from vanedamp.modal.frf import UNITS
+from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
@@ -58,7 +59,9 @@ def _calibration(file: str, record: tuple[dict[str, Any], dict[str, Any]], page:
         unit = UNITS[damping["quantity"]]
         figure = response_figure(values, damping, unit)
         response = page.chart("response", figure, *_response_table(values, unit), [file])
+    level = None if excitation is None else excitation | excitation["hot_spot"]
     return {
+        "doubts": list(level_warnings(level)),
         "file": file,
         "targets": targets,
         "chart": chart,

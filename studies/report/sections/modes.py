@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vanedamp.files.store import load as load_record
+from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.report.mode_chart import mode_figure, mode_rows, small_surface
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.pictures import mode_picture
@@ -44,6 +45,7 @@ def _analysis(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Pa
         chart = page.chart("mode", figure, header, rows, [file])
     elif bending is not None:
         picture = mode_picture(file, bending)
+    level = json.loads(attributes["fatigue"]) if "fatigue" in attributes else None
     return {
         "file": file,
         "chart": chart,
@@ -59,7 +61,8 @@ def _analysis(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Pa
         "movable_mass": values["movable_mass"],
         "rigid": json.loads(attributes["rigid"]) if "rigid" in attributes else None,
         "cavities": json.loads(attributes.get("cavity", "{}")),
-        "fatigue": json.loads(attributes["fatigue"]) if "fatigue" in attributes else None,
+        "fatigue": level,
+        "doubts": list(level_warnings(level)),
         "speed": float(attributes["speed"]) if "speed" in attributes else None,
         "whirls": list(zip(values.get("gyroscopic_frequency", ()), values.get("whirl", ()), strict=True)),
     }
