@@ -15,6 +15,8 @@ _UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}
 _MPA = ("MPa", 1e-6)
 #: estimated relative error of a stress above which commands warn
 DOUBTFUL = 0.3
+#: what warnings call the amplitude at the fatigue strength
+_LEVEL = "the amplitude at the fatigue strength"
 
 
 def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
@@ -40,10 +42,11 @@ def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
 
 
 def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what to look at in the hot spots of a reduced model, by its provenance."""
-    for name, facts in provenance.get("hot_spots", {}).items():
-        if isinstance(facts, Mapping):
-            yield from _doubts(name, facts)
+    """Yield what to look at in the stresses of a reduced model, by its provenance."""
+    level = provenance.get("fatigue")
+    spots = {name: facts for name, facts in provenance.get("hot_spots", {}).items() if isinstance(facts, Mapping)}
+    yield from _doubts(({} if level is None else {_LEVEL: level}) | spots)
+    yield from _unmoved(level)
     covered = provenance.get("estimate", {}).get("frequencies_hz", [0.0, 0.0])[1]
     hidden = [
         f"mode {number} ({frequency:.6g} Hz; {shown:.0%})"
@@ -59,15 +62,9 @@ def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 def level_warnings(level: Mapping[str, Any] | None) -> Iterator[str]:
     """Yield what to look at in the amplitude at the fatigue strength (studies.case.stages.Fatigue), if there is one."""
-    if level is None:
-        return
-    further = f", and with it the amplitude at {level['share']:.0%} of the fatigue strength"
-    yield from _doubts("fatigue", level, further)
-    if (moved := level.get("moved", 1.0)) < MOVES:
-        yield (
-            f"fatigue: the coordinate of the amplitude moves by {moved:.1g} of the structure's largest displacement, so "
-            "that the mesh decides about it; name another interface coordinate in modes.at"
-        )
+    if level is not None:
+        yield from _doubts({_LEVEL: level})
+        yield from _unmoved(level)
 
 
 def plus_minus(error: float | None) -> str:
@@ -75,18 +72,29 @@ def plus_minus(error: float | None) -> str:
     return "" if error is None else f" (+- {100.0 * error:.2g} % by the mesh)"
 
 
-def _doubts(name: str, facts: Mapping[str, Any], further: str = "") -> Iterator[str]:
-    """Yield warnings of a stress that the mesh does not determine, and of one that no mesh does."""
-    place = _place(facts["coordinates"]) if "coordinates" in facts else ""
-    if facts.get("singular"):
+def _doubts(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a warning of stresses that no mesh determines, and of those that this mesh does not."""
+    singular = [f"{name} beside {facts['singular']}" for name, facts in spots.items() if facts.get("singular")]
+    if singular:
         yield (
-            f"{name}: the stress{place} is that beside {facts['singular']}, where it grows without limit as the mesh "
-            "is refined; model the fillet, or leave the place out (case: [hot_spots] exclude, calibration.hot_spot)"
+            f"stress: {', '.join(singular)}, where it grows without limit as the mesh is refined; model the fillet, or "
+            "leave the place out (in the case: hot_spots.exclude, calibration.hot_spot)"
         )
-    if facts.get("error", 0.0) > DOUBTFUL:
+    doubtful = [
+        f"{name}{_place(facts['coordinates'])} by {facts['error']:.0%}"
+        for name, facts in spots.items()
+        if facts.get("error", 0.0) > DOUBTFUL
+    ]
+    if doubtful:
+        yield f"stress: the mesh leaves open {', '.join(doubtful)}; refine it there (docs/mesh_convergence.md)"
+
+
+def _unmoved(level: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield a warning of a coordinate that its mode hardly moves, so that the mesh decides by how much."""
+    if level is not None and (moved := level.get("moved", 1.0)) < MOVES:
         yield (
-            f"{name}: the mesh leaves the stress{place} open by {facts['error']:.0%}{further}; refine it there "
-            "(docs/mesh_convergence.md)"
+            f"{_LEVEL}: its coordinate moves by {moved:.1g} of the structure's largest displacement, which the mesh "
+            "decides; name another interface coordinate in modes.at"
         )
 
 

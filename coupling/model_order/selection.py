@@ -34,6 +34,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, natural_ladder, rigid_errors, worst_rungs
+from vanedamp.rom.recovery import SHOWN, shown_modes
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
@@ -155,6 +156,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
         *getattr(method, "run_warnings", lambda _: ())(scene),
         *([f"ranges: {ranges}: the scene's own numbers are taken; vanedamp.ensemble samples ranges"] if ranges else []),
         *_of_rotation(scene),
+        *_of_hot_spots(scene),
         *_of_impact_laws(scene),
         *load_warnings(scene),
         *touching(scene),
@@ -171,6 +173,24 @@ def _of_rotation(scene: Scene) -> tuple[str, ...]:
     return (
         f"rotation: missing, so that the structure stands still; its model is for speeds up to {greatest:.6g} rad/s, "
         "and speed = 0 says that standstill is meant",
+    )
+
+
+def _of_hot_spots(scene: Scene) -> tuple[str, ...]:
+    """Return a warning of hot spots that do not show the largest stress of the mode nearest to the excitation."""
+    if type(scene.structure) is not Rom or not scene.moved:
+        return ()
+    modes = shown_modes(reduced_model(scene.structure, scene.speed).provenance)
+    if not modes:
+        return ()
+    number = int(np.argmin([abs(frequency - scene.frequency) for frequency, _ in modes]))
+    frequency, shown = modes[number]
+    if shown >= SHOWN:
+        return ()
+    return (
+        f"hot spots: show {shown:.0%} of the largest stress over strength of mode {number + 1} ({frequency:.6g} Hz), "
+        "the nearest to the excitation; stress, utilisation and life are those of other places; reduce with more "
+        "--hot-spots",
     )
 
 

@@ -559,9 +559,7 @@ def reduction_warnings(structure: Structure, model: ReducedModel) -> tuple[str, 
     """Return what to look at in a reduced model: units, strengths, and stresses that the mesh does not determine."""
     made = model.provenance
     found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))
-    level = made.get("fatigue")
-    found += tuple(level_warnings(level))
-    if level is not None or "hot_spots" in made:
+    if made.get("fatigue") is not None or "hot_spots" in made:
         found += strength_warnings(structure)
     return found + tuple(spot_warnings(made))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.hot_spots import level_warnings, spot_lines, spot_warnings
+from vanedamp.studies.hot_spots import spot_lines, spot_warnings
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
@@ -33,7 +33,7 @@ def _reduction(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
     placed = {name: facts for name, facts in spots.items() if "coordinates" in facts}
     return {
         "spots": list(spot_lines(spots)),
-        "doubts": [*level_warnings(model.provenance.get("fatigue")), *spot_warnings(model.provenance)],
+        "doubts": list(spot_warnings(model.provenance)),
         "picture": _picture(file, model, placed, page) if placed else None,
         "file": file,
         "interface": model.interface,
