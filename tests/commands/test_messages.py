@@ -172,7 +172,7 @@ def test_a_million_hot_spots(folder, capfd):
 def test_more_hot_spots_than_places(folder, capfd):
     (folder / "case.toml").write_text(changed(BLOCK, ("divisions = [6, 2, 1]", "divisions = [2, 1, 1]\ndegree = 1")))
     assert main(["reduce", "case.toml", "--modes", "2", "--hot-spots", "1000"]) == BAD_INPUT
-    assert "are all that lie 2 % of the structure's size apart" in capfd.readouterr().err
+    assert "are all that lie 0.005 m apart" in capfd.readouterr().err
 
 
 def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
