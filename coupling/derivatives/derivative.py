@@ -139,7 +139,10 @@ class Derivative:
         jump, kick = self._jump(before, new, z)
         if begins(new):  # rows at rest or in touch to round-off: the passage begins with them so
             M = self._constraints.begun(new.state, self._start.closed(new), z)(jump(before.M))
-            if event.what in (codes.CLOSES, codes.OPENS, codes.RECLOSES):
+            # a gap that round-off has opened closes at once, without speed
+            met = abs(float(self.dynamics.speed[event.unit] @ before.z))
+            rests = np.isinf(self.system.spring[event.unit]) and met <= _ROUND_OFF * before.segment.speed
+            if event.what in (codes.CLOSES, codes.OPENS, codes.RECLOSES) and not rests:
                 self.worsen(PassageStatus.GRAZING)
         else:
             M = self._saltation(before, new, flow, z, jump, kick, guards)

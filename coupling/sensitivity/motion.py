@@ -50,15 +50,15 @@ class Motion:
     """A motion of a scene from a state (k,), to be passed with its derivatives.
 
     derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
-    (numbers.StartOf); speed, scale: as in PeriodMap. Raises InputError, and NotSmooth.
+    (numbers.StartOf); speed, scale, begin: as in PeriodMap. Raises InputError, and NotSmooth.
     """
 
     def __init__(
         self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
-        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None,
+        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None, begin: float = 0.0,
     ) -> None:  # fmt: skip
         self.scene = derived(scene)
-        self.frame = Frame(self.scene, speed)
+        self.frame = Frame(self.scene, speed, begin=begin)
         if scale is None:
             scale = self._sizes(None if begins is None else begins(scene, self.frame))
         self.dynamics = Dynamics(self.frame, scale)
@@ -74,11 +74,16 @@ class Motion:
         return sizes
 
     def passed(
-        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None, given: bool
-    ) -> Passage:
-        """Return the passage from a state (k,) that numbers turn by (k, P); given: as in derivatives.start.Start."""
+        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None = None,
+        given: bool = False, part: float = np.inf,
+    ) -> Passage:  # fmt: skip
+        """Return the passage from a state (k,) that numbers turn by (k, P), over all periods or the first part of them.
+
+        given: as in derivatives.start.Start.
+        """
         names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
-        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given)
+        short = part < periods
+        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given, part, short)
         passage = walk.passage(run_from(self.frame, state, periods), periods)
         self.completed = walk.derivative.completed
         return passage
