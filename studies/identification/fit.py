@@ -96,6 +96,21 @@ class Fit:
             follower.leader = leader
         self._last = None
 
+    def forget(self) -> None:
+        """Let motions begin with the scene's own start again: what follows depends on no place before."""
+        for model in self.models:
+            for follower in model.followers:
+                follower.motion = follower.leader = None
+        self._last = None
+
+    def widening(self, z: np.ndarray) -> float:
+        """Return the sum of the logarithms of standard deviations with the errors of runs over those without."""
+        wider = [
+            np.log(np.hypot(deviation, np.nan_to_num(error)) / deviation).sum()
+            for (_, _, error), deviation in zip(self._pairs(self.predict(z)), self.deviations, strict=True)
+        ]
+        return float(np.sum(wider))
+
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return the residuals (N,), in standard deviations: of channels, then of priors."""
         return self._residual(self.study.values(z), self.predict(z))
