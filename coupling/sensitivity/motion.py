@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -144,4 +145,22 @@ def nothing(paths: Sequence[str | MatrixDirection], status: SensitivityStatus, n
         values={}, derivatives={}, names=(), state=none, state_derivative=rows, peak=none, peak_derivative=rows,
         impact_time=none, impact_speed=none, impact_time_derivative=rows, impact_speed_derivative=rows, time=none,
         motion=frozen(np.zeros((0, 3))), motion_derivative=frozen(np.zeros((0, 3, n))),
+    )  # fmt: skip
+
+
+def together(alone: Sequence[Sensitivity]) -> Sensitivity:
+    """Return the record of records by one number each, of which at least one has derivatives: nan for those without."""
+    first = next(each for each in alone if each.status is SensitivityStatus.OK)
+
+    def joined(read: Callable[[Sensitivity], np.ndarray]) -> np.ndarray:
+        unknown = np.full_like(read(first), np.nan)
+        rows = [read(each) if each.status is SensitivityStatus.OK else unknown for each in alone]
+        return frozen(np.concatenate(rows, axis=-1))
+
+    without = [f"{each.paths[0]}: no derivative, {each.note}" for each in alone if each.status != SensitivityStatus.OK]
+    names = ("state", "peak", "impact_time", "impact_speed", "motion")
+    return replace(
+        first, paths=tuple(each.paths[0] for each in alone), note="; ".join([*filter(None, [first.note]), *without]),
+        derivatives={name: joined(lambda each, name=name: each.derivatives[name]) for name in first.derivatives},
+        **{f"{name}_derivative": joined(lambda each, name=name: getattr(each, f"{name}_derivative")) for name in names},
     )  # fmt: skip

@@ -14,6 +14,7 @@ class SensitivityStatus(StrEnum):
     """Whether derivatives exist and mean something. Unless `ok`, there are none, nor figures."""
 
     OK = "ok"
+    """there are derivatives, but for numbers that the note names: nan"""
     GRAZING = "grazing"
     """an event is tangential, or the motion begins with one: derivatives differ from side to side"""
     COINCIDENT = "coincident"
@@ -124,6 +125,11 @@ class Sensitivity:
     time: np.ndarray
     motion: np.ndarray
     motion_derivative: np.ndarray
+
+    @property
+    def complete(self) -> bool:
+        """Whether there are derivatives by all numbers."""
+        return self.status is SensitivityStatus.OK and bool(np.isfinite(self.state_derivative).all())
 
     def to_json(self) -> dict[str, Any]:
         """Return figures and derivatives as plain data, by figure and path."""

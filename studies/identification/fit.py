@@ -190,7 +190,7 @@ class Fit:
         for place, (channel, off) in enumerate(zip(self.channels, self.by_channel(z), strict=True)):
             off = off[np.isfinite(off)]
             if channel.deviation is None and len(off):
-                floor = 1e-9 * (1.0 if channel.compare == "ratio" else float(np.abs(channel.values).max()))
+                floor = 1e-9 * channel.size
                 own = max(float(np.sqrt(off @ off / (len(off) * share))), floor)
                 changed = changed or abs(own / self.deviations[place] - 1.0) > 0.02
                 self.deviations[place] = own
@@ -249,4 +249,4 @@ class _Slopes:
 def _assumed(channel: Channel) -> float:
     if channel.deviation is not None:
         return channel.deviation
-    return _ASSUMED if channel.compare != "difference" else _ASSUMED * float(np.abs(channel.values).max())
+    return _ASSUMED * (1.0 if channel.compare == "angle" else channel.size)

@@ -67,7 +67,7 @@ def test_two_hundred_random_orbits_are_judged_alike_at_all_phases(tmp_path):
 
 
 def test_an_impact_as_the_period_begins():
-    """A ball whose impact is 1e-13 periods after the start: its approach g T/(1 + e) has a derivative, -g T/(1 + e)^2."""
+    """A ball's impact 1e-13 periods after the start: its approach g T/(1 + e) turns by -g T/(1 + e)^2."""
     e = 0.5
     ball_orbit = BouncingBall(e, 0.5 * (beginning(e) + doubling(e)))
     part = ball_orbit.phase / (2 * np.pi) + 1e-13
