@@ -186,11 +186,10 @@ class Continuation:
         how, passed = "", None
         if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED
+        elif (passed := self._other_side.past_the_start(last)) is not None:
+            point, how = passed[0], " at the start of the period"
         elif point is None:
-            if (passed := self._other_side.past_the_start(last)) is not None:
-                point, how = passed[0], " at the start of the period"
-            else:
-                point, how = self._other_side.find(last, step)
+            point, how = self._other_side.find(last, step)
         if point is not None and passed is None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
         after = self._other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage

@@ -138,8 +138,8 @@ class Orbit(Displayed):
     def _quiet(self) -> list[float]:
         """Return times amid the longest intervals between events, in periods, the longest first."""
         assert self.map is not None
-        times = np.array([crossing.time for crossing in self.passage.crossings]) * self.map.scene.frequency
-        ends = np.append(times, times[0] + self.periods) if len(times) else np.array([0.0, self.periods])
+        times = self.map.times(self.passage)
+        ends = np.array([*times, times[0] + self.periods] if times else [0.0, self.periods])
         longest = np.argsort(-np.diff(ends), kind="stable")[:_SECTIONS]
         return [float((ends[place] + ends[place + 1]) / 2 % self.periods) for place in longest]
 

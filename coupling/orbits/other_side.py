@@ -70,13 +70,15 @@ class OtherSide:
 
         The branch is followed from where no event is near. None where no event passes the start.
         """
-        periods, whole = last.orbit.periods, self.problem.map
-        times = _times(last.orbit)
+        periods = last.orbit.periods
+        times = self.problem.at(last.orbit.parameter).times(last.orbit.passage)
         if not times or min(times[0], periods - times[-1]) > _AT_START:
             return None
         apart = np.diff([*times, times[0] + periods])
         later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % periods
-        there = replace(self.problem, map=replace(whole, begin=later % 1.0, _earlier=[]), _maps={}, _passages={})
+        there = replace(
+            self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]), _maps={}, _passages={}
+        )
         head = self._moved(self.problem, last, there, later)
         if head is None:
             return None
@@ -92,7 +94,11 @@ class OtherSide:
                 if moved is not None:
                     own = self.problem.at(each.orbit.parameter)
                     found.append(each._replace(orbit=replace(each.orbit, state=moved, map=own)))
-            passed = len({bisect(_times(each.orbit), periods - later) for each in (head, point)}) > 1
+            before = (
+                bisect(there.at(each.orbit.parameter).times(each.orbit.passage), periods - later)
+                for each in (head, point)
+            )
+            passed = len(set(before)) > 1
             head = point
             if passed:
                 back = self._moved(there, point, self.problem, periods - later)
@@ -217,12 +223,6 @@ class OtherSide:
                     return None
             distance *= 10
         return None
-
-
-def _times(orbit: Orbit) -> list[float]:
-    """Return the times of an orbit's events, in periods."""
-    frequency = 1.0 if orbit.map is None else orbit.map.scene.frequency
-    return [crossing.time * frequency for crossing in orbit.passage.crossings]
 
 
 def _reach(stays: Callable[[float], bool], sign: float) -> float:

@@ -118,6 +118,10 @@ class PeriodMap:
         """Return the map of the same scene over another number of periods."""
         return replace(self, periods=periods)
 
+    def times(self, passage: Passage) -> list[float]:
+        """Return the times of a passage's events, in periods."""
+        return [crossing.time * self.scene.frequency for crossing in passage.crossings]
+
     def later(self, state: np.ndarray, periods: float) -> tuple[PeriodMap, np.ndarray] | None:
         """Return the map that begins some periods later, and where a motion from a state (k,) is then; or None."""
         _, reached = self._walk(state, math.ceil(periods), False, periods, True)

@@ -67,7 +67,9 @@ def judged(seed: int, folder: Path) -> list[Judged] | None:
         return None
     if orbit.status != "ok":
         return None
-    paths = ["excitation.frequency", *(f"cavity.{cavity.name}.gap" for cavity in scene.cavity[:1])]
+    paths = [f"cavity.{cavity.name}.gap" for cavity in scene.cavity[:1]]
+    if scene.excitation.engine_order is None:
+        paths.append("excitation.frequency")
     found = []
     for phase in PHASES:
         other = vd.find_orbit(*later(scene, orbit, phase))

@@ -115,7 +115,8 @@ def test_a_wrong_model_is_seen_by_its_misfit():
     [
         (1e3, None, "divided by 1000 all amplitudes fit (mm and m?)"),
         (np.sqrt(2.0), 0.02, "divided by 1.414 all amplitudes fit"),
-        (2.0, 0.02, "divided by 2 all amplitudes fit"), (np.where(FREQUENCY == 15.3, 4.0, 1.0), None, "% of the values"),
+        (2.0, 0.02, "divided by 2 all amplitudes fit"),
+        (np.where(FREQUENCY == 15.3, 4.0, 1.0), None, "% of the values"),
     ],
 )  # fmt: skip
 def test_wrong_units_and_outliers_are_a_misfit(wrong, noise, said):
@@ -123,7 +124,9 @@ def test_wrong_units_and_outliers_are_a_misfit(wrong, noise, said):
     rng = np.random.default_rng(5)
     amplitude = response(FREQUENCY)[0] * np.exp(0.01 * rng.standard_normal(len(FREQUENCY)))
     measured = [forced("sweep", FREQUENCY, wrong * amplitude, {}, noise=noise)]
-    record = identify(IdentificationStudy(oscillator.scene(), oscillator.NUMBERS, measured, QUICK))
+    number = {"structure.damping_ratio": oscillator.NUMBERS["structure.damping_ratio"]}
+    few = SearchTable(candidates=1, starts=1)
+    record = identify(IdentificationStudy(oscillator.scene(), number, measured, few))
     assert record.status is IdentificationStatus.MISFIT
     assert said in record.notes[0]
     assert noise is not None or record.test.noise == record.deviation[0] > 0.2
