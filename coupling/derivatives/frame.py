@@ -33,7 +33,7 @@ class Frame:
     """
 
     def __init__(self, scene: Scene, speed: float | None = None, like: Frame | None = None, begin: float = 0.0) -> None:
-        self.begin = begin if like is None else like.begin
+        self.begin: float = begin if like is None else like.begin
         self.scene, self.system = scene, _later(assemble(scene), self.begin)
         self._sign = np.ones(self.system.modes) if like is None else _signs(self.system, like.system)
         self.system = _turned(self.system, self._sign)

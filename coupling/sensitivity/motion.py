@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -158,9 +159,15 @@ def together(alone: Sequence[Sensitivity]) -> Sensitivity:
         return frozen(np.concatenate(rows, axis=-1))
 
     without = [f"{each.paths[0]}: no derivative, {each.note}" for each in alone if each.status != SensitivityStatus.OK]
-    names = ("state", "peak", "impact_time", "impact_speed", "motion")
+    turned: dict[str, Any] = {
+        f"{name}_derivative": joined(attrgetter(f"{name}_derivative"))
+        for name in ("state", "peak", "impact_time", "impact_speed", "motion")
+    }
+
+    def of(name: str) -> Callable[[Sensitivity], np.ndarray]:
+        return lambda each: each.derivatives[name]
+
     return replace(
         first, paths=tuple(each.paths[0] for each in alone), note="; ".join([*filter(None, [first.note]), *without]),
-        derivatives={name: joined(lambda each, name=name: each.derivatives[name]) for name in first.derivatives},
-        **{f"{name}_derivative": joined(lambda each, name=name: getattr(each, f"{name}_derivative")) for name in names},
+        derivatives={name: joined(of(name)) for name in first.derivatives}, **turned,
     )  # fmt: skip

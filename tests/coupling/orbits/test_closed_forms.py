@@ -339,7 +339,7 @@ def test_a_branch_of_a_ball_doubles_and_turns_where_holmes_has_it(restitution, p
         assert after.any()
         for parameter, values, beyond in zip(branch.parameter, branch.multipliers, after, strict=True):
             other = BouncingBall(restitution, max(parameter / unit, begins), late=not beyond)
-            assert values.sum().real == pytest.approx(other.trace, abs=1e-3)
+            assert values.sum().real == pytest.approx(other.trace, abs=1e-6)
         # but for the points next to the fold, whose multipliers are 1 to the root of round-off
         assert np.count_nonzero(branch.stable == after) <= 2
 
