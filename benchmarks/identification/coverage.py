@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.identification.truth import TRUTH, study
 from vanedamp.studies.identification.fit import Fit
 from vanedamp.studies.identification.statistics import covariance, held_at
+from vanedamp.studies.identification.study import IdentificationStudy
 
 #: fall of the misfit by which a minimum with a number held shows that the free one was none
 _LOWER = 0.01
@@ -19,12 +20,12 @@ def rises(seeds: range) -> list[dict[str, Any]]:
 
     The interval of a number covers the truth if that rise is below the threshold. Searches begin at the truth.
     """
-    return [_rises(seed) for seed in seeds]
+    return [{"seed": seed} | rises_of(study(seed), TRUTH) for seed in seeds]
 
 
-def _rises(seed: int) -> dict[str, Any]:
-    sought = study(seed)
-    fit, truth = Fit(sought), sought.coordinates(TRUTH)
+def rises_of(sought: IdentificationStudy, values: np.ndarray) -> dict[str, Any]:
+    """Return misfit, best numbers, and rises of a study whose numbers have true values (P,)."""
+    fit, truth = Fit(sought), sought.coordinates(values)
     best = fit.minimum(truth)
     for _ in range(3):
         scatter = covariance(fit.jacobian(best.z))
@@ -34,7 +35,7 @@ def _rises(seed: int) -> dict[str, Any]:
             break
         best = fit.minimum(lowest.z)
     return {
-        "seed": seed, "misfit": best.misfit, "best": sought.values(best.z).tolist(),
+        "misfit": best.misfit, "best": sought.values(best.z).tolist(),
         "deviation": (np.sqrt(np.diag(scatter)) * sought.slope(sought.values(best.z))).tolist(),
         "rise": [each.misfit - best.misfit for each in held],
     }  # fmt: skip

@@ -25,14 +25,16 @@ class Frame:
 
     speed: of rotation at which the states' modes were taken, rad/s; None: the scene's own. A reduced model's modes turn
     with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
-    like: of a neighbouring scene, whose modes have the signs that these take.
+    like: of a neighbouring scene, whose modes have the signs that these take, and whose begin it takes.
+    begin: periods of the excitation from its start to time zero of the system and of the states.
     to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders of Jenkins elements have no rates
     of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
     state; longest: (j,) m, elongations at their bounds.
     """
 
-    def __init__(self, scene: Scene, speed: float | None = None, like: Frame | None = None) -> None:
-        self.scene, self.system = scene, assemble(scene)
+    def __init__(self, scene: Scene, speed: float | None = None, like: Frame | None = None, begin: float = 0.0) -> None:
+        self.begin: float = begin if like is None else like.begin
+        self.scene, self.system = scene, _later(assemble(scene), self.begin)
         self._sign = np.ones(self.system.modes) if like is None else _signs(self.system, like.system)
         self.system = _turned(self.system, self._sign)
         self._turn = self._back = np.diag(self._sign)  # from modes of the states to the scene's own, and back
@@ -160,6 +162,14 @@ class Frame:
         if symmetry is None:
             return None
         return symmetry._replace(image=self.to_state @ np.kron(np.eye(2), symmetry.image) @ self.from_state)
+
+
+def _later(system: System, begin: float) -> System:
+    """Return a system whose time zero is some periods after the start of one of its excitation."""
+    if not begin:
+        return system
+    turned = system.phases(np.array([2.0 * np.pi * begin]))[0]
+    return system._replace(load=system.load * turned[:, None], table=system.table * turned)
 
 
 def _signs(system: System, like: System) -> np.ndarray:

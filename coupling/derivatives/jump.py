@@ -119,11 +119,8 @@ def impact(system: System, v: np.ndarray, event: Event, speed: float, numbers: N
 
 
 def _approach(laws: _Laws, begun: Jump, event: Event) -> _Approach:
-    """Return how the contacts meet. Raises Untrusted near a kink of the restitution, such as that at 0."""
+    """Return how the contacts meet. Raises Untrusted near a kink of the restitution."""
     system, u, n = laws.system, len(laws.system.rest), len(begun.v)
-    plastic = event.struck[np.isinf(system.spring[event.struck]) & (system.restitution[event.struck] == 0.0)]
-    if laws.restitution[:, plastic].any():
-        raise Untrusted
     speed, slope = -system.J[:u] @ begun.v, -system.J[:u] @ begun.derivative
     slope[:, n:] -= (laws.J[:, :u] @ begun.v).T
     speed[event.struck] = -event.before

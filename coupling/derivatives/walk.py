@@ -53,9 +53,9 @@ class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
     turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
-    a search for the clearance; given: as in Start; reached: state (k,) and derivatives (k, k) and (k, P) a part of a
-    period after the start, of a passage without its derivative only the state; None without a part, or if the engine
-    has not come so far; short: whether the passage ends there, its own end unknown.
+    a search for the clearance; given: as in Start; reached: state (k,) and derivatives (k, k) and (k, P) some part of a
+    period, or periods, after the start, of a passage without its derivative only the state; None without a part, or if
+    the engine has not come so far; short: whether the passage ends there, its own end unknown.
     """
 
     def __init__(
@@ -102,8 +102,8 @@ class PassageWalk:
             flow, u = dynamics.flow(segment.state, segment.open_force), dynamics.state(segment)
             M = self._next(walk, before, segment, flow, u)
             z = dynamics.extended(u, segment.time)
-            if segment.period == 0 and segment.time <= part <= segment.time + segment.duration:
-                middle = self._followed(Before(segment, segment.event, flow, z, M), part - segment.time, None)
+            if segment.start <= part <= segment.start + segment.duration:
+                middle = self._followed(Before(segment, segment.event, flow, z, M), part - segment.start, None)
                 self.reached = dynamics.to_state @ middle.u, *self.derivative.reached(middle, self._part)
                 if self._short:
                     return middle

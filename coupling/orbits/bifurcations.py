@@ -114,7 +114,8 @@ def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[
     if (passage := problem.passage(y)) is None:
         return None
     state, parameter = y[:-1] * problem.weight, problem.parameter(y)
-    points[root] = near._replace(y=y, orbit=replace(near.orbit, state=state, parameter=parameter, passage=passage))
+    orbit = replace(near.orbit, state=state, parameter=parameter, passage=passage, map=problem.at(parameter))
+    points[root] = near._replace(y=y, orbit=orbit)
     return root
 
 

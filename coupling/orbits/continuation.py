@@ -7,10 +7,12 @@ branch comes from; then an orbit of the other sequence is sought (orbits.other_s
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import change, forecast
-from vanedamp.coupling.orbits.bifurcations import bifurcations
+from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
 from vanedamp.coupling.orbits.newton import (
     Orbit,
@@ -69,7 +71,10 @@ class Continuation:
         if passage is None:
             return None
         missed = float(np.abs(problem.residual(y, passage)).max(initial=0.0))
-        orbit = Orbit(OrbitStatus.OK, last.parameter, last.state, branch.periods, problem.map.scale, passage, missed, 0)
+        orbit = Orbit(
+            OrbitStatus.OK, last.parameter, last.state, branch.periods, problem.map.scale, passage, missed, 0,
+            map=problem.at(last.parameter),
+        )  # fmt: skip
         head = Point(y, orbit, problem.slope(y), tangent)
         resumed = cls(problem, table, branch.points, head, branch.source)
         resumed.special, resumed.step, resumed.end = list(branch.special), step, branch.end
@@ -95,7 +100,7 @@ class Continuation:
                 failed = step
                 break
             if point.tangent @ head.tangent > _BENT or step <= 2 * self.table.min_step:
-                if not self._search(head, point):
+                if not self._search(bifurcations(self.problem, head, point)):
                     self._accept(head, point)
                 quick = point.orbit.iterations <= _QUICK and point.tangent @ head.tangent > _STRAIGHT
                 self.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
@@ -129,9 +134,9 @@ class Continuation:
         elif len(self.points) > 3 and self._returned(before, point):
             self._end("closed: back at its first orbit", point.orbit)
 
-    def _search(self, before: Point, point: Point) -> bool:
-        """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
-        for found in bifurcations(self.problem, before, point):
+    def _search(self, located: Iterable[Located]) -> bool:
+        """Note bifurcations on the way. Returns whether the branch has ended on one: joined another."""
+        for found in located:
             # where a branch meets its own mirror image it turns, so that it looks like a fold, too
             turns = found.kind in ("fold", "pitchfork")
             if turns and (why := self._joined(found.orbit)):
@@ -176,20 +181,24 @@ class Continuation:
         """Continue with the next sequence of events where the present one ends, within a step; or end the branch."""
         head = self.head
         last, point = self._last(head, step)
-        if last is not head and self._search(head, last):
+        if last is not head and self._search(bifurcations(self.problem, head, last)):
             return
-        how = ""
+        how, passed = "", None
         if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED
+        elif (passed := self._other_side.past_the_start(last)) is not None:
+            point, how = passed[0], " at the start of the period"
         elif point is None:
             point, how = self._other_side.find(last, step)
-        if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
+        if point is not None and passed is None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
         after = self._other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage
         kind, what = change(last.orbit.passage, after)
         self._note(last.orbit, kind, f"{what}{how}")
         if point is None:
             self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
+            return
+        if passed is not None and self._search(passed[1]):
             return
         self._accept(last, point)
         self.step = max(self.table.step / 8, self.table.min_step)

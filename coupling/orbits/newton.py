@@ -40,6 +40,8 @@ _ROUND_OFF = 1e-13
 _SYMMETRIC = 1e-6
 #: corrections of a point of a branch before its step is shortened, which is better than many
 _ITERATIONS, _HALVINGS = 8, 3
+#: moments of an orbit at which a derivative on all sides is sought
+_SECTIONS = 4
 #: scenes and passages that are kept for the next step, which often wants them again; more would fill the memory
 _MAPS, _PASSAGES = 3, 16
 
@@ -54,6 +56,15 @@ class OrbitStatus(StrEnum):
     NOT_CONVERGED = "not_converged"
     FORBIDDEN = "sequence_forbidden"
     STOPPED = "engine_stopped"
+
+
+class Section(NamedTuple):
+    """A moment of an orbit: periods after its start, the period map that begins then, state (k,) and passage."""
+
+    later: float
+    map: PeriodMap | None
+    state: np.ndarray
+    passage: Passage
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,8 +119,33 @@ class Orbit(Displayed):
         return self.passage.scaled(self.scale)
 
     @cached_property
+    def section(self) -> Section:
+        """Where its derivative is taken: at the start of the period unless an event or a contact at rest makes a kink.
+
+        A kink at the start of a passage is none of the motion, whose neighbours come to that event or rest as it does.
+        """
+        own = Section(0.0, self.map, self.state, self.passage)
+        if self.map is None or self.passage.status not in (PassageStatus.GRAZING, PassageStatus.COINCIDENT):
+            return own
+        for periods in self._quiet():
+            if (later := self.map.later(self.state, periods)) is None:
+                continue
+            passage = later[0](later[1])
+            if passage.status is PassageStatus.OK:
+                return Section(periods, *later, passage)
+        return own
+
+    def _quiet(self) -> list[float]:
+        """Return times amid the longest intervals between events, in periods, the longest first."""
+        assert self.map is not None
+        times = self.map.times(self.passage)
+        ends = np.array([*times, times[0] + self.periods] if times else [0.0, self.periods])
+        longest = np.argsort(-np.diff(ends), kind="stable")[:_SECTIONS]
+        return [float((ends[place] + ends[place + 1]) / 2 % self.periods) for place in longest]
+
+    @cached_property
     def _multipliers(self) -> tuple[np.ndarray, int]:
-        return multipliers(self.derivative)
+        return multipliers(self.section.passage.scaled(self.scale))
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -124,7 +160,7 @@ class Orbit(Displayed):
     @property
     def undetermined(self) -> bool:
         """Whether multipliers say nothing of stability: the period map has no derivative that holds on all sides."""
-        return self.passage.status is not PassageStatus.OK
+        return self.section.passage.status is not PassageStatus.OK
 
     @property
     def stable(self) -> bool:

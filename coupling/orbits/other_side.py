@@ -2,19 +2,21 @@
 
 An orbit of another sequence is sought where the branch would continue, at the root of the distance along it where a
 new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
-event does, while the orbit continues as if nothing had happened. The state on the other side is how a passage ends that
-begins close to the last orbit: the event, which comes at both of its ends, is then inside of the period at one
-end and outside at the other.
+event does, while the orbit continues as if nothing had happened. It is followed past that place by states at another
+moment of the period.
 """
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage
+from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import (
     Orbit,
@@ -34,8 +36,8 @@ CENTRED = ": a body that may rest anywhere is moved to the middle of where it do
 _FARTHEST = 10.0
 #: how often the search for the place of a new event is widened
 _WIDENINGS = 6
-#: scaled distances from the last orbit, and how much farther a state is that has jumped
-_BESIDE, _FARTHER = (1e-8, 1e-7, 1e-6, 1e-5), 1e3
+#: periods from the start of one within which an event passes it; steps past it; scaled distance of a state behind
+_AT_START, _STEPS, _BEHIND = 1e-3, 12, 1e-6
 
 
 class OtherSide:
@@ -47,8 +49,6 @@ class OtherSide:
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
-        if (passed := self._past_the_start(last)) is not None:
-            return passed, " at the start of the period"
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)
@@ -65,24 +65,67 @@ class OtherSide:
                 return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
         return None, ""
 
-    def _past_the_start(self, last: Point) -> Point | None:
-        """Return an orbit beyond the last one, where an event passes the start; None if none is found."""
-        problem = self.problem
-        ahead = np.sign(last.tangent[-1]) * problem.along_parameter
-        for size in _BESIDE:
-            for direction in (*np.eye(problem.size), *-np.eye(problem.size)):
-                y = last.y + size * (np.append(direction, 0.0) + ahead)
-                passage = problem.passage(y)
-                if passage is None:
-                    continue
-                image = problem.pack(passage.state, problem.parameter(y))
-                beyond = problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
-                if beyond is None:
-                    continue
-                orbit = near(problem, image, ahead, problem.slope(image), _FARTHER * size)
-                if orbit is not None:
-                    return point_of(problem, orbit, ahead)
+    def past_the_start(self, last: Point) -> tuple[Point, list[Located]] | None:
+        """Return an orbit beyond the last one, where an event passes the start, and the bifurcations on the way.
+
+        The branch is followed from where no event is near. None where no event passes the start.
+        """
+        periods = last.orbit.periods
+        times = self.problem.at(last.orbit.parameter).times(last.orbit.passage)
+        if not times or min(times[0], periods - times[-1]) > _AT_START:
+            return None
+        apart = np.diff([*times, times[0] + periods])
+        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % periods
+        there = replace(
+            self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]), _maps={}, _passages={}
+        )
+        head = self._moved(self.problem, last, there, later)
+        if head is None:
+            return None
+        found, step = list[Located](), self.step
+        for _ in range(_STEPS):
+            orbit = corrected(there, head, step)
+            if orbit is None:
+                step /= 4
+                continue
+            point = point_of(there, orbit, head.tangent)
+            for each in bifurcations(there, head, point):
+                moved = self._state(there, each.orbit.state, each.orbit.parameter, periods - later)
+                if moved is not None:
+                    own = self.problem.at(each.orbit.parameter)
+                    found.append(each._replace(orbit=replace(each.orbit, state=moved, map=own)))
+            before = (
+                bisect(there.at(each.orbit.parameter).times(each.orbit.passage), periods - later)
+                for each in (head, point)
+            )
+            passed = len(set(before)) > 1
+            head = point
+            if passed:
+                back = self._moved(there, point, self.problem, periods - later)
+                return None if back is None else (back, found)
         return None
+
+    def _moved(self, problem: Problem, point: Point, other: Problem, later: float) -> Point | None:
+        """Return a point of a problem as one of another, whose section is some periods later; None if it is lost."""
+        parameter = point.orbit.parameter
+        behind = point.y - _BEHIND * point.tangent
+        states = [
+            self._state(problem, y[:-1] * problem.weight, problem.parameter(y), later) for y in (point.y, behind)
+        ]  # fmt: skip
+        if states[0] is None or states[1] is None:
+            return None
+        y, before = other.pack(states[0], parameter), other.pack(states[1], problem.parameter(behind))
+        passage, row = other.passage(y), (y - before) / np.linalg.norm(y - before)
+        if passage is None:
+            return None
+        orbit = replace(point.orbit, state=states[0], passage=passage, map=other.at(parameter))
+        return point_of(other, orbit, row)
+
+    @staticmethod
+    def _state(problem: Problem, state: np.ndarray, parameter: float, later: float) -> np.ndarray | None:
+        """Return where a motion from a state (k,) is some periods later."""
+        found = problem.at(parameter).later(state, later)
+        return None if found is None else found[1]
 
     def passage(self, last: Point) -> Passage | None:
         """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""

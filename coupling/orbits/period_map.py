@@ -5,6 +5,7 @@ The engine's motion is walked segment by segment, and with it the derivative of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -40,7 +41,8 @@ class PeriodMap:
     the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
     of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives;
     wave: whether a passage ends, with its sectors shifted, after the part of a period in which a travelling wave comes
-    to the next one (derivatives.symmetry.wave_of): travelling waves are fixed points of it.
+    to the next one (derivatives.symmetry.wave_of): travelling waves are fixed points of it; begin: part of a period of
+    the excitation at which passages begin and end.
     """
 
     scene: Scene
@@ -50,12 +52,13 @@ class PeriodMap:
     speed: float | None = None
     numbers: tuple[str, ...] = ()
     wave: bool = False
+    begin: float = 0.0
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
     _earlier: list[EventRun] = field(default_factory=list, repr=False)
 
     @cached_property
     def _frame(self) -> Frame:
-        return Frame(self.scene, self.speed)
+        return Frame(self.scene, self.speed, begin=self.begin)
 
     @cached_property
     def _dynamics(self) -> Dynamics:
@@ -114,6 +117,17 @@ class PeriodMap:
     def over(self, periods: int) -> PeriodMap:
         """Return the map of the same scene over another number of periods."""
         return replace(self, periods=periods)
+
+    def times(self, passage: Passage) -> list[float]:
+        """Return the times of a passage's events, in periods."""
+        return [crossing.time * self.scene.frequency for crossing in passage.crossings]
+
+    def later(self, state: np.ndarray, periods: float) -> tuple[PeriodMap, np.ndarray] | None:
+        """Return the map that begins some periods later, and where a motion from a state (k,) is then; or None."""
+        _, reached = self._walk(state, math.ceil(periods), False, periods, True)
+        if reached is None:
+            return None
+        return replace(self, begin=(self.begin + periods) % 1.0, _earlier=[]), reached[0]
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) that a run has left."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -50,15 +52,15 @@ class Motion:
     """A motion of a scene from a state (k,), to be passed with its derivatives.
 
     derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
-    (numbers.StartOf); speed, scale: as in PeriodMap. Raises InputError, and NotSmooth.
+    (numbers.StartOf); speed, scale, begin: as in PeriodMap. Raises InputError, and NotSmooth.
     """
 
     def __init__(
         self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
-        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None,
+        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None, begin: float = 0.0,
     ) -> None:  # fmt: skip
         self.scene = derived(scene)
-        self.frame = Frame(self.scene, speed)
+        self.frame = Frame(self.scene, speed, begin=begin)
         if scale is None:
             scale = self._sizes(None if begins is None else begins(scene, self.frame))
         self.dynamics = Dynamics(self.frame, scale)
@@ -74,11 +76,16 @@ class Motion:
         return sizes
 
     def passed(
-        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None, given: bool
-    ) -> Passage:
-        """Return the passage from a state (k,) that numbers turn by (k, P); given: as in derivatives.start.Start."""
+        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None = None,
+        given: bool = False, part: float = np.inf,
+    ) -> Passage:  # fmt: skip
+        """Return the passage from a state (k,) that numbers turn by (k, P), over all periods or the first part of them.
+
+        given: as in derivatives.start.Start.
+        """
         names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
-        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given)
+        short = part < periods
+        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given, part, short)
         passage = walk.passage(run_from(self.frame, state, periods), periods)
         self.completed = walk.derivative.completed
         return passage
@@ -139,4 +146,28 @@ def nothing(paths: Sequence[str | MatrixDirection], status: SensitivityStatus, n
         values={}, derivatives={}, names=(), state=none, state_derivative=rows, peak=none, peak_derivative=rows,
         impact_time=none, impact_speed=none, impact_time_derivative=rows, impact_speed_derivative=rows, time=none,
         motion=frozen(np.zeros((0, 3))), motion_derivative=frozen(np.zeros((0, 3, n))),
+    )  # fmt: skip
+
+
+def together(alone: Sequence[Sensitivity]) -> Sensitivity:
+    """Return the record of records by one number each, of which at least one has derivatives: nan for those without."""
+    first = next(each for each in alone if each.status is SensitivityStatus.OK)
+
+    def joined(read: Callable[[Sensitivity], np.ndarray]) -> np.ndarray:
+        unknown = np.full_like(read(first), np.nan)
+        rows = [read(each) if each.status is SensitivityStatus.OK else unknown for each in alone]
+        return frozen(np.concatenate(rows, axis=-1))
+
+    without = [f"{each.paths[0]}: no derivative, {each.note}" for each in alone if each.status != SensitivityStatus.OK]
+    turned: dict[str, Any] = {
+        f"{name}_derivative": joined(attrgetter(f"{name}_derivative"))
+        for name in ("state", "peak", "impact_time", "impact_speed", "motion")
+    }
+
+    def of(name: str) -> Callable[[Sensitivity], np.ndarray]:
+        return lambda each: each.derivatives[name]
+
+    return replace(
+        first, paths=tuple(each.paths[0] for each in alone), note="; ".join([*filter(None, [first.note]), *without]),
+        derivatives={name: joined(of(name)) for name in first.derivatives}, **turned,
     )  # fmt: skip

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
-from scipy.linalg import svd
+from scipy.linalg import matrix_balance, svd
 
-from vanedamp.coupling.derivatives.numbers import Numbers
-from vanedamp.coupling.derivatives.passage import Passage
+from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 
-#: round-off of a period map's derivative, relative, and error of an orbit's derivatives beyond which it is at a fold
-_ROUND_OFF, _UNCERTAIN = 1e-13, 1e-8
+#: round-off of a period map, relative, and error of an orbit's derivatives, relative, beyond which it is at a fold
+_ROUND_OFF, _UNCERTAIN = 1e-13, 1e-6
 #: part of a derivative that no move of the orbit makes up for, relative: neutral orbits that numbers would drive away
 _DRIVEN = 1e-7
+_FOLD = "the orbit is at a fold or another point where it meets others"
 #: imbalance of the energies' derivatives, relative to the largest of a number, and of all and the energies
 _OPEN, _NOTHING = 1e-6, 1e-9
 
@@ -27,32 +29,84 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     """Return the derivatives of an orbit. Raises NoDerivative, InputError and NotSmooth."""
     if orbit.status is not OrbitStatus.OK or orbit.map is None:
         raise NoDerivative(SensitivityStatus.STOPPED, f"no orbit was found: {orbit.status.value}")
-    motion = Motion(orbit.map.scene, paths, speed=orbit.map.speed, scale=orbit.scale)
-    still = np.zeros((len(orbit.state), len(paths)))
-    first = motion.passed(orbit.state, still, orbit.periods, None, False)
-    check(first.status)
-    turns = _moved(orbit, first, motion.numbers)
+    section, periods = orbit.section, orbit.periods
+    assert section.map is not None
+    motion = _motion(section.map, paths, orbit.scale)
+    turns = _moved(orbit, motion)
+    state = section.state
+    if section.later:
+        left = periods - section.later
+        rest = motion.passed(state, turns, math.ceil(left), part=left)
+        state, turns = orbit.state, rest.by_number
+        motion = _motion(orbit.map, paths, orbit.scale)
     measures = Measures(motion.dynamics, motion.numbers, 0, **options)
-    check(motion.passed(orbit.state, turns, orbit.periods, measures, False).status)
+    status = motion.passed(state, turns, periods, measures).status
+    # an event or a contact at rest at the very start or end is no kink of the motion, as its section tells
+    check(PassageStatus.OK if section.later and status in (PassageStatus.GRAZING, PassageStatus.COINCIDENT) else status)
     _check_energies(measures)
-    return record(motion, measures, orbit.periods, orbit.state, turns)
+    return record(motion, measures, periods, state, turns)
 
 
-def _moved(orbit: Orbit, passage: Passage, numbers: Numbers) -> np.ndarray:
-    """Return how numbers move an orbit (k, P). Raises NoDerivative where it does not depend smoothly on them."""
-    scale = orbit.scale
-    matrix = np.eye(len(scale)) - passage.scaled(scale)
-    right = passage.by_number * numbers.size / scale[:, None]
-    left, sizes, rows = svd(matrix)
-    reach = max(1.0, float(sizes.max(initial=0.0)))
-    kept = sizes > NULL * reach
-    smallest = float(sizes[kept].min(initial=np.inf))
-    if int((~kept).sum()) > orbit.neutral or _ROUND_OFF * (reach / smallest) ** 2 > _UNCERTAIN:
-        raise NoDerivative(SensitivityStatus.FOLD, "the orbit is at a fold or another point where it meets others")
-    parts = left.T @ right
-    if np.any(np.abs(parts[~kept]) > _DRIVEN * (np.abs(right).max(initial=0.0) + NULL)):
-        raise NoDerivative(SensitivityStatus.UNDETERMINED, "numbers set a body adrift that rests anywhere")
-    return np.asarray(rows.T[:, kept] @ (parts[kept] / sizes[kept, None]) * scale[:, None] / numbers.size)
+def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
+    """Return the motion of a period map's scene from its section."""
+    return Motion(period_map.scene, paths, speed=period_map.speed, scale=scale, begin=period_map.begin)
+
+
+def _moved(orbit: Orbit, motion: Motion) -> np.ndarray:
+    """Return how numbers move the state (k, P) of an orbit's section.
+
+    Raises NoDerivative where it does not depend smoothly on them.
+    """
+    state, still = orbit.section.state, np.zeros((len(orbit.state), len(motion.numbers)))
+    passage = motion.passed(state, still, orbit.periods)
+    check(passage.status)
+    equations = _Equations(passage, motion, orbit)
+    if int((~equations.kept).sum()) > orbit.neutral:
+        raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
+    turns = equations.solved()
+    if equations.condition**2 * _ROUND_OFF > _UNCERTAIN:
+        # the orbit is known to round-off over the smallest singular value: the derivatives of one as far away differ
+        moved = state + equations.farthest()
+        other = motion.passed(moved, still, orbit.periods)
+        off = np.abs(_Equations(other, motion, orbit).solved() - turns) / equations.scale[:, None]
+        size = np.abs(turns / equations.scale[:, None]).max(axis=0, initial=0.0)
+        if other.sequence != passage.sequence or not np.all(off.max(axis=0, initial=0.0) <= _UNCERTAIN * size):
+            raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
+    return turns
+
+
+class _Equations:
+    """The equations (1 - D) x = dP/dp of how an orbit moves, in coordinates of sizes that balance D."""
+
+    def __init__(self, passage: Passage, motion: Motion, orbit: Orbit) -> None:
+        numbers, D = motion.numbers, passage.scaled(orbit.scale)
+        _, (balance, _) = matrix_balance(D, permute=False, separate=True)
+        self.scale, self._size = orbit.scale * balance, numbers.size
+        self.right = passage.by_number * numbers.size / self.scale[:, None]
+        self.left, self.sizes, self.rows = svd(np.eye(len(D)) - passage.scaled(self.scale))
+        self._reach = max(1.0, float(self.sizes.max(initial=0.0)))
+        self.kept = self.sizes > NULL * self._reach
+        self._state = np.abs(orbit.section.state / self.scale).max(initial=1.0)
+
+    @property
+    def condition(self) -> float:
+        """Ratio of the largest and the smallest singular value that is none of a neutral direction."""
+        return self._reach / float(self.sizes[self.kept].min(initial=np.inf))
+
+    def farthest(self) -> np.ndarray:
+        """Return the move (k,) of the state that round-off of the map leaves open most."""
+        if not self.kept.any():
+            return np.zeros(len(self.scale))
+        last = np.flatnonzero(self.kept)[-1]
+        return np.asarray(_ROUND_OFF * self._reach * self._state / self.sizes[last] * self.rows[last] * self.scale)
+
+    def solved(self) -> np.ndarray:
+        """Return the solution (k, P) by units of the numbers. Raises NoDerivative where there is none."""
+        parts, kept = self.left.T @ self.right, self.kept
+        if np.any(np.abs(parts[~kept]) > _DRIVEN * (np.abs(self.right).max(initial=0.0) + NULL)):
+            raise NoDerivative(SensitivityStatus.UNDETERMINED, "numbers set a body adrift that rests anywhere")
+        found = self.rows.T[:, kept] @ (parts[kept] / self.sizes[kept, None])
+        return np.asarray(found * self.scale[:, None] / self._size)
 
 
 def _check_energies(measures: Measures) -> None:

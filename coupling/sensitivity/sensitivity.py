@@ -14,13 +14,16 @@ from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
-from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, nothing
+from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, nothing, together
 from vanedamp.coupling.sensitivity.of_orbit import of_orbit
 from vanedamp.coupling.sensitivity.of_run import of_ramp, of_ring_down, of_run
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import InputError
+
+#: statuses that one number may cause though others have derivatives
+_BY_NUMBER = (SensitivityStatus.UNDETERMINED, SensitivityStatus.GRAZING)
 
 
 def sensitivity(
@@ -39,12 +42,25 @@ def sensitivity(
     if isinstance(paths, str):
         raise InputError(f'paths: expected a list of dotted paths, not "{paths}"')
     wanted, moments = tuple(paths), sorted(times)
+    found = _tried(motion, wanted, orders, moments, start)
+    if found.status in _BY_NUMBER and len(wanted) > 1:
+        alone = [_tried(motion, (path,), orders, moments, start) for path in wanted]
+        if any(each.status is SensitivityStatus.OK for each in alone):
+            return together(alone)
+    return found
+
+
+def _tried(
+    motion: Orbit | RingDown | Ramp | Scene | str | Path, paths: Paths, orders: Sequence[int], times: list[float],
+    start: RestartState | None,
+) -> Sensitivity:  # fmt: skip
+    """Return the derivatives, or the record of why there are none."""
     try:
-        return _found(motion, wanted, orders, moments, start)
+        return _found(motion, paths, orders, times, start)
     except NoDerivative as error:
-        return nothing(wanted, error.status, error.note)
+        return nothing(paths, error.status, error.note)
     except NotSmooth as error:
-        return nothing(wanted, SensitivityStatus.UNDETERMINED, str(error))
+        return nothing(paths, SensitivityStatus.UNDETERMINED, str(error))
 
 
 def _found(

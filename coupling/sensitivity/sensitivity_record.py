@@ -14,12 +14,13 @@ class SensitivityStatus(StrEnum):
     """Whether derivatives exist and mean something. Unless `ok`, there are none, nor figures."""
 
     OK = "ok"
+    """there are derivatives, but for numbers that the note names: nan"""
     GRAZING = "grazing"
-    """an event is tangential, or the motion begins with one: derivatives differ from side to side"""
+    """an event is tangential, or a run begins with one: derivatives differ from side to side"""
     COINCIDENT = "coincident"
     """events that do not follow from each other meet at one instant"""
     UNDETERMINED = "undetermined"
-    """contact forces that the laws do not determine, or a kink of the equations"""
+    """contact forces that the laws do not determine, or a kink of the equations in every number"""
     STOPPED = "stopped"
     """the engine did not reach the end, or the search found no orbit"""
     FOLD = "fold"
@@ -124,6 +125,11 @@ class Sensitivity:
     time: np.ndarray
     motion: np.ndarray
     motion_derivative: np.ndarray
+
+    @property
+    def complete(self) -> bool:
+        """Whether there are derivatives by all numbers."""
+        return self.status is SensitivityStatus.OK and bool(np.isfinite(self.state_derivative).all())
 
     def to_json(self) -> dict[str, Any]:
         """Return figures and derivatives as plain data, by figure and path."""

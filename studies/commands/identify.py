@@ -15,7 +15,7 @@ from vanedamp.studies.identification.deviations import identify_deviations, load
 from vanedamp.studies.identification.record import Identification, IdentificationStatus
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.summary import number_texts, proposal_text
+from vanedamp.studies.identification.summary import noise_texts, number_texts, proposal_text
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
@@ -63,5 +63,6 @@ def _summary(found: Identification) -> Iterator[str]:
     yield f"status {found.status.value}, {found.counts['runs']} runs, {found.wall_time_s:.0f} s"
     yield from (f"read {one['source']}" for one in found.study["measured"] if one["source"])
     yield from number_texts(found)
+    yield from noise_texts(found)
     if found.proposal is not None:
         yield proposal_text(found.paths, found.proposal)

@@ -15,6 +15,8 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.measurements import check_phase
 from vanedamp.studies.identification.tables import DecayTable, ForcedTable, ImpactsTable
 
+#: phase that is in degrees if it is said to be in rad
+_TURNS = 4.0 * np.pi
 #: rows of one file
 _MOST_ROWS = 10_000
 
@@ -38,6 +40,11 @@ class Channel:
     values: np.ndarray
     compare: Literal["ratio", "difference", "angle"]
     deviation: float | None
+
+    @property
+    def size(self) -> float:
+        """Difference that is as large as the values: of angles a quarter of a turn."""
+        return {"ratio": 1.0, "angle": 0.5 * np.pi, "difference": float(np.abs(self.values).max())}[self.compare]
 
     def difference(self, model: np.ndarray) -> np.ndarray:
         """Return by how much a model's values (n,) differ."""
@@ -149,8 +156,15 @@ def read_forced(table: ForcedTable, folder: Path) -> Measured:
     amplitude, measure, told = _amplitude(own, motion, table.measure, 2 * np.pi * frequency)
     direction, phase = [""] * len(frequency), None
     if "phase" in found:
-        phase = own.si(found["phase"], "phase") * (-1.0 if table.conjugate else 1.0)
-        told[found["phase"].header] = f"phase in {own.unit_of(found['phase'], 'phase').text}"
+        phase = own.si(found["phase"], "phase")
+        unit = own.unit_of(found["phase"], "phase").text
+        if unit == "rad" and (largest := float(np.abs(phase).max(initial=0.0))) > _TURNS:
+            raise InputError(
+                f"{own.path}: {found['phase'].header}: {largest:g} rad is more than two turns; "
+                "write phase_deg for degrees"
+            )
+        phase = phase * (-1.0 if table.conjugate else 1.0)
+        told[found["phase"].header] = f"phase in {unit}"
         if motion.unit and motion.unit.quantity in MOTION:  # each derivative is a quarter of a turn ahead
             phase = phase - MOTION.index(motion.unit.quantity) * np.pi / 2
     if "direction" in found:

@@ -8,7 +8,7 @@ import numpy as np
 
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity
-from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.studies.identification.data import MOTION, Measured
@@ -80,7 +80,7 @@ class Decay(Model):
     def _exact(self, found: RingDown) -> np.ndarray | None:
         """Return the derivatives (n, P); None where the motion has none."""
         slopes = self._sampled(found)
-        if slopes.status is not SensitivityStatus.OK:
+        if not slopes.complete:
             return None
         if self._name in MOTION:
             return np.asarray(slopes.motion_derivative[:, MOTION.index(self._name)])

@@ -16,7 +16,9 @@ class LogDensity:
     """Logarithm of the posterior density of P numbers, up to a constant, with its gradient.
 
     Errors of measurements are normal, of ratios lognormal; priors are those of the study, uniform between the bounds
-    without. Motions are found from the last ones, so that calls near each other are fast.
+    without. Motions are those to which the scene's own start leads, or at measured directions the neighbour's state: a
+    value depends on no call before. Where a motion does not repeat, the confidence of its mean widens the error, and
+    the normal density is lower by that; the gradient takes it as constant.
     """
 
     def __init__(self, study: IdentificationStudy | str | Path, deviations: Sequence[float] | None = None) -> None:
@@ -34,14 +36,16 @@ class LogDensity:
         z = self._inside(values)
         if z is None:
             return -np.inf
+        self._fit.forget()
         residual = self._fit.residual(z)
-        return -0.5 * float(residual @ residual)
+        return -0.5 * float(residual @ residual) - self._fit.widening(z)
 
     def gradient(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return its derivatives (P,) by the numbers; nan outside of their bounds."""
         z = self._inside(values)
         if z is None:
             return np.full(len(self.study.numbers), np.nan)
+        self._fit.forget()
         slope = -self._fit.residual(z) @ self._fit.jacobian(z)
         return np.asarray(slope / self.study.slope(self.study.values(z)))
 

@@ -96,6 +96,21 @@ class Fit:
             follower.leader = leader
         self._last = None
 
+    def forget(self) -> None:
+        """Let motions begin with the scene's own start again: what follows depends on no place before."""
+        for model in self.models:
+            for follower in model.followers:
+                follower.motion = follower.leader = None
+        self._last = None
+
+    def widening(self, z: np.ndarray) -> float:
+        """Return the sum of the logarithms of standard deviations with the errors of runs over those without."""
+        wider = [
+            np.log(np.hypot(deviation, np.nan_to_num(error)) / deviation).sum()
+            for (_, _, error), deviation in zip(self._pairs(self.predict(z)), self.deviations, strict=True)
+        ]
+        return float(np.sum(wider))
+
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return the residuals (N,), in standard deviations: of channels, then of priors."""
         return self._residual(self.study.values(z), self.predict(z))
@@ -175,7 +190,7 @@ class Fit:
         for place, (channel, off) in enumerate(zip(self.channels, self.by_channel(z), strict=True)):
             off = off[np.isfinite(off)]
             if channel.deviation is None and len(off):
-                floor = 1e-9 * (1.0 if channel.compare == "ratio" else float(np.abs(channel.values).max()))
+                floor = 1e-9 * channel.size
                 own = max(float(np.sqrt(off @ off / (len(off) * share))), floor)
                 changed = changed or abs(own / self.deviations[place] - 1.0) > 0.02
                 self.deviations[place] = own
@@ -234,4 +249,4 @@ class _Slopes:
 def _assumed(channel: Channel) -> float:
     if channel.deviation is not None:
         return channel.deviation
-    return _ASSUMED if channel.compare != "difference" else _ASSUMED * float(np.abs(channel.values).max())
+    return _ASSUMED * (1.0 if channel.compare == "angle" else channel.size)

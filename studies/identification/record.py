@@ -18,8 +18,8 @@ from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import write_commented
 
 _KIND = "identification"
-#: chance of a misfit below which it is none
-CHANCE = 0.01
+#: chance of a misfit below which it is none, and noise, relative, that no measurement has
+CHANCE, ROUGHEST = 0.01, 0.2
 _ARRAYS = {
     "best": ("number",), "covariance": ("number", "other_number"), "interval": ("number", "end"),
     "open": ("number", "end"), "profile_number": ("profile_point",), "profile_value": ("profile_point",),
@@ -56,18 +56,19 @@ class Misfit(NamedTuple):
 
     squares, freedom: sum of squares over channels with given deviations, and its degrees of freedom; chance: that noise
     makes it as large or larger; runs: chance of as few changes of sign of the residuals, of channels with estimated
-    deviations; nan where neither can be told.
+    deviations; nan where neither can be told; noise: the largest estimated deviation over the values, nan without.
     """
 
     squares: float
     freedom: int
     chance: float
     runs: float
+    noise: float = float("nan")
 
     @property
     def larger(self) -> bool:
         """Whether the misfit is larger than the noise."""
-        return self.chance < CHANCE or self.runs < CHANCE
+        return self.chance < CHANCE or self.runs < CHANCE or self.noise > ROUGHEST
 
 
 class Proposal(NamedTuple):

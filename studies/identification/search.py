@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
 from contextlib import suppress
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,13 @@ _ROUNDS = 4
 _AS_GOOD = 4.0
 #: relative deviation of a proposed measurement's amplitude where no forced response tells it
 _NOISE = 0.02
+#: common factors of wrong readings, and what they are
+FACTORS = {
+    1e3: "mm and m", 1e6: "um and m", 2.0: "peak to peak and peak", math.sqrt(2.0): "peak and rms",
+    180.0 / math.pi: "degrees and rad",
+}  # fmt: skip
+#: part of the misfit that is left where a common factor explains it
+_EXPLAINS = 0.1
 #: half width of a 95 % interval over the standard deviation
 _NORMAL = 1.96
 
@@ -342,7 +350,8 @@ def _identification(
     others = ended[apart & found & (squares < least + _AS_GOOD)]
     data = _data(fit, best.z, scatter)
     cold = fit.quick(best.z)
-    status, notes = outcome(study, opened, interval, test, best.converged, others, cold, least, work.over)
+    factor = common_factor(fit, best.z) if test.larger and not work.over else ""
+    status, notes = outcome(study, opened, interval, test, best.converged, others, cold, least, work.over, factor)
     return Identification(
         study=study.to_json(), status=status, notes=notes, paths=study.paths,
         sentence=sentence_of(study.paths, values, interval, opened), best=frozen(values),
@@ -355,6 +364,31 @@ def _identification(
         estimated=frozen(fit.estimated, bool), proposal=proposal, counts=dict(work.count + fit.count),
         wall_time_s=time.perf_counter() - began, scene=study.scene_at(values), provenance=provenance, **data,
     )  # fmt: skip
+
+
+def common_factor(fit: Fit, z: np.ndarray) -> str:
+    """Say by which factor, such as one between units, all measured amplitudes are off; "" if by none of FACTORS.
+
+    The two are tried that are closest to the median of the ratios to the model at its best, which they have moved.
+    """
+    pairs = zip(fit.channels, fit.by_channel(z), strict=True)
+    ratios = [off[np.isfinite(off)] for channel, off in pairs if channel.compare == "ratio"]
+    if not ratios or not len(together := np.concatenate(ratios)):
+        return ""
+    middle = -float(np.median(together))
+    both = {factor: name for value, name in FACTORS.items() for factor in (value, 1.0 / value)}
+    for factor in sorted(both, key=lambda each: abs(math.log(each) - middle))[:2]:
+        measured = [
+            replace(one, channels=tuple(
+                replace(each, values=each.values / factor) if each.compare == "ratio" else each for each in one.channels
+            ))
+            for one in fit.study.measured
+        ]  # fmt: skip
+        other = Fit(replace(fit.study, measured=measured), fit.deviations)
+        start = min((z, fit.study.coordinates(fit.study.start)), key=other.quick)
+        if other.minimum(start, close=_ROUGH).misfit < _EXPLAINS * _squares(fit, z):
+            return f"divided by {factor:.4g} all amplitudes fit ({both[factor]}?)"
+    return ""
 
 
 def _squares(fit: Fit, z: np.ndarray) -> float:

@@ -144,11 +144,13 @@ def _end(
 def misfit(fit: Fit, z: np.ndarray) -> Misfit:
     """Return the test of a model at its best coordinates."""
     residual, offset, squares, count, runs = fit.residual(z), 0, 0.0, 0, list[float]()
-    for channel, estimated in zip(fit.channels, fit.estimated, strict=True):
+    noise = float("nan")
+    for channel, estimated, deviation in zip(fit.channels, fit.estimated, fit.deviations, strict=True):
         own = residual[offset : offset + len(channel.values)]
         offset += len(own)
         if estimated:
             runs.append(few_changes(own))
+            noise = float(np.fmax(noise, deviation / channel.size))
         else:
             squares, count = squares + float(own @ own), count + len(own)
     free = count - len(z) if not any(fit.estimated) else count  # else their numbers are those of other channels
@@ -156,7 +158,7 @@ def misfit(fit: Fit, z: np.ndarray) -> Misfit:
     squares, free = squares + float(priors @ priors), free + len(priors)
     chance = float(stats.chi2.sf(squares, free)) if count and free > 0 else np.nan
     known = [each for each in runs if np.isfinite(each)]
-    return Misfit(squares, free, chance, min(min(known) * len(known), 1.0) if known else np.nan)
+    return Misfit(squares, free, chance, min(min(known) * len(known), 1.0) if known else np.nan, noise)
 
 
 def few_changes(residual: np.ndarray) -> float:

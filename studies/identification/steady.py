@@ -15,7 +15,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity
-from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity
 from vanedamp.coupling.simulation import simulate
 
 #: ends of runs whose figures count, with their confidence interval
@@ -79,7 +79,7 @@ class Follower:
             return None
         self._count["derivatives"] += 1
         found = sensitivity(self.motion.orbit, self.paths)
-        return found if found.status is SensitivityStatus.OK else None
+        return found if found.complete else None
 
     def beside(self, scene: Scene | None) -> Steady | None:
         """Return the motion of a scene that differs little from the last one, which stays the last one."""

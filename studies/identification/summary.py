@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.studies.identification.record import Identification, IdentificationStatus, Misfit, Proposal
+from vanedamp.studies.identification.record import ROUGHEST, Identification, IdentificationStatus, Misfit, Proposal
 from vanedamp.studies.identification.study import IdentificationStudy
 
 
@@ -35,6 +35,16 @@ def sentence_of(paths: Sequence[str], best: np.ndarray, interval: np.ndarray, op
     return "; ".join(map(number_text, paths, best.tolist(), interval, opened)) + "."
 
 
+def noise_texts(found: Identification) -> list[str]:
+    """Return the deviations that the residuals tell, one a channel."""
+    texts = []
+    for channel, deviation, estimated in zip(found.channels, found.deviation, found.estimated, strict=True):
+        if estimated:
+            size = f"{deviation:.2%}" if channel["compare"] == "ratio" else f"{deviation:.3g} {channel['unit']}"
+            texts.append(f"noise of {channel['measurement']}, {channel['quantity']}: {size} by the residuals")
+    return texts
+
+
 def proposal_text(paths: Sequence[str], proposal: Proposal) -> str:
     """Return which further measurement would tell most of the number that is told least."""
     best = proposal.best
@@ -47,15 +57,15 @@ def proposal_text(paths: Sequence[str], proposal: Proposal) -> str:
 
 def outcome(
     study: IdentificationStudy, opened: np.ndarray, interval: np.ndarray, test: Misfit, converged: bool,
-    others: np.ndarray, cold: float, misfit: float, over: str,
+    others: np.ndarray, cold: float, misfit: float, over: str, factor: str = "",
 ) -> tuple[IdentificationStatus, tuple[str, ...]]:  # fmt: skip
     """Return how an identification ended, and its notes.
 
     others: (o, P) numbers of other minima that are as good; cold: misfit of runs from the scene's own start; over: what
-    its budget of time has cut, in words, or "".
+    its budget of time has cut, in words, or ""; factor: by which all measured amplitudes are off, in words, or "".
     """
     notes = [remark for measured in study.measured for remark in measured.remarks]
-    notes += _notes(study, opened, interval, test, converged or bool(over), others, cold, misfit)
+    notes += _notes(study, opened, interval, test, converged or bool(over), others, cold, misfit, factor)
     if over:
         return IdentificationStatus.BUDGET, (f"the budget of time is over: {over}", *notes)
     if not converged:
@@ -73,14 +83,20 @@ _ELSEWHERE = 10.0
 
 def _notes(
     study: IdentificationStudy, opened: np.ndarray, interval: np.ndarray, test: Misfit, converged: bool,
-    others: np.ndarray, cold: float, misfit: float,
+    others: np.ndarray, cold: float, misfit: float, factor: str,
 ) -> Iterator[str]:  # fmt: skip
     if not converged:
         yield "the search has not reached a minimum; give more starts, or bounds that are closer"
     if test.chance == test.chance and test.larger:
         yield (
             f"misfit: {test.squares:.4g} of {test.freedom} degrees of freedom, which noise exceeds with a chance of "
-            f"{test.chance:.2g}; the model lacks something that the measurements show, or the noise is larger"
+            f"{test.chance:.2g}; "
+            + (factor or "the model lacks something that the measurements show, or the noise is larger")
+        )
+    elif test.noise > ROUGHEST:
+        yield (
+            f"misfit: the noise that the residuals tell is {test.noise:.0%} of the values; no measurement is that "
+            f"rough: {factor or 'check units, outliers and bodies'}"
         )
     elif test.larger:
         yield (

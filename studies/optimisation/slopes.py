@@ -72,6 +72,6 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
 def slope_of(orbit: Orbit, paths: Sequence[str], measure: str) -> Slope | str:
     """Return the slope of an orbit, or the status of its derivatives."""
     found = sensitivity(orbit, paths)
-    if found.status is not SensitivityStatus.OK:
-        return found.status.value
+    if not found.complete:
+        return (SensitivityStatus.UNDETERMINED if found.status is SensitivityStatus.OK else found.status).value
     return Slope(found.values[measure], found.derivatives[measure], orbit, found.state_derivative)

@@ -33,17 +33,27 @@ def doubling(restitution: float) -> float:
 
 @dataclass(frozen=True)
 class BouncingBall:
-    """The orbit for a restitution and an acceleration X w^2 / g of the table; gravity in m/s^2, period in s."""
+    """The orbit for a restitution and an acceleration X w^2 / g of the table; gravity in m/s^2, period in s.
+
+    late: whether the impact is after phase 0, of the orbit that is stable where it begins; the other one never is.
+    """
 
     restitution: float
     acceleration: float
     gravity: float = 10.0
     period: float = 1.0
+    late: bool = True
 
     @property
     def phase(self) -> float:
-        """Phase of the impact, between 0 and pi / 2: the branch that is stable where it begins."""
-        return math.acos(beginning(self.restitution) / self.acceleration)
+        """Phase of the impact, between -pi / 2 and pi / 2."""
+        return math.copysign(math.acos(beginning(self.restitution) / self.acceleration), 1.0 if self.late else -1.0)
+
+    @property
+    def trace(self) -> float:
+        """Sum of the multipliers."""
+        e = self.restitution
+        return -2 * e + (1 + e) ** 2 * (1 - self.acceleration * math.sin(self.phase))
 
     @property
     def approach(self) -> float:
@@ -53,11 +63,16 @@ class BouncingBall:
     @property
     def state(self) -> np.ndarray:
         """Height over the table and its rate (2,) at phase 0, m and m/s."""
+        return self.at(0.0)
+
+    def at(self, part: float) -> np.ndarray:
+        """Return height over the table and its rate (2,) a part of a period after phase 0, m and m/s."""
         omega = 2 * math.pi / self.period
-        table, flown = self.acceleration * self.gravity / omega**2, self.period * (1 - self.phase / (2 * math.pi))
-        leaves = self.gravity * self.period / 2
-        height = table * math.sin(self.phase) + leaves * flown - self.gravity * flown**2 / 2
-        return np.array([height, leaves - self.gravity * flown - table * omega])
+        table = self.acceleration * self.gravity / omega**2
+        flown = self.period * ((part - self.phase / (2 * math.pi)) % 1.0)
+        leaves, angle = self.gravity * self.period / 2, 2 * math.pi * part
+        height = table * (math.sin(self.phase) - math.sin(angle)) + leaves * flown - self.gravity * flown**2 / 2
+        return np.array([height, leaves - self.gravity * flown - table * omega * math.cos(angle)])
 
     @property
     def monodromy(self) -> np.ndarray:

@@ -74,6 +74,10 @@ class ClosedMap:
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
         return -state if self.mirror else None
 
+    def times(self, passage: Passage) -> list[float]:
+        """Return none: the map is known from one moment only."""
+        return []
+
 
 def smooth(function: Callable[..., tuple], size: int, **options: object) -> ClosedMap:
     """Return a map without events; function: (state, parameter) -> (state, derivative)."""
@@ -159,6 +163,10 @@ class ImpactOscillator:
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
         return None
+
+    def times(self, passage: Passage) -> list[float]:
+        """Return none, as ClosedMap."""
+        return []
 
     def driven(self, t: float) -> np.ndarray:
         """Return the steady response without stop: a/c (sin t, cos t)."""

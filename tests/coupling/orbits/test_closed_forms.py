@@ -312,23 +312,36 @@ def test_a_branch_turns_where_two_symmetric_motions_meet():
     lie_on(branch, both=True)
 
 
-@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8])
-def test_a_branch_of_a_ball_doubles_and_begins_where_holmes_has_it(restitution):
-    """Where the orbit begins two of them meet with the impact at phase 0, the start of the period."""
+@pytest.mark.parametrize(("restitution", "phase"), [(0.3, 0.0), (0.5, 20.0), (0.8, 60.0)])
+def test_a_branch_of_a_ball_doubles_and_turns_where_holmes_has_it(restitution, phase):
+    """Where two orbits meet the impact is at phase 0 of the sine, which is the start of the period or not."""
     unit = 10.0 / (2 * math.pi) ** 2
-    orbit = BouncingBall(restitution, 0.5 * (beginning(restitution) + doubling(restitution)))
-    data, (position, velocity) = bouncing(orbit)
+    begins, doubles = beginning(restitution), doubling(restitution)
+    orbit = BouncingBall(restitution, 0.5 * (begins + doubles))
+    data, _ = bouncing(orbit)
+    position, velocity = orbit.at(phase / 360.0) - [10.0, 0.0]
     data = data.replace({
         "damper.0.position": position, "damper.0.velocity": velocity, "time": {"periods": 1, "transient": 0},
+        "excitation.harmonic": [{"order": 1, "amplitude": 1.0, "phase": phase}],
     })  # fmt: skip
-    for to in (0.9 * beginning(restitution), 1.1 * doubling(restitution)):
+    for to in (0.95 * begins, 1.1 * doubles):
         table = {"parameter": "structure.displacement_amplitude", "from": unit * orbit.acceleration, "to": unit * to}
         (branch,) = orbits(data.replace({"orbit": table})).branches
-        if to < orbit.acceleration:
-            assert branch.special[-1].parameter == pytest.approx(unit * beginning(restitution), rel=1e-8)
-        else:
+        if to > orbit.acceleration:
             (found,) = [point.parameter for point in branch.special if point.kind == "period doubling"]
-            assert found == pytest.approx(unit * doubling(restitution), rel=1e-8)
+            assert found == pytest.approx(unit * doubles, rel=1e-8)
+            continue
+        (fold,) = [point for point in branch.special if point.kind == "fold"]
+        assert fold.parameter == pytest.approx(unit * begins, rel=1e-8)
+        assert not {point.kind for point in branch.special} & {"grazing", "pitchfork"}
+        assert branch.end == "the end of the parameter's range" and branch.parameter[-1] == branch.parameter[0]
+        after = np.arange(len(branch.parameter)) > fold.index
+        assert after.any()
+        for parameter, values, beyond in zip(branch.parameter, branch.multipliers, after, strict=True):
+            other = BouncingBall(restitution, max(parameter / unit, begins), late=not beyond)
+            assert values.sum().real == pytest.approx(other.trace, abs=1e-6)
+        # but for the points next to the fold, whose multipliers are 1 to the root of round-off
+        assert np.count_nonzero(branch.stable == after) <= 2
 
 
 def test_the_branch_without_contact_grazes_where_its_amplitude_is_the_gap():

@@ -4,6 +4,7 @@ Relative to the larger of a derivative and of its result over its number.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ import vanedamp as vd
 from tests.reference import orbit_numbers as exact
 from tests.reference.orbit_bouncing_ball import BouncingBall, beginning, doubling
 from tests.reference.orbit_dry_friction import DryFriction
+from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.tools.closed_form_scenes import ball, scene
 from vanedamp.coupling.orbits.newton import OrbitStatus
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.scene.orbit import Orbit
 
 #: error allowed
 CLOSE = 1e-10
@@ -243,3 +246,47 @@ def test_a_spring_and_a_jenkins_element(element, limit, frequency):
         "amplitude": found.peak_derivative[0], "place": found.state_derivative[0],
         "rate": found.state_derivative[1], "elongation": found.state_derivative[2],
     })  # fmt: skip
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-6])
+def test_a_motion_with_little_damping_is_at_no_fold(ratio):
+    """Multipliers are as close to 1 as 2 pi zeta; amplitudes are F / |k - m w^2 + 2 i zeta w| with k = m = 1."""
+    omega = 0.9
+    scene = vd.Scene.of(
+        {"structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": ratio},
+         "excitation": {"frequency": omega / (2 * math.pi), "force": 1.0}}, "scene"
+    )  # fmt: skip
+    orbit = vd.find_orbit(replace(scene, orbit=Orbit(start="linear")))
+    found = vd.sensitivity(orbit, ["structure.stiffness", "structure.mass"])
+    assert orbit.stable and found.status == "ok", found.note
+    dynamic = 1.0 - omega**2 + 2j * ratio * omega
+    # the damping ratio stays: c = 2 zeta sqrt(k m)
+    turned = np.array([1.0 + 1j * ratio * omega, -(omega**2) + 1j * ratio * omega])
+    exact = -(turned / dynamic).real / abs(dynamic)
+    assert found.derivatives["amplitude_harmonic"] == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize(("away", "status"), [(1e-3, "ok"), (1e-5, "ok"), (1e-14, "fold")])
+def test_derivatives_next_to_a_fold(away, status):
+    """Two orbits meet there as roots do: the speed of approach turns by the root of the distance."""
+    gap = GapOscillator(1.0, 0.1, 1.0, body=0.1, half_gap=8.0, restitution=0.6, force=1.0, omega=1.0)
+    omega = gap.fold(1.25, 1.4) * (1.0 - away)
+    own = replace(gap, omega=omega)
+    scene = vd.Scene.of(
+        {"structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+         "excitation": {"frequency": omega / (2 * math.pi), "force": 1.0}, "gravity": {"acceleration": 0.0},
+         "cavity": [{"name": "c", "gap": 16.0}], "damper": [{"cavity": "c", "mass": 0.1, "restitution": 0.6}],
+         "orbit": {"periods": 1}}, "scene"
+    )  # fmt: skip
+    passages = period_map(scene)
+    orbit = vd.find_orbit(scene, passages.restart_of(own.state))
+    found = vd.sensitivity(orbit, ["excitation.frequency"])
+    assert found.status == status
+    if status == "ok":
+        step = 1e-3 * away * omega
+        one, two = (
+            replace(gap, omega=omega + k * step).approach - replace(gap, omega=omega - k * step).approach
+            for k in (1, 2)
+        )  # fmt: skip
+        exact = 2 * math.pi * (8 * one - two) / (12 * step)
+        assert np.abs(found.impact_speed_derivative[:, 0]) == pytest.approx([abs(exact)] * 2, rel=1e-4)

@@ -41,6 +41,21 @@ def test_friction_begins_with_a_kink():
     assert "damper.0.friction = 0" in found.note
 
 
+def test_one_number_without_a_derivative_leaves_the_others():
+    """Friction begins with a kink; bounces of a small restitution end at once: one-sided, their sum is nothing."""
+    body = TABLES["damper"][0] | {"restitution": 0.0, "friction": 0.0}
+    orbit, _ = orbit_of(vd.Scene.of(TABLES | {"damper": [body]}, "scene"))
+    paths = ["damper.0.friction", "cavity.c.gap", "damper.0.restitution", "excitation.force"]
+    found = vd.sensitivity(orbit, paths)
+    assert found.status == "ok" and found.note.startswith("damper.0.friction: no derivative, ")
+    kink, gap, restitution, force = found.derivatives["amplitude_max"]
+    assert np.isnan(kink) and np.isnan(found.state_derivative[:, 0]).all() and not found.complete
+    assert restitution == pytest.approx(0.0, abs=1e-8)
+    # gap and force scale the motion together
+    assert 0.5 * gap + 0.08 * force == pytest.approx(orbit.amplitude_max, rel=1e-9)
+    assert found.impact_speed_derivative.shape == (len(found.impact_speed), 4)
+
+
 def test_motions_that_part():
     scene = vd.Scene.of(TABLES | {"damper": [TABLES["damper"][0] | {"restitution": 0.9, "friction": 0.0}],
                             "time": {"periods": 60, "transient": 50}}, "scene")  # fmt: skip

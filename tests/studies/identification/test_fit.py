@@ -155,3 +155,42 @@ def test_density_and_its_gradient():
     with pytest.raises(InputError, match="give noise there"):
         LogDensity(open_study)
     assert LogDensity(open_study, np.array([0.02]))(TRUTH) == pytest.approx(0.0, abs=1e-6)
+
+
+FREE = {
+    "cavity": [{"name": "c1", "gap": 1.6e-3}],
+    "damper": [{"cavity": "c1", "mass": 0.03, "friction": 0.0, "restitution": 0.7}],
+}
+
+
+def of_gap(frequency, amplitude, **changes):
+    """The density of a gap by amplitudes (n,) at frequencies (n,), Hz."""
+    measured = forced("sweep", frequency, amplitude, {}, noise=0.02)
+    return LogDensity(
+        IdentificationStudy(oscillator.scene(**FREE | changes), {"cavity.c1.gap": Number(1e-3, 2e-3)}, [measured])
+    )
+
+
+def test_a_density_depends_on_no_call_before():
+    """In the wide gap the body, at rest at the start, never meets a wall; motions of a narrow gap lead to impacts."""
+    frequency = np.array([15.2, 15.1])
+    density = of_gap(frequency, response(frequency)[0])
+    wide, narrow = [3.0 * response(15.2)[0]], [2.6 * response(15.2)[0]]
+    assert density(wide) == pytest.approx(0.0, abs=1e-4)
+    assert density(narrow) < -100.0
+    density.gradient(narrow)
+    assert density(wide) == pytest.approx(0.0, abs=1e-4)
+    assert density.gradient(wide) == pytest.approx([0.0], abs=1e-9)
+
+
+def test_a_density_of_motions_that_do_not_repeat_is_as_wide_as_their_means():
+    frequency, gap = np.array([15.5, 15.45]), 1.6 * response(15.5)[0]
+    base = oscillator.scene(**FREE).replace({"cavity.c1.gap": gap})
+    runs = [simulate(base.replace({"excitation.frequency": each})) for each in frequency.tolist()]
+    assert runs[0].classification == "non-periodic"
+    measured = 1.01 * np.array([run.amplitude_mean for run in runs])
+    errors = [(run.amplitude_mean_confidence or 0.0) / 1.96 / run.amplitude_mean for run in runs]
+    deviation = np.hypot(0.02, errors)
+    exact = np.sum(-0.5 * (np.log(1.01) / deviation) ** 2 - np.log(deviation / 0.02))
+    assert of_gap(frequency, measured)([gap]) == pytest.approx(exact, rel=1e-3)
+    assert deviation[0] > 1.001 * 0.02

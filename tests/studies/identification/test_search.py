@@ -24,6 +24,7 @@ from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.record import Identification, IdentificationStatus
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
+from vanedamp.studies.identification.summary import noise_texts
 from vanedamp.studies.identification.tables import Number, SearchTable
 from vanedamp.studies.workers import WorkerPool
 
@@ -107,6 +108,29 @@ def test_a_wrong_model_is_seen_by_its_misfit():
     record = identify(IdentificationStudy(oscillator.scene(), oscillator.NUMBERS, measured, QUICK))
     assert record.status is IdentificationStatus.MISFIT and record.test.chance < 1e-6
     assert record.notes[0].startswith("misfit: ")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "noise", "said"),
+    [
+        (1e3, None, "divided by 1000 all amplitudes fit (mm and m?)"),
+        (np.sqrt(2.0), 0.02, "divided by 1.414 all amplitudes fit"),
+        (2.0, 0.02, "divided by 2 all amplitudes fit"),
+        (np.where(FREQUENCY == 15.3, 4.0, 1.0), None, "% of the values"),
+    ],
+)  # fmt: skip
+def test_wrong_units_and_outliers_are_a_misfit(wrong, noise, said):
+    """Amplitudes of the closed form, with noise of 1 %, in millimetres, as rms, peak to peak, and with an outlier."""
+    rng = np.random.default_rng(5)
+    amplitude = response(FREQUENCY)[0] * np.exp(0.01 * rng.standard_normal(len(FREQUENCY)))
+    measured = [forced("sweep", FREQUENCY, wrong * amplitude, {}, noise=noise)]
+    number = {"structure.damping_ratio": oscillator.NUMBERS["structure.damping_ratio"]}
+    few = SearchTable(candidates=1, starts=1)
+    record = identify(IdentificationStudy(oscillator.scene(), number, measured, few))
+    assert record.status is IdentificationStatus.MISFIT
+    assert said in record.notes[0]
+    assert noise is not None or record.test.noise == record.deviation[0] > 0.2
+    assert noise is not None or any("by the residuals" in line for line in noise_texts(record))
 
 
 @pytest.fixture
