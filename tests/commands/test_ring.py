@@ -269,8 +269,14 @@ def test_mistuning_is_that_of_the_study(tmp_path, monkeypatch, capsys):
 
 def test_deviations_that_are_given_are_one_draw(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(DISK + MISTUNED.replace("std = 0.01", "pattern = [0.02, -0.02]"))
-    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1"]) == 0
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1", "--family", "2"]) == 0
     assert "1 draw of [mistuning]" in capsys.readouterr().out
+
+
+def test_a_family_that_hardly_moves_the_coordinate_has_no_amplification(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED)
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1", "--draws", "2"]) == BAD_INPUT
+    assert "'tip' has no peak of family 1 under order 1; take another family (--family)" in capsys.readouterr().err
 
 
 def test_pages_are_of_rings_only(tmp_path, capsys):
