@@ -91,6 +91,28 @@ def test_frequencies_and_amplification_of_deviating_blades(structure, size, basi
     assert one.sector == np.argmax(response.max(axis=0))
 
 
+@pytest.mark.parametrize("basis", ["modes", "sectors"])
+def test_one_blade_that_deviates(structure, basis):
+    """No frequency is below the whole ring's, the error is near the estimate, and by sectors it is small."""
+    ring, sector, part = (
+        ring_reduction(structure, 2, basis=basis),
+        ring_sector(structure),
+        structure.solid.part(["blade"]),
+    )
+    told = {each["stiffness"]: each["frequency"] for each in ring.provenance["estimate"]["one_sector"]}
+    assert all(f"at {size:+.0%}" in ring.provenance["estimate"]["sentence"] for size in told)
+    for size in (0.0, -0.1, -0.3, -0.5, -0.9, 1.0):
+        deviations = Deviations(size * np.eye(6)[2])
+        exact = modes_of(*whole_ring(sector, part, deviations)[:2], 12)[0]
+        errors = np.sqrt(np.sort(ring.model(deviations).squares)[:12] / exact) - 1.0
+        assert errors.min() > -1e-11
+        if size in told:
+            assert 0.2 * told[size] < errors.max() < 2.0 * told[size] or size == -0.9
+            assert errors.max() < 2.0 * told[size]
+        if basis == "sectors":
+            assert errors.max() < (1e-5 if size == -0.9 else 2e-6)
+
+
 def test_command(tmp_path: Path, capsys):
     case, output = tmp_path / "case.toml", tmp_path / "ring.h5"
     case.write_text(CASE)
