@@ -1,8 +1,8 @@
 """Error that a reduced ring makes of the frequencies of a ring of which one sector deviates, by its residual.
 
 A mode x of the reduced ring with the squared frequency q is one of the full one but for the force r = K x - q M x,
-which no motion of the reduced ring feels. Its frequency is too high by about r^T K^-1 r / (2 q), K^-1 at most that of the
-tuned ring over 1 + d where a part is softer by d. In waves around the ring, this takes one sector per nodal diameter.
+which no motion of the reduced ring feels. Its frequency is too high by about r^T K^-1 r / (2 q), K^-1 at most that of
+the tuned ring over 1 + d where a part is softer by d. In waves around the ring, this takes one sector per diameter.
 """
 
 from __future__ import annotations

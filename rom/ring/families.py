@@ -26,6 +26,16 @@ class Families:
     squares: np.ndarray
     momenta: np.ndarray
 
+    @property
+    def ascending(self) -> np.ndarray:
+        """Nodal diameters (m,) of the modes by ascending frequency, pairs together."""
+        return self.diameters[np.argsort(self.squares, kind="stable")]
+
+    def frequency_hz(self, diameter: int, number: int) -> float:
+        """Return the frequency of a family at a nodal diameter; nan if it has none there."""
+        own = self.squares[(self.diameters == diameter) & (self.numbers == number)]
+        return float(np.sqrt(own[0]) / (2.0 * np.pi)) if len(own) else np.nan
+
     def of_modes(self, shapes: np.ndarray) -> np.ndarray:
         """Return the families (k,) of shapes (n, k) of modal mass 1; -1: of none of them."""
         energies = (self.momenta @ shapes) ** 2

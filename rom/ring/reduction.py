@@ -49,9 +49,9 @@ def reduce_ring(
 
     The estimate of the error is `estimate` of the provenance: `receptance` of the interface, up to 1.5 times the first
     family's frequencies or the last family's lowest; `deviation`, of squared frequencies per squared deviation;
-    `one_sector`, of frequencies where the stiffness of one sector's part changes much. Raises RingError for an interface
-    of rigid or full patches, an unknown basis, one of sectors that rotates, and what ring_modes and the factorisation
-    raise.
+    `one_sector`, of frequencies where the stiffness of one sector's part changes much. Raises RingError for an
+    interface of rigid or full patches, an unknown basis, one of sectors that rotates, and what ring_modes and the
+    factorisation raise.
     """
     if basis not in BASES or (basis == "sectors" and centrifugal is not None):
         raise RingError(f'basis: expected one of {", ".join(BASES)}, "modes" of a ring that rotates; not {basis!r}')
@@ -88,13 +88,13 @@ def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
     centrifugal: sparse.csr_array | None, greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
-    """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
+    """Return the reduced ring of the waves of all diameters, and their fields (c, n); natural modes first, ascending."""
     fields = np.vstack([one.real_fields for one in waves])
     squares = np.concatenate([np.repeat(one.squares, 1 + one.problem.travels) for one in waves])
     diameters = np.repeat([one.problem.number for one in waves], [len(one.squares) * (1 + one.problem.travels)
                                                                   for one in waves])  # fmt: skip
     lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
-    order = np.argsort(~lead, kind="stable")
+    order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
     spinning = None
     if centrifugal is not None:
         blocks = [_hermitian(one.factor * one.fields.conj() @ (centrifugal @ one.fields.T), one) for one in waves]

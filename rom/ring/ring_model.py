@@ -31,7 +31,7 @@ class RingModel(Ring, Displayed):
     sectors, axis, point   N; (3,) unit vector and (3,) m: the axis; sector j is sector 0 turned by 2 pi j / N
     diameters              (n,) nodal diameters; pairs of waves are adjacent
     squares                (n,) squared angular frequencies of the tuned ring at standstill
-    modes                  number of natural modes, whole pairs
+    modes                  number of natural modes, whole pairs; `reduce_ring` sorts them by frequency
     interface              k labels in a sector
     selection              (k, n) their displacements in sector 0; directions, normals, positions, arms: as in
                            ReducedModel, of sector 0
