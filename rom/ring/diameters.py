@@ -197,6 +197,8 @@ class Statics:
 
         unit: the fields are scaled to unit energy first. Also returns the most energy that is left out.
         """
+        if not len(fields):
+            return fields, 0.0
         if unit:
             fields = fields / np.sqrt(np.einsum("ii->i", self.energies(fields, fields)).real)[:, None]
         inner = self.energies(known, known)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from scipy import sparse
@@ -131,6 +132,29 @@ def test_command(tmp_path: Path, capsys):
     assert "basis: expected one of modes, sectors" in capsys.readouterr().err
     assert main(["reduce", str(case), "-o", str(output), "--basis", "sectors", "--json", "-"]) == 0
     assert kind_of(output) == "ring-sectors"
+
+
+def test_a_group_that_deviates_of_an_abaqus_mesh(structure, tmp_path: Path):
+    """The blade has the default material and is named by [ring] only; the mesh of the generator, written as .inp."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE)
+    assert main(["mesh", str(case), "-o", str(tmp_path / "disk.msh")]) == 0
+    mesh = meshio.read(tmp_path / "disk.msh")
+    lines = ["*NODE", *(f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1))]
+    names = {(dimension, tag): name for name, (tag, dimension) in mesh.field_data.items()}
+    number = 0
+    for block, tags in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True):
+        for cell, tag in zip(block.data + 1, tags, strict=True):
+            if block.type == "hexahedron":
+                number += 1
+                lines += [f"*ELEMENT, TYPE=C3D8, ELSET={names[3, tag]}", ", ".join(map(str, (number, *cell)))]
+            elif (2, tag) in names:
+                lines += [f"*NSET, NSET={names[2, tag]}", ", ".join(map(str, cell))]
+    (tmp_path / "disk.inp").write_text("\n".join(lines) + "\n")
+    case.write_text('[mesh]\nfile = "disk.inp"\ndegree = 1\n' + CASE[CASE.index("[material") :])
+    deviations = Deviations(-0.3 * np.eye(6)[1])
+    found, expected = (ring_reduction(one, 2) for one in (assemble(Case.load(case)), structure))
+    np.testing.assert_allclose(found.model(deviations).squares, expected.model(deviations).squares, rtol=1e-6)
 
 
 @pytest.mark.parametrize(
