@@ -88,7 +88,7 @@ def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
     centrifugal: sparse.csr_array | None, greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
-    """Return the reduced ring of the waves of all diameters, and their fields (c, n); natural modes first, ascending."""
+    """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
     fields = np.vstack([one.real_fields for one in waves])
     squares = np.concatenate([np.repeat(one.squares, 1 + one.problem.travels) for one in waves])
     diameters = np.repeat([one.problem.number for one in waves], [len(one.squares) * (1 + one.problem.travels)
