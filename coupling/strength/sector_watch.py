@@ -52,7 +52,8 @@ class SectorTaker:
         peak = np.maximum(high - static, static - low)
         undamped, fixed = self._linear(scene)
         found, shown = peak.mean(axis=-1), str(scene.excitation.at).partition("@")[2]
-        exact, sampled = response.amplitude_mean, float(found[int(shown or 0) % len(found)])
+        exact = response.amplitude_mean_dynamic if response.static_deflection else response.amplitude_mean
+        sampled = float(found[int(shown or 0) % len(found)])
         error = abs(sampled - exact) / exact if exact > 0.0 else 0.0
         return SectorResponse(
             found, peak.max(axis=-1), undamped, fixed, self._impacts(scene, outcome, first), error, _tuned(scene)
