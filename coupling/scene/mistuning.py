@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -28,8 +28,8 @@ class Deviation:
     values: _List | None = None
     """deviation of every sector, from sector 0 on [-]"""
     file: str | None = None
-    """CSV file with the columns sector, deviation, or sector, frequency_hz of blade tests, which count relative to
-    their mean"""
+    """CSV file with the columns sector, deviation, or, of `frequency`, sector, frequency_hz of blade tests, which count
+    relative to their mean"""
     std: NonNegative | None = None
     """standard deviation of normal deviations, which the seed draws [-]"""
     pattern: _List | None = None
@@ -47,7 +47,12 @@ class Deviation:
         if self.std is not None:
             return self.std * np.random.default_rng(seed).standard_normal(sectors)
         if self.file is not None:
-            return np.array(_measured(self.file, sectors, key, file_stamp(self.file)))
+            measured = _measured(self.file, sectors, key, file_stamp(self.file))
+            if measured.frequencies and not key.endswith(".frequency"):
+                raise InputError(
+                    f"{key}.file: {self.file} has frequencies; give it as mistuning.frequency, or a column deviation"
+                )
+            return np.array(measured.values)
         if self.values is not None:
             if len(self.values) != sectors:
                 raise InputError(f"{key}.values: expected {sectors} deviations, one per sector, not {len(self.values)}")
@@ -79,6 +84,8 @@ class Mistuning:
     def __post_init__(self) -> None:
         if self.stiffness is not None and self.frequency is not None:
             raise ValueError("give one of stiffness and frequency")
+        if all(getattr(self, name) is None for name in DEVIATIONS):
+            raise ValueError("gives no deviations; add a key such as frequency = {std = 0.01}, or leave the table out")
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -111,8 +118,15 @@ class Mistuning:
         return Deviations(**found)
 
 
+class _Measured(NamedTuple):
+    """Deviations in a file, and whether they are of frequencies."""
+
+    values: tuple[float, ...]
+    frequencies: bool
+
+
 @lru_cache(maxsize=8)
-def _measured(file: str, sectors: int, key: str, _stamp: int) -> tuple[float, ...]:
+def _measured(file: str, sectors: int, key: str, _stamp: int) -> _Measured:
     """Return the deviations in a CSV file. Raises InputError."""
     frequencies = any("frequency_hz" in header for _, header in csv_table(file, InputError)[:1])
     column = "frequency_hz" if frequencies else "deviation"
@@ -130,4 +144,4 @@ def _measured(file: str, sectors: int, key: str, _stamp: int) -> tuple[float, ..
     if missing:
         raise InputError(f"{key}.file: {file}: sector {missing[0]} is missing; expected all of 0 to {sectors - 1}")
     values = np.array([found[sector] for sector in range(sectors)])
-    return tuple((values / values.mean() - 1.0 if frequencies else values).tolist())
+    return _Measured(tuple((values / values.mean() - 1.0 if frequencies else values).tolist()), frequencies)

@@ -51,8 +51,12 @@ class SectorTaker:
         static = mean.mean(axis=-1, keepdims=True) if response.static_deflection else 0.0
         peak = np.maximum(high - static, static - low)
         undamped, fixed = self._linear(scene)
+        found, shown = peak.mean(axis=-1), str(scene.excitation.at).partition("@")[2]
+        exact = response.amplitude_mean_dynamic if response.static_deflection else response.amplitude_mean
+        sampled = float(found[int(shown or 0) % len(found)])
+        error = abs(sampled - exact) / exact if exact > 0.0 else 0.0
         return SectorResponse(
-            peak.mean(axis=-1), peak.max(axis=-1), undamped, fixed, self._impacts(scene, outcome, first), _tuned(scene)
+            found, peak.max(axis=-1), undamped, fixed, self._impacts(scene, outcome, first), error, _tuned(scene)
         )
 
     def _linear(self, scene: Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -49,6 +49,22 @@ def ring_in_file(structure: Structure) -> RingFacts | None:
     return RingFacts(ring.sectors, ring.interface)
 
 
+def modes_of_ring(structure: Ring) -> tuple[int, np.ndarray] | None:
+    """Return the number of modes that a scene keeps of a ring, and the nodal diameters of all, ascending in frequency.
+
+    The number is that of `modes`, or the next one that parts no pair of waves of the tuned ring, which deviations
+    mix but do not part. None: all modes.
+    """
+    count = structure.modes
+    if not isinstance(count, int):
+        return None
+    ring, diameters = _ring_modes(structure.file, file_stamp(structure.file))
+    paired = (diameters > 0) & (2 * diameters < ring.sectors)
+    while count < len(diameters) and np.any(np.bincount(diameters[:count][paired[:count]]) % 2):
+        count += 1
+    return count, diameters
+
+
 def reduced_model(structure: Rom, speed: float) -> ReducedModel:
     """Return the reduced model of a structure at a speed of rotation (rad/s), with its number of modes.
 
@@ -109,6 +125,8 @@ def _restricted(structure: Rom, speed: float, _stamp: int) -> Restricted:
 def _cut(model: ReducedModel, structure: Rom) -> ReducedModel:
     """Return a model at its speed with the structure's number of modes."""
     modes = structure.modes
+    if isinstance(structure, Ring) and (whole_pairs := modes_of_ring(structure)) is not None:
+        modes = whole_pairs[0]
     if modes is None:
         return model
     assert isinstance(modes, int)
@@ -137,6 +155,13 @@ def _ring(file: str, _stamp: int) -> RingModel | SectorRing:
     from vanedamp.rom.ring.sector_ring import load_ring  # for scenes of rings only
 
     return load_ring(file)
+
+
+@lru_cache(maxsize=8)
+def _ring_modes(file: str, stamp: int) -> tuple[RingModel | SectorRing, np.ndarray]:
+    """Return a ring, and the nodal diameters of its natural modes by ascending frequency."""
+    ring = _ring(file, stamp)
+    return ring, ring.tuned_families().ascending[: ring.modes]
 
 
 @lru_cache(maxsize=8)

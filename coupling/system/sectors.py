@@ -18,8 +18,9 @@ from vanedamp.coupling.scene.excitation import Excitation, Harmonic
 from vanedamp.coupling.scene.load_pattern import Load
 from vanedamp.coupling.scene.repetition import Sectors
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Ring
 from vanedamp.coupling.scene.wear import WearPair
-from vanedamp.coupling.system.reduced_model_file import RingFacts, ring_in_file
+from vanedamp.coupling.system.reduced_model_file import RingFacts, modes_of_ring, ring_in_file
 from vanedamp.files.toml_input import InputError, nearest
 
 #: keys of a cavity that name labels
@@ -36,6 +37,7 @@ def unrolled(scene: Scene) -> Scene:
         return scene
     ring = ring_in_file(scene.structure)
     assert ring is not None
+    _check_diameters(scene, ring)
     if scene.added and any(cavity.sectors is not None for cavity in scene.cavity):
         table = next(iter(scene.added))
         raise InputError(
@@ -57,6 +59,34 @@ def unrolled(scene: Scene) -> Scene:
     )  # fmt: skip
 
 
+def _check_diameters(scene: Scene, ring: RingFacts) -> None:
+    """Raise InputError where a nodal diameter that the force excites is not among the modes that the scene keeps."""
+    from vanedamp.modal.cyclic import aliased  # imports scipy
+
+    structure, excitation = scene.structure, scene.excitation
+    assert isinstance(structure, Ring)
+    kept = modes_of_ring(structure)
+    if kept is None or excitation.distributed or excitation.base_acceleration is not None:
+        return
+    count, diameters = kept
+    wave, whose = excitation.travelling, "a force at one label excites"
+    excited = set(range(ring.sectors // 2 + 1))
+    if wave is not None:
+        orders = {1} | {sine.order for sine in excitation.harmonic}
+        whose = f"wave {wave} excites"
+        if structure.mistuning is None:
+            excited = {aliased(abs(order * wave), ring.sectors)[0] for order in orders}
+        else:
+            whose += " in a mistuned ring"
+    missing = excited - set(diameters[:count].tolist())
+    if missing:
+        least = max(int(np.argmax(diameters == diameter)) for diameter in missing) + 1
+        raise InputError(
+            f"structure.modes: {structure.modes} modes are without the nodal diameter {min(missing)}, which {whose}; "
+            f"give at least {least}"
+        )
+
+
 def sectors_of(given: Sectors, count: int, key: str) -> list[int]:
     """Return the numbers of the sectors that a table names of a ring with `count`. Raises InputError for others."""
     if isinstance(given, str):
@@ -70,15 +100,24 @@ def sectors_of(given: Sectors, count: int, key: str) -> list[int]:
     return found
 
 
-def _label(label: str, sector: int, ring: RingFacts, key: str) -> str:
-    """Return a label in a sector: one that names its sector as it is, "shroud@+1" in the next one."""
+def _label(label: str, sector: int, ring: RingFacts, key: str, repeated: bool = False) -> str:
+    """Return a label in a sector: one that names its sector as it is, unless repeated; "shroud@+1" in the next one."""
     name, mark, where = label.partition("@")
     if name not in ring.labels:
         raise InputError(f"{key}: no sector of the ring has a label '{name}'; {nearest(name, list(ring.labels))}")
-    if mark and where[:1] not in ("+", "-"):
-        return label
-    step = int(where) if where[1:].isdecimal() else 0
-    return f"{name}@{(sector + step) % ring.sectors}"
+    if not mark:
+        return f"{name}@{sector}"
+    relative = where[:1] in ("+", "-")
+    if not (where[1:] if relative else where).isdecimal():
+        raise InputError(f"{key}: expected '{name}', '{name}@3' or '{name}@+1', not '{label}'")
+    if relative:
+        return f"{name}@{(sector + int(where)) % ring.sectors}"
+    if repeated:
+        raise InputError(
+            f"{key}: '{label}' is the same place for all of several sectors; give '{name}', each sector's own, or "
+            f"'{name}@+1' in the next one"
+        )
+    return label
 
 
 def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[tuple[int, Damper]]]:
@@ -93,9 +132,10 @@ def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[t
             bodies += row
             continue
         draws = _Draws(cavity, index, len(row), ring.sectors)
-        for sector in sectors_of(cavity.sectors, ring.sectors, f"cavity[{index}].sectors"):
+        sectors = sectors_of(cavity.sectors, ring.sectors, f"cavity[{index}].sectors")
+        for sector in sectors:
             own: dict[str, Any] = {
-                side: _label(label, sector, ring, f"cavity[{index}].{side}")
+                side: _label(label, sector, ring, f"cavity[{index}].{side}", len(sectors) > 1)
                 for side in _SURFACES
                 if (label := getattr(cavity, side)) is not None
             }
@@ -145,9 +185,10 @@ def _repeated(
         if entry.sectors is None:
             found.append((number, entry))
             continue
-        for sector in sectors_of(entry.sectors, ring.sectors, f"{table}[{number}].sectors"):
+        sectors = sectors_of(entry.sectors, ring.sectors, f"{table}[{number}].sectors")
+        for sector in sectors:
             own = {
-                key: _label(label, sector, ring, f"{table}[{number}].{key}")
+                key: _label(label, sector, ring, f"{table}[{number}].{key}", len(sectors) > 1)
                 for key in keys
                 if (label := getattr(entry, key) or (shown if key == "at" else None)) is not None
             }

@@ -92,7 +92,7 @@ def ring_waves(
     return Bases(waves, {
         "receptance": receptance, "deviation": left, "frequencies_hz": [0.0, top / (2.0 * np.pi)],
         "sentence": f"{count} natural modes of the ring: estimated error {100 * receptance:.2g} % of the "
-        f"interface's receptance, {100 * left:.1g} % of squared frequencies per squared deviation",
+        "interface's receptance",
     })  # fmt: skip
 
 
@@ -181,6 +181,15 @@ class Statics:
         """Return fields^H M others over the ring."""
         return self.own(self.factor * fields.conj() @ (self._mass @ others.T))
 
+    def residual_energies(self, waves: np.ndarray, squares: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return r^H K^-1 r over the ring (p,), of r = K z - q M z + f of waves z (p, n), squares q and forces f.
+
+        The waves are sums over sectors, so that the forces may act on one of them.
+        """
+        residual = (self._stiffness @ waves.T - squares * (self._mass @ waves.T)).T + forces
+        found = self.response(self.own(residual))
+        return np.asarray(np.einsum("pn,pn->p", residual.conj(), found).real / self.factor)
+
     def independent(
         self, fields: np.ndarray, known: np.ndarray, least: float, unit: bool = False
     ) -> tuple[np.ndarray, float]:
@@ -188,6 +197,8 @@ class Statics:
 
         unit: the fields are scaled to unit energy first. Also returns the most energy that is left out.
         """
+        if not len(fields):
+            return fields, 0.0
         if unit:
             fields = fields / np.sqrt(np.einsum("ii->i", self.energies(fields, fields)).real)[:, None]
         inner = self.energies(known, known)

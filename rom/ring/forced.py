@@ -22,21 +22,24 @@ from vanedamp.rom.ring.placement import sector_label
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 
-# half-bandwidths around every resonance at which a response is sampled, and halvings of the bracket of a peak
+# half-bandwidths around every resonance at which a response is sampled, halvings of the bracket of a peak, and the
+# fraction of a peak that the nearest sample has at least
 _AROUND = np.array([-4.0, -2.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
 _ROUNDS = 16
+_NEAR = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Forced:
     """Response of N sectors over the frequency.
 
-    poles (p,) rad/s; residues (p, N); residual (N,) m: per force F of 1 N.
+    poles (p,) rad/s; residues (p, N); residual (N,) m: per force F of 1 N; modes (p,): the natural mode of each pole.
     """
 
     poles: np.ndarray
     residues: np.ndarray
     residual: np.ndarray
+    modes: np.ndarray
 
     def __post_init__(self) -> None:
         for name in ("poles", "residues", "residual"):
@@ -44,30 +47,49 @@ class Forced:
 
     def at(self, frequencies_hz: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f, N), m/N."""
-        s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
-        return np.asarray((1.0 / (s[:, None] - self.poles)) @ self.residues + self.residual)
+        return self._parts(frequencies_hz, slice(None)) + self.residual
 
-    def peaks(self, low_hz: float, high_hz: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest amplitude (N,), m/N, of every sector between two frequencies, and where (N,), Hz."""
+    def peaks(self, low_hz: float, high_hz: float, modes: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the largest peak (N,), m/N, of every sector between two frequencies, and where (N,), Hz.
+
+        A peak is a local maximum, so that none is at an end of the band; nan for a sector without one.
+
+        modes: some natural modes; only peaks count to which they contribute more than all others.
+        """
         natural, width = np.abs(self.poles), np.maximum(-self.poles.real, 1e-6 * np.abs(self.poles))
         near = (natural[:, None] + width[:, None] * _AROUND).ravel() / (2.0 * np.pi)
         grid = np.unique(np.r_[low_hz, high_hz, near[(near > low_hz) & (near < high_hz)]])
-        best = np.argmax(np.abs(self.at(grid)), axis=0)
-        low, high = grid[np.maximum(best - 1, 0)], grid[np.minimum(best + 1, len(grid) - 1)]
-        for _ in range(_ROUNDS):  # the amplitude rises and falls once between neighbours of the largest sample
+        response = self.at(grid)
+        sizes = np.abs(response)
+        tops = np.zeros(sizes.shape, bool)
+        tops[1:-1] = (sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])
+        if modes is not None:
+            own = self._parts(grid, np.isin(self.modes, modes))
+            tops &= np.abs(own) > np.abs(response - own)
+        # the largest sample may be of a lower peak, but not by much
+        tops &= sizes > _NEAR * np.where(tops, sizes, 0.0).max(axis=0)
+        place, sector = np.nonzero(tops)
+        low, high, every = grid[place - 1], grid[place + 1], np.arange(len(place))
+        for _ in range(_ROUNDS):  # the amplitude rises and falls once between neighbours of a local maximum
             points = np.linspace(low, high, 5)
-            best = np.clip(np.argmax(self._own(points), axis=0), 1, 3)
-            sector = np.arange(points.shape[1])
-            low, high = points[best - 1, sector], points[best + 1, sector]
-        points = np.stack([low, 0.5 * (low + high), high])
-        values = self._own(points)
-        best = np.argmax(values, axis=0)
-        return values.max(axis=0), points[best, np.arange(points.shape[1])]
+            best = np.clip(np.argmax(self._own(points, sector), axis=0), 1, 3)
+            low, high = points[best - 1, every], points[best + 1, every]
+        middle = 0.5 * (low + high)
+        largest, where = np.full(sizes.shape[1], np.nan), np.full(sizes.shape[1], np.nan)
+        values = self._own(middle[None], sector)[0]
+        for one in np.argsort(values, kind="stable"):
+            largest[sector[one]], where[sector[one]] = values[one], middle[one]
+        return largest, where
 
-    def _own(self, points: np.ndarray) -> np.ndarray:
-        """Return amplitudes (q, N) of every sector at its own frequencies (q, N)."""
-        terms = self.residues / (2j * np.pi * points[:, None, :] - self.poles[:, None])
-        return np.abs(terms.sum(axis=1) + self.residual)
+    def _parts(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
+        """Return what some poles contribute to the complex amplitudes (f, N)."""
+        s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
+        return np.asarray((1.0 / (s[:, None] - self.poles[poles])) @ self.residues[poles])
+
+    def _own(self, points: np.ndarray, sector: np.ndarray) -> np.ndarray:
+        """Return amplitudes (q, c) at frequencies (q, c), each column of a sector (c,)."""
+        terms = self.residues[:, sector] / (2j * np.pi * points[:, None, :] - self.poles[:, None])
+        return np.abs(terms.sum(axis=1) + self.residual[sector])
 
 
 def forced_response(
@@ -129,9 +151,10 @@ class Natural(NamedTuple):
 
 
 class OfModel(NamedTuple):
-    """The same of a ring's reduced model, in the modes that it keeps."""
+    """The same of a ring by sectors: its reduced model, in the modes that it keeps, and their shapes (n, m)."""
 
     model: ReducedModel
+    shapes: np.ndarray
 
     @property
     def squares(self) -> np.ndarray:
@@ -153,7 +176,7 @@ def natural_of(
     deviations = deviations or Deviations()
     if isinstance(ring, SectorRing):
         # a family above those of the model, too, which responds to the same forces
-        return OfModel(ring.model(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
+        return OfModel(*ring.natural(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
     mass, stiffness = ring.matrices(deviations, speed)
     squares, shapes = linalg.eigh(stiffness, mass)
     if squares[0] <= 0.0:
@@ -174,11 +197,12 @@ def _superposed(
         root = np.sqrt(0.25 * diagonal**2 - squares + 0j)
         poles = np.concatenate([-0.5 * diagonal + root, -0.5 * diagonal - root])
         shares = np.concatenate([load / (2.0 * root), -load / (2.0 * root)])
-        return Forced(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual)
+        return Forced(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual, np.tile(np.arange(count), 2))
     first = np.block([[np.zeros((count, count)), np.eye(count)], [-np.diag(squares), -damping]])
     poles, vectors = linalg.eig(first)
     shares = np.linalg.solve(vectors, np.concatenate([np.zeros(count), load]))
-    return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual)
+    modes = np.argmax(np.abs(vectors[:count]), axis=0)
+    return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual, modes)
 
 
 def load_of(ring: RingModel, order: int, label: str) -> np.ndarray:

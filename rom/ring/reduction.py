@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import linalg, sparse
 from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.rom.bases.projection import Factorize, superlu
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.ring.deviation_error import SIZES, deviation_errors
 from vanedamp.rom.ring.deviations import RingError
 from vanedamp.rom.ring.diameters import DiameterWaves, Part, ring_waves
 from vanedamp.rom.ring.ring_model import RingModel
@@ -45,10 +47,11 @@ def reduce_ring(
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
 
-    The estimate of the error is `estimate` of the provenance: of the interface's receptance, up to 1.5 times the first
-    family's frequencies or the last family's lowest, and of squared frequencies per squared deviation. Raises RingError
-    for an interface of rigid or full patches, an unknown basis, one of sectors that rotates, and what ring_modes and
-    the factorisation raise.
+    The estimate of the error is `estimate` of the provenance: `receptance` of the interface, up to 1.5 times the first
+    family's frequencies or the last family's lowest; `deviation`, of squared frequencies per squared deviation;
+    `one_sector`, of frequencies where the stiffness of one sector's part changes much. Raises RingError for an
+    interface of rigid or full patches, an unknown basis, one of sectors that rotates, and what ring_modes and the
+    factorisation raise.
     """
     if basis not in BASES or (basis == "sectors" and centrifugal is not None):
         raise RingError(f'basis: expected one of {", ".join(BASES)}, "modes" of a ring that rotates; not {basis!r}')
@@ -64,29 +67,41 @@ def reduce_ring(
         "matrices": dict(sector.matrices.provenance), "basis": basis, "estimate": estimate,
         "versions": {"numpy": np.__version__, "scipy": scipy.__version__},
     }  # fmt: skip
-    if basis == "sectors":
-        return sector_ring(sector, interface, part, waves, factorize, provenance)
-    return _model(sector, interface, part, waves, centrifugal, greatest_speed, provenance)
+    made: tuple[RingModel | SectorRing, np.ndarray] = (
+        sector_ring(sector, interface, part, waves, factorize, provenance)
+        if basis == "sectors"
+        else _model(sector, interface, part, waves, centrifugal, greatest_speed, provenance)
+    )
+    ring, fields = made
+    errors = deviation_errors(ring, sector, fields, part, factorize)
+    told = ", ".join(f"{100 * error:.1g} % at {size:+.0%}" for size, error in zip(SIZES, errors, strict=True))
+    estimate |= {
+        "one_sector": [{"stiffness": size, "frequency": error} for size, error in zip(SIZES, errors, strict=True)],
+        "sentence": f"{estimate['sentence']}; of frequencies, if one sector's stiffness changes, {told}",
+    }
+    if basis == "sectors":  # what the waves leave out is in the sectors' own motions
+        estimate["deviation"] = 2.0 * errors[0] / SIZES[0] ** 2
+    return replace(ring, provenance=provenance | {"estimate": estimate})
 
 
 def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
     centrifugal: sparse.csr_array | None, greatest_speed: float, provenance: dict[str, Any],
-) -> RingModel:  # fmt: skip
-    """Return the reduced ring of the waves of all diameters: natural modes first."""
+) -> tuple[RingModel, np.ndarray]:  # fmt: skip
+    """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
     fields = np.vstack([one.real_fields for one in waves])
     squares = np.concatenate([np.repeat(one.squares, 1 + one.problem.travels) for one in waves])
     diameters = np.repeat([one.problem.number for one in waves], [len(one.squares) * (1 + one.problem.travels)
                                                                   for one in waves])  # fmt: skip
     lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
-    order = np.argsort(~lead, kind="stable")
+    order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
     spinning = None
     if centrifugal is not None:
         blocks = [_hermitian(one.factor * one.fields.conj() @ (centrifugal @ one.fields.T), one) for one in waves]
         spinning = linalg.block_diag(*blocks)[np.ix_(order, order)]
     fields, matrices = fields[order], sector.matrices
     translations = matrices.rigid_translations()
-    return RingModel(
+    ring = RingModel(
         sectors=sector.sectors, axis=sector.axis, point=sector.point, diameters=diameters[order],
         squares=squares[order], modes=int(lead.sum()), interface=interface.labels,
         selection=(fields @ interface.vectors).T,
@@ -96,6 +111,7 @@ def _model(
         damping_ratio=matrices.damping_ratio, centrifugal_stiffness=spinning, greatest_speed=greatest_speed,
         provenance=provenance,
     )  # fmt: skip
+    return ring, fields
 
 
 def _hermitian(matrix: np.ndarray, one: DiameterWaves) -> np.ndarray:

@@ -16,6 +16,7 @@ from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.families import Families
 from vanedamp.rom.ring.placement import SHARED, Ring
 from vanedamp.rom.ring.waves import Waves
 
@@ -30,7 +31,7 @@ class RingModel(Ring, Displayed):
     sectors, axis, point   N; (3,) unit vector and (3,) m: the axis; sector j is sector 0 turned by 2 pi j / N
     diameters              (n,) nodal diameters; pairs of waves are adjacent
     squares                (n,) squared angular frequencies of the tuned ring at standstill
-    modes                  number of natural modes, whole pairs
+    modes                  number of natural modes, whole pairs; `reduce_ring` sorts them by frequency
     interface              k labels in a sector
     selection              (k, n) their displacements in sector 0; directions, normals, positions, arms: as in
                            ReducedModel, of sector 0
@@ -146,6 +147,25 @@ class RingModel(Ring, Displayed):
                 raise RingError(f"speed: the ring holds up to {self.greatest_speed:.6g} rad/s, not at {speed:.6g}")
             stiffness = stiffness + speed**2 * self.centrifugal_stiffness
         return mass, stiffness
+
+    def tuned_families(self, speed: float = 0.0) -> Families:
+        """Return the natural modes of the tuned ring at a speed, rad/s, diameter by diameter. Raises RingError."""
+        mass, stiffness = self.matrices(Deviations(), speed)
+        numbers, squares, momenta, diameters = [], [], [], []
+        for diameter in np.unique(self.diameters):
+            own = np.flatnonzero(self.diameters == diameter)
+            count = int(np.count_nonzero(own < self.modes))
+            found, shapes = linalg.eigh(
+                stiffness[np.ix_(own, own)], mass[np.ix_(own, own)], subset_by_index=[0, count - 1]
+            )
+            paired = 0 < 2 * diameter < self.sectors
+            numbers.append(np.arange(count) // (2 if paired else 1))
+            squares.append(found)
+            momenta.append((mass[:, own] @ shapes).T)
+            diameters.append(np.full(count, diameter))
+        return Families(
+            np.concatenate(numbers), np.concatenate(diameters), np.concatenate(squares), np.concatenate(momenta)
+        )
 
     def added_damping(self, deviations: Deviations) -> np.ndarray | None:
         """Return the damping (n, n) that deviations add to that of the ratio; None without such deviations.

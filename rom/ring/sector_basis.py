@@ -1,8 +1,9 @@
 """Component modes of a sector: motions of its faces, and inner motions that leave these at rest.
 
-All are taken from the waves of the ring (rom.ring.diameters), so that they hold these: the faces' motions, their static
-continuation into the sector, and what of the waves remains, as far as it has strain energy. As in Craig-Bampton's
-method, sectors that deviate are joined at their faces, and each has inner motions of its own.
+From the waves of the ring (rom.ring.diameters), so that they hold these, come the faces' motions, their static
+continuation into the sector, and what of the waves remains with the faces at rest. Modes of a sector whose faces are at
+rest and whose part is much softer or stiffer hold what large deviations add. As in Craig-Bampton's method, sectors are
+joined at their faces, where inner motions are zero, so that no reduced frequency is below the true one.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.cyclic import CyclicSector
-from vanedamp.rom.bases.projection import Factorize
+from vanedamp.rom.bases.projection import Factorize, lowest_modes
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.ring.deviations import RingError
 from vanedamp.rom.ring.diameters import DiameterWaves, Part
@@ -22,16 +23,18 @@ from vanedamp.rom.ring.sector_ring import SectorRing
 
 # fraction of the strain energy of the waves that motions of a sector may leave out
 _LEFT_OUT = 1e-10
+# deviations of the part's stiffness whose modes are inner motions
+_SIZES = (-0.9, -0.5, 1.0)
 
 
 def sector_ring(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves], factorize: Factorize,
     provenance: dict[str, Any],
-) -> SectorRing:  # fmt: skip
-    """Return the ring of a sector's component modes. Raises RingError for nodes on the axis."""
+) -> tuple[SectorRing, np.ndarray]:  # fmt: skip
+    """Return the ring of component modes, and their fields (s, n). Raises RingError for nodes on the axis."""
     if np.any(sector.low == sector.high):
         raise RingError('basis: nodes on the axis belong to all sectors; take basis = "modes"')
-    faces, inner = _component_modes(sector, waves, factorize)
+    faces, inner = _component_modes(sector, part, waves, factorize)
     fields, matrices = np.vstack([*faces, inner]), sector.matrices
     translations = matrices.rigid_translations()
     couplers = sector.couplers()
@@ -42,7 +45,7 @@ def sector_ring(
     def projected(matrix: sparse.csr_array) -> np.ndarray:
         return np.asarray(fields @ (matrix @ fields.T))
 
-    return SectorRing(
+    ring = SectorRing(
         sectors=sector.sectors, axis=sector.axis, point=sector.point, faces=len(faces[0]),
         modes=sum(one.modes * (1 + one.problem.travels) for one in waves),
         stiffness=projected(matrices.stiffness), mass=projected(matrices.mass),
@@ -54,10 +57,11 @@ def sector_ring(
         base_load=fields @ (matrices.mass @ translations), part_load=fields @ (part.mass @ translations),
         damping_ratio=matrices.damping_ratio, provenance=provenance,
     )  # fmt: skip
+    return ring, fields
 
 
 def _component_modes(
-    sector: CyclicSector, waves: Sequence[DiameterWaves], factorize: Factorize
+    sector: CyclicSector, part: Part, waves: Sequence[DiameterWaves], factorize: Factorize
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Return motions (f, n) of the low face, the same of the high face, and inner motions (i, n)."""
     stiffness = sector.matrices.stiffness
@@ -75,16 +79,39 @@ def _component_modes(
         found[:, inside] = -factors.solve(np.asarray(stiffness[inside] @ found.T)).T
         return found
 
-    shapes = _own(fields[:, low])
+    least = _LEFT_OUT / sector.sectors
+    leading = continued(low, fields[:, low])
+    shapes = _independent(leading, stiffness, least) @ fields[:, low]
     turned = (shapes.reshape(len(shapes), len(sector.low), 3) @ sector.turn().T).reshape(shapes.shape)
-    faces = continued(low, shapes), continued(high, turned)
-    rest = fields - (fields[:, low] @ shapes.T) @ faces[0] - (fields[:, high] @ turned.T) @ faces[1]
-    energies, turns = linalg.eigh(rest @ (stiffness @ rest.T))
-    own = energies > _LEFT_OUT / sector.sectors
-    return faces, (turns[:, own] / np.sqrt(energies[own])).T @ rest
+    # without all of a face's motion, also what its shapes leave out: else the faces of neighbours would part
+    rest = fields - leading - continued(high, fields[:, high])
+    rest[:, np.concatenate([low, high])] = 0.0
+    own = [rest, *(_fixed_modes(sector, part, size, inside, max(one.modes for one in waves) + 1, factorize)
+                   for size in _SIZES)]  # fmt: skip
+    inner = np.vstack(own)
+    return (continued(low, shapes), continued(high, turned)), _independent(inner, stiffness, least) @ inner
 
 
-def _own(motions: np.ndarray) -> np.ndarray:
-    """Return orthonormal motions (f, p) that span those of a face."""
-    _, sizes, shapes = np.linalg.svd(motions, full_matrices=False)
-    return shapes[sizes > np.sqrt(_LEFT_OUT) * sizes.max(initial=0.0)]
+def _fixed_modes(
+    sector: CyclicSector, part: Part, size: float, inside: np.ndarray, count: int, factorize: Factorize
+) -> np.ndarray:
+    """Return the lowest modes (m, n) of a sector that deviates, its faces at rest, of unit strain energy."""
+    stiffness, mass = (
+        matrix[inside][:, inside]
+        for matrix in (sector.matrices.stiffness + size * part.stiffness, sector.matrices.mass)
+    )
+    count = min(count, len(inside))
+    squares, shapes = lowest_modes(
+        mass, count, factorize(stiffness).solve, len(inside), 0.0,
+        lambda: linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, count - 1]),
+    )  # fmt: skip
+    found = np.zeros((count, sector.matrices.size))
+    found[:, inside] = shapes.T / np.sqrt(squares)[:, None]
+    return found
+
+
+def _independent(fields: np.ndarray, stiffness: sparse.csr_array, least: float) -> np.ndarray:
+    """Return the combinations (q, p) of fields (p, n) of more strain energy than the least, of unit energy."""
+    energies, turns = linalg.eigh(fields @ (stiffness @ fields.T))
+    own = energies > least
+    return np.asarray((turns[:, own] / np.sqrt(energies[own])).T)

@@ -17,6 +17,7 @@ from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.bases.projection import lowest_modes, superlu
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
+from vanedamp.rom.ring.families import Families
 from vanedamp.rom.ring.placement import SHARED, Ring
 from vanedamp.rom.ring.ring_model import RingModel
 
@@ -97,6 +98,12 @@ class SectorRing(Ring, Displayed):
         In its own lowest natural modes, so many or `modes` of the ring, with residual flexibility. Raises RingError,
         also for a speed.
         """
+        return self.natural(deviations, speed, modes)[0]
+
+    def natural(
+        self, deviations: Deviations | None = None, speed: float | None = None, modes: int | None = None
+    ) -> tuple[ReducedModel, np.ndarray]:
+        """Return that model, and the shapes (size, m) of its modes in the coordinates of the ring. Raises RingError."""
         count = self.modes if modes is None else modes
         if speed:
             raise RingError('speed: the ring is reduced sector by sector, at standstill; take basis = "modes"')
@@ -114,7 +121,48 @@ class SectorRing(Ring, Displayed):
             moved = shapes.T @ (self._summed(extra[:, None, None] * self.part_stiffness) @ shapes)
             added = symmetric_part(share[:, None] * moved * share)
         load = self._load(deviations.of("mass", self.sectors))
-        return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added)
+        return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added), shapes
+
+    def tuned_families(self, speed: float = 0.0) -> Families:
+        """Return the natural modes of the tuned ring diameter by diameter, and a family above those of `model`.
+
+        Raises RingError for a speed.
+        """
+        if speed:
+            raise RingError('speed: the ring is reduced sector by sector, at standstill; take basis = "modes"')
+        own = len(self.mass) - self.faces
+        count = min(-(-self.modes // self.sectors) + 1, own)
+        mass = self.matrices(Deviations())[1]
+        numbers, squares, shapes, diameters = [], [], [], []
+        for diameter in range(self.sectors // 2 + 1):
+            found, waves = linalg.eigh(*self.of_diameter(diameter), subset_by_index=[0, count - 1])
+            around = np.exp(2j * np.pi / self.sectors * (diameter * np.arange(self.sectors) % self.sectors))
+            fields = np.einsum("j,sm->mjs", around, waves).reshape(count, self.size)
+            paired = 0 < 2 * diameter < self.sectors
+            parts = [fields.real, fields.imag] if paired else [fields.real]
+            shapes.append(np.concatenate(parts) * np.sqrt(len(parts) / self.sectors))
+            numbers.append(np.tile(np.arange(count), len(parts)))
+            squares.append(np.tile(found, len(parts)))
+            diameters.append(np.full(len(numbers[-1]), diameter))
+        return Families(
+            np.concatenate(numbers), np.concatenate(diameters), np.concatenate(squares),
+            np.asarray((mass @ np.concatenate(shapes).T).T),
+        )  # fmt: skip
+
+    def of_diameter(self, diameter: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return stiffness and mass of a sector of the tuned ring in a wave of a nodal diameter, Hermitian.
+
+        Of s - f complex coordinates: the face low and the inner motions; real for diameters 0 and N/2.
+        """
+        phase = np.exp(2j * np.pi * diameter / self.sectors)
+        if 2 * diameter % self.sectors == 0:
+            phase = phase.real.round()
+        face, inner = np.eye(self.faces), np.eye(len(self.mass) - 2 * self.faces)
+        wave = linalg.block_diag(np.vstack([face, phase * face]), inner)
+        stretch = (self.spring_high - phase * self.spring_low) @ wave
+        stiffness = wave.conj().T @ self.stiffness @ wave
+        stiffness = stiffness + stretch.conj().T @ (self.spring_stiffness[:, None] * stretch)
+        return stiffness, wave.conj().T @ self.mass @ wave
 
     def matrices(self, deviations: Deviations) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Return stiffness and mass of the whole ring, sparse."""

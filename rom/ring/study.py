@@ -14,6 +14,7 @@ from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
+from vanedamp.rom.ring.families import Families
 from vanedamp.rom.ring.forced import Forced, Natural, OfModel, natural_of, participation
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
@@ -22,7 +23,7 @@ from vanedamp.rom.ring.whitehead import whitehead_bound
 _KIND = "mistuning"
 #: probabilities of the quantiles of a study
 PROBABILITIES = (0.5, 0.95, 0.99)
-# relative margins of the band around the frequencies of a family
+# relative margins of the band about the frequencies of a family
 _MARGIN = 0.05
 _ARRAYS = {
     "orders": (("order",), "1"),
@@ -78,7 +79,7 @@ class MistuningStudy(Displayed):
 
     sectors, label                 N; interface label where forces act and responses are taken
     orders, seeds                  (o,) engine orders; (s,) seeds of the draws
-    band_hz                        (2,) frequencies between which peaks count
+    band_hz                        (2,) frequencies between which peaks count: of all draws
     tuned_amplitude                (o,) m/N, largest of the tuned ring; tuned_frequency_hz (o,): where
     amplification                  (o, s) largest amplitude of a sector over that
     peak_frequency_hz              (o, s), worst_sector (o, s): where it is
@@ -177,15 +178,14 @@ def amplification(
 ) -> Amplification:  # fmt: skip
     """Return the amplification of a ring with deviations under an engine order at an interface label.
 
-    band_hz: two frequencies between which the peaks count (default: around the first family); speed: rad/s, of a ring
-    that rotates. The response of a RingModel includes all of its waves. Raises RingError.
+    band_hz: two frequencies between which the peaks count (default: peaks of the first family, wherever deviations move
+    its modes); speed: rad/s, of a ring that rotates. The response of a RingModel includes all of its waves. Raises
+    RingError, also where the response is larger at an end of the band than at any peak in it.
     """
     _check_damped(ring)
-    tuned = natural_of(ring, speed=speed)
-    low, high = _band(ring, tuned, 0) if band_hz is None else band_hz
-    reference = float(tuned.forced(order, label).peaks(low, high)[0].max())
-    _check_reference(reference, order, label)
-    return _amplified(natural_of(ring, deviations, speed).forced(order, label), reference, low, high)
+    search = _search(ring, 0, band_hz, speed)
+    tuned = _Peak.of(search, natural_of(ring, speed=speed), order, label)
+    return _amplified(_Peak.of(search, natural_of(ring, deviations, speed), order, label), tuned)
 
 
 def mistuning_study(
@@ -205,7 +205,7 @@ def mistuning_study(
     table    draws them (`Mistuning`)
     seeds    of the draws, or their number, from the table's seed on
     label    interface label of force and response (default: the first)
-    family   around whose frequencies the peaks count; or band_hz, two frequencies
+    family   whose peaks count, wherever deviations move its modes; or band_hz, two frequencies between which they do
     points   of the frequencies of the first draw's responses
     report   called with the number of draws done, and of all
 
@@ -217,47 +217,107 @@ def mistuning_study(
     if not numbers or not len(orders):
         raise RingError("seeds: expected at least one draw, and one engine order")
     _check_damped(ring)
-    tuned = natural_of(ring, speed=speed)
-    low, high = _band(ring, tuned, family) if band_hz is None else band_hz
+    search = _search(ring, family, band_hz, speed)
     waves = [-order if speed else order for order in orders]
-    nominal = [tuned.forced(wave, label) for wave in waves]
-    peaks = [one.peaks(low, high) for one in nominal]
-    largest = [int(np.argmax(amplitudes)) for amplitudes, _ in peaks]
-    references = [float(amplitudes[place]) for (amplitudes, _), place in zip(peaks, largest, strict=True)]
-    for order, reference in zip(orders, references, strict=True):
-        _check_reference(reference, order, label)
-    frequencies = np.linspace(low, high, points)
-    first: tuple[Deviations, list[Forced]] | None = None
-    found = []
+    natural = natural_of(ring, speed=speed)
+    nominal = [_Peak.of(search, natural, wave, label) for wave in waves]
+    bands, first, found = [search.band(natural)], None, []
     for done, seed in enumerate(numbers):
         if report is not None:
             report(done, len(numbers))
         deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
         natural = natural_of(ring, deviations, speed)
-        responses = [natural.forced(wave, label) for wave in waves]
-        first = first or (deviations, responses)
-        found.append([_amplified(one, top, low, high) for one, top in zip(responses, references, strict=True)])
+        try:
+            peaks = [_Peak.of(search, natural, wave, label) for wave in waves]
+        except RingError as error:
+            raise RingError(f"{error} (seed {seed})") from error
+        first = first or (deviations, peaks)
+        bands.append(search.band(natural))
+        found.append([_amplified(one, tuned) for one, tuned in zip(peaks, nominal, strict=True)])
     assert first is not None
+    drawn, peaks = first
     columns = np.array(found, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
-    drawn, responses = first
+    band = np.array([min(low for low, _ in bands), max(high for _, high in bands)])
+    frequencies = np.linspace(band[0], band[1], points)
     return MistuningStudy(
         sectors=ring.sectors, label=label, orders=np.array(orders), seeds=np.array(numbers),
-        band_hz=np.array([low, high]), tuned_amplitude=np.array(references),
-        tuned_frequency_hz=np.array([at[place] for (_, at), place in zip(peaks, largest, strict=True)]),
+        band_hz=band, tuned_amplitude=np.array([one.amplitude for one in nominal]),
+        tuned_frequency_hz=np.array([one.frequency_hz for one in nominal]),
         amplification=columns[0], worst_sector=columns[1], peak_frequency_hz=columns[2], participation=columns[4],
-        frequencies_hz=frequencies, amplitude=np.abs([one.at(frequencies) for one in responses]),
-        amplitude_tuned=np.abs([one.at(frequencies)[:, 0] for one in nominal]),
+        frequencies_hz=frequencies, amplitude=np.abs([one.response.at(frequencies) for one in peaks]),
+        amplitude_tuned=np.abs([one.response.at(frequencies)[:, 0] for one in nominal]),
         **{name: drawn.of(name, ring.sectors) for name in ("stiffness", "mass", "damping")},
         provenance={"ring": dict(ring.provenance), "speed": speed},
     )  # fmt: skip
 
 
-def _band(ring: RingModel | SectorRing, tuned: Natural | OfModel, family: int) -> tuple[float, float]:
-    """Return the edges of the band, Hz, around a family's frequencies, of families apart from each other."""
-    own = np.sqrt(tuned.squares[family * ring.sectors : (family + 1) * ring.sectors]) / (2.0 * np.pi)
-    if len(own) < ring.sectors or not 0 <= family < ring.modes // ring.sectors:
-        raise RingError(f"family: the ring has families 0 to {ring.modes // ring.sectors - 1}, not {family}")
-    return float((1.0 - _MARGIN) * own[0]), float((1.0 + _MARGIN) * own[-1])
+class _Search(NamedTuple):
+    """Where peaks count: at the modes of a family, wherever a draw has them, or in a band, Hz, that is given."""
+
+    families: Families
+    family: int
+    given: tuple[float, float] | None
+
+    def modes(self, natural: Natural | OfModel) -> np.ndarray | None:
+        """Return the natural modes of the family; None: all."""
+        if self.given is not None:
+            return None
+        own = np.flatnonzero(self.families.of_modes(natural.shapes) == self.family)
+        if not len(own):
+            raise RingError(f"family: deviations leave no mode of family {self.family + 1}; give band_hz")
+        return own
+
+    def band(self, natural: Natural | OfModel) -> tuple[float, float]:
+        """Return the edges of the band, Hz, given or about the modes of the family."""
+        modes = self.modes(natural)
+        if modes is None:
+            assert self.given is not None
+            return self.given
+        own = np.sqrt(natural.squares[modes]) / (2.0 * np.pi)
+        return float((1.0 - _MARGIN) * own.min()), float((1.0 + _MARGIN) * own.max())
+
+
+def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _Search:
+    """Return where peaks count. Raises RingError for a family that the ring does not have."""
+    families, kept = ring.tuned_families(speed), ring.modes // ring.sectors
+    if band_hz is not None:
+        return _Search(families, 0, (float(band_hz[0]), float(band_hz[1])))
+    if not 0 <= family < kept:
+        raise RingError(f"family: the ring has families 0 to {kept - 1}, not {family}")
+    return _Search(families, family, None)
+
+
+class _Peak(NamedTuple):
+    """The largest peak of a ring's response to an engine order."""
+
+    response: Forced
+    amplitude: float
+    sector: int
+    frequency_hz: float
+
+    @classmethod
+    def of(cls, search: _Search, natural: Natural | OfModel, order: int, label: str) -> _Peak:
+        """Return the largest peak where peaks count.
+
+        Raises RingError where there is none, or where a band cuts what is larger.
+        """
+        response, band = natural.forced(order, label), search.band(natural)
+        amplitudes, frequencies = response.peaks(*band, search.modes(natural))
+        if np.all(np.isnan(amplitudes)):
+            told, remedy = f"of family {search.family + 1}", "take another family (--family), or"
+            if search.given:
+                told, remedy = f"between {band[0]:.6g} and {band[1]:.6g} Hz", "take another band_hz, or"
+            raise RingError(
+                f"label: {label!r} has no peak {told} under order {abs(order)}; {remedy} an interface coordinate that "
+                "its modes move"
+            )
+        sector = int(np.nanargmax(amplitudes))
+        if search.given and np.abs(response.at(np.array(band))).max() > amplitudes[sector]:
+            raise RingError(
+                f"band_hz: under order {abs(order)}, the response is larger at an end of the band "
+                "than at any peak in it; take a band whose ends are apart from resonances"
+            )
+        return cls(response, float(amplitudes[sector]), sector, float(frequencies[sector]))
 
 
 def _check_damped(ring: RingModel | SectorRing) -> None:
@@ -265,20 +325,7 @@ def _check_damped(ring: RingModel | SectorRing) -> None:
         raise RingError("damping_ratio: an undamped ring has no peaks to compare; give it damping")
 
 
-def _check_reference(reference: float, order: int, label: str) -> None:
-    """Raise RingError for a peak of the tuned ring that nothing can be compared with."""
-    if not 0.0 < reference < np.inf:
-        raise RingError(
-            f"label: the tuned ring does not move {label!r} under order {order}; take an interface coordinate that its "
-            "modes move"
-        )
-
-
-def _amplified(response: Forced, reference: float, low: float, high: float) -> Amplification:
-    amplitudes, frequencies = response.peaks(low, high)
-    sector = int(np.argmax(amplitudes))
-    there = response.at(frequencies[[sector]])[0]
-    top = float(amplitudes[sector])
-    return Amplification(
-        top / reference, sector, float(frequencies[sector]), top, float(participation(there[:, None])[0])
-    )
+def _amplified(peak: _Peak, tuned: _Peak) -> Amplification:
+    there = peak.response.at(np.array([peak.frequency_hz]))[0]
+    taking_part = float(participation(there[:, None])[0])
+    return Amplification(peak.amplitude / tuned.amplitude, peak.sector, peak.frequency_hz, peak.amplitude, taking_part)

@@ -555,6 +555,11 @@ class Case:
         ring = self.ring.groups.values() if self.ring is not None else ()
         return {*self.support.clamped, *self.support.elastic, *self.hot_spots.exclude, *named, *ring}
 
+    @property
+    def volume_groups(self) -> set[str]:
+        """Every group of volumes that materials and the ring name."""
+        return {*self.material, *(self.ring.deviating if self.ring is not None else ())} - {"default"}
+
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
     ) -> None:

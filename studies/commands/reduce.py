@@ -79,6 +79,8 @@ def _reduce_ring(arguments: Namespace, case: Case, started: float) -> None:
         "warnings": list(unit_doubts(structure, float(frequencies.min()))),
         "wall_time_s": time.perf_counter() - started,
     }
+    if case.rotation is not None and case.rotation.gyroscopic:
+        result["warnings"].append("rotation.gyroscopic: the reduced ring leaves the gyroscopic coupling out")
     write_result(arguments, result, _ring_summary(ring), result["warnings"], output=ring.save)
 
 

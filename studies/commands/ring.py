@@ -7,6 +7,8 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
+
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.records.campbell import RPM
@@ -41,8 +43,11 @@ def run(arguments: Namespace, case: Case) -> None:
     modes = ring_analysis(structure)
     with progress("diameters") as report:
         found = ring_interference(structure, modes, operating, arguments.orders, report)
-    study = None if case.mistuning is None else _study(arguments, structure, found)
-    warnings = unit_doubts(structure)
+    warnings = list(unit_doubts(structure))
+    study = None
+    if case.mistuning is not None:
+        study, doubts = _study(arguments, structure, found)
+        warnings += doubts
     result = found.to_json() | {"warnings": warnings, "wall_time_s": time.perf_counter() - started}
     lines, files = [*_summary(found)], _files(structure, found)
     if study is not None:
@@ -76,8 +81,8 @@ def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str
     return {"output": save, "vtu": vtu, "picture": picture}
 
 
-def _study(arguments: Namespace, structure: Structure, found: Interference) -> MistuningStudy:
-    """Return the amplification over draws, of the orders that are named, or one for each diameter from 1.
+def _study(arguments: Namespace, structure: Structure, found: Interference) -> tuple[MistuningStudy, list[str]]:
+    """Return the amplification over draws, of the orders that are named, or one for each diameter from 1; and doubts.
 
     Raises InputError for a case without an interface, and RingError.
     """
@@ -87,10 +92,21 @@ def _study(arguments: Namespace, structure: Structure, found: Interference) -> M
     ring = ring_reduction(structure, max(arguments.family, _FAMILIES))
     drawn = any(each is not None and each.std is not None for each in (getattr(table, name) for name in DEVIATIONS))
     with progress("draws") as report:
-        return mistuning_study(
+        study = mistuning_study(
             ring, table, found.orders if named else range(1, half + 1), arguments.draws if drawn else 1,
             family=arguments.family - 1, speed=found.speed or 0.0, report=report,
         )  # fmt: skip
+    rotation = structure.case.rotation
+    if rotation is None or not rotation.gyroscopic:
+        return study, []
+    tuned, modes = ring.tuned_families(found.speed or 0.0), found.modes
+    own = modes.families == arguments.family - 1
+    without = [tuned.frequency_hz(abs(int(diameter)), arguments.family - 1) for diameter in modes.diameters[own]]
+    shift = float(np.nanmax(np.abs(modes.frequencies_hz[own] / without - 1.0), initial=0.0))
+    return study, [
+        "rotation.gyroscopic: [mistuning] leaves the gyroscopic coupling out, which shifts frequencies of family "
+        f"{arguments.family} by up to {shift:.2%}"
+    ]
 
 
 def _summary(found: Interference) -> Iterator[str]:

@@ -269,8 +269,33 @@ def test_mistuning_is_that_of_the_study(tmp_path, monkeypatch, capsys):
 
 def test_deviations_that_are_given_are_one_draw(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(DISK + MISTUNED.replace("std = 0.01", "pattern = [0.02, -0.02]"))
-    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1"]) == 0
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1", "--family", "2"]) == 0
     assert "1 draw of [mistuning]" in capsys.readouterr().out
+
+
+def test_a_family_that_hardly_moves_the_coordinate_has_no_amplification(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(DISK + MISTUNED)
+    assert main(["ring", str(tmp_path / "case.toml"), "--orders", "1", "--draws", "2"]) == BAD_INPUT
+    assert "'tip' has no peak of family 1 under order 1; take another family (--family)" in capsys.readouterr().err
+
+
+def test_gyroscopic_coupling_that_is_left_out_is_said(tmp_path, capsys):
+    turning = "\n[rotation]\naxis = [0, 0, 1]\nrpm = 60000\n"
+    frequencies = []
+    for more in ("", "gyroscopic = true\n"):
+        (tmp_path / "case.toml").write_text(DISK + turning + more + MISTUNED)
+        case = vd.Case.load(str(tmp_path / "case.toml"))
+        modes = ring_analysis(assemble(case))
+        own = modes.families == 1
+        frequencies.append(dict(zip(modes.diameters[own].tolist(), modes.frequencies_hz[own], strict=True)))
+    without, coupled = frequencies
+    shift = max(abs(value / without[abs(diameter)] - 1.0) for diameter, value in coupled.items())
+    assert shift > 1e-3
+    assert main(["ring", str(tmp_path / "case.toml"), "--family", "2", "--orders", "1", "--draws", "1"]) == 0
+    told = "".join(capsys.readouterr())
+    assert f"which shifts frequencies of family 2 by up to {shift:.2%}" in told
+    assert main(["reduce", str(tmp_path / "case.toml"), "-o", str(tmp_path / "ring.h5")]) == 0
+    assert "the reduced ring leaves the gyroscopic coupling out" in "".join(capsys.readouterr())
 
 
 def test_pages_are_of_rings_only(tmp_path, capsys):

@@ -106,6 +106,8 @@ def test_results_by_sector_are_those_of_the_run(file, tmp_path):
     response = simulate(made)
     sectors = response.sectors
     assert sectors.amplitude_mean[2] == pytest.approx(response.amplitude_mean, rel=0.01)
+    missed = abs(sectors.amplitude_mean[2] / response.amplitude_mean - 1.0)
+    assert sectors.sampling_error == pytest.approx(missed, abs=1e-12) and sectors.sampling_error < 0.01
     assert sectors.amplitude_max[2] == pytest.approx(response.amplitude_max, rel=0.01)
     assert sectors.impacts_per_period.sum() == pytest.approx(response.impacts_per_period)
     assert np.ptp(sectors.amplitude_mean) > 0.05 * sectors.amplitude_mean.max()
@@ -125,6 +127,7 @@ def test_a_static_pull_moves_no_amplitude_by_sector(file):
     response = simulate(made)
     assert abs(response.static_deflection) > 0.01 * response.amplitude_mean
     assert response.sectors.amplitude_mean[0] == pytest.approx(response.amplitude_mean_dynamic, rel=0.01)
+    assert response.sectors.sampling_error < 0.01
 
 
 def test_the_record_tells_the_ring_from_its_arrays():

@@ -43,6 +43,9 @@ def test_blade_tests_count_relative_to_their_mean(tmp_path):
     file.write_text("frequency_hz,sector\n101,2\n100,0\n99,1\n")
     found = mistuning(frequency={"file": str(file)}).deviations(3)
     assert found.stiffness == pytest.approx([0.0, 0.99**2 - 1, 1.01**2 - 1])
+    for name in ("stiffness", "mass", "damping"):
+        with pytest.raises(InputError, match=rf"mistuning.{name}.file: .* has frequencies; give it as mistuning.freq"):
+            mistuning(**{name: {"file": str(file)}}).deviations(3)
     file.write_text("sector,deviation\n0,0.1\n1,0.2\n2,0\n")
     assert mistuning(mass={"file": str(file)}).deviations(3).mass.tolist() == [0.1, 0.2, 0.0]
 
@@ -54,6 +57,7 @@ def test_blade_tests_count_relative_to_their_mean(tmp_path):
         ({"stiffness": {"std": 0.1, "pattern": [0.1]}}, "give one of values, file, std and pattern"),
         ({"stiffness": {"std": -0.1}}, "stiffness.std: should be greater than or equal to 0"),
         ({"stiffness": {"std": 0.1}, "frequency": {"std": 0.1}}, "give one of stiffness and frequency"),
+        ({"seed": 4}, "mistuning: gives no deviations; add a key such as frequency"),
         ({"seed": -1}, "seed: should be greater than or equal to 0"),
         ({"mass": {"values": []}}, "mass.values: expected at least 1 entries"),
     ],

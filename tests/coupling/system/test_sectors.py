@@ -122,6 +122,17 @@ def test_the_linear_response_is_the_wave_of_the_chain(file, wave):
         assert response.amplitudes(321.0, rows) == pytest.approx(np.full(6, expected), rel=1e-10)
 
 
+@pytest.mark.parametrize("natural", [False, True])
+def test_modes_of_a_ring_are_whole_pairs(file, natural):
+    # a wave of which a part is left out would stand: 2, 1, 1, 2, 1, 1 of the amplitude
+    made = scene(file, structure__modes=4, structure__natural=natural, excitation__frequency=321.0)
+    basis, square = basis_of(made), CHAIN.squares([2])[0]
+    assert len(basis.stiffness) == 5
+    omega, rows = 2 * np.pi * 321.0, np.array([basis.rows[f"tip@{sector}"] for sector in range(6)])
+    expected = 2.0 / 0.5 / abs(square - omega**2 + 2j * CHAIN.damping_ratio * np.sqrt(square) * omega)
+    assert linear_responses(made)[0].amplitudes(321.0, rows) == pytest.approx(np.full(6, expected), rel=1e-9)
+
+
 def test_the_level_of_a_mistuned_ring_is_that_of_the_tuned_one(file):
     square = CHAIN.squares([2])[0]
     tuned = scene(
@@ -231,6 +242,21 @@ def test_it_comes_back_from_its_file(file, tmp_path):
             r"cavity\[0\].floor: no sector of the ring has a label 'tipp'; did you mean 'tip'",
         ),
         ({"excitation__at": "root"}, "excitation.at: no sector of the ring has a label 'root'"),
+        ({"excitation__at": "tip@+x"}, r"excitation.at: expected 'tip', 'tip@3' or 'tip@\+1', not 'tip@\+x'"),
+        ({"cavity__c__floor": "tip@2"}, r"cavity\[0\].floor: 'tip@2' is the same place for all of several sectors"),
+        (
+            {"stop": [{"side": "left", "gap": 1e-4, "at": "tip", "to": "tip@3", "sectors": "all"}]},
+            r"stop\[0\].to: 'tip@3' is the same place for all of several sectors; give 'tip'",
+        ),
+        (
+            {"structure__modes": 1},
+            "structure.modes: 1 modes are without the nodal diameter 2, which wave 2 excites; give at least 4",
+        ),
+        (
+            {"structure__modes": 5, "structure__mistuning": {"mass": {"std": 0.01}}},
+            "without the nodal diameter 3, which wave 2 excites in a mistuned ring; give at least 6",
+        ),
+        ({"structure__modes": 3, "excitation__wave": None}, "without the nodal diameter 2, which a force at one label"),
     ],
 )
 def test_what_the_ring_does_not_have_is_rejected(file, changes, message):

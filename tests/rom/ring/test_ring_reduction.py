@@ -17,8 +17,8 @@ from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
 
 TIP = [InterfaceCoordinate("tip", "tip", (0, 1, 0), "node"), InterfaceCoordinate("root", "root", (1, 0, 0), "node")]
-# the first family, apart from the others
-LOW, HIGH = 420.0, 490.0
+# the second family, which moves the tip, apart from the others
+LOW, HIGH = 480.0, 640.0
 CENTRIFUGAL = sparse.csr_array(np.diag(np.repeat([0.2, 0.2, 0.4, 0.3, 0.3, 0.2], 3)))
 
 
@@ -81,8 +81,8 @@ def test_frequencies_with_deviations(size, mass):
     assert np.abs(found - exact).max() < 2e-5 * np.abs(exact - tuned).max()
 
 
-@pytest.mark.parametrize("size", [0.05, 0.3])
-def test_amplification(size):
+@pytest.mark.parametrize(("size", "error"), [(0.05, 1e-3), (0.3, 1e-2)])
+def test_amplification(size, error):
     disk, ring, deviations = LumpedDisk(7), reduced(7), drawn(7, size)
     stiffness, mass, place = disk.whole(deviations)
     squares, shapes = linalg.eigh(stiffness, mass)
@@ -93,8 +93,8 @@ def test_amplification(size):
     transfer = 1 / (squares - omegas[:, None] ** 2 + 2j * 0.002 * np.sqrt(squares) * omegas[:, None])
     exact = (transfer * (tip.T @ load)) @ tip.T
     response = forced(ring, 2, "tip", deviations=deviations)
-    assert np.abs(response.at(frequencies) - exact).max() < 1e-3 * np.abs(exact).max()
-    assert response.peaks(LOW, HIGH)[0].max() == pytest.approx(np.abs(exact).max(), rel=1e-3)
+    assert np.abs(response.at(frequencies) - exact).max() < error * np.abs(exact).max()
+    assert np.nanmax(response.peaks(LOW, HIGH)[0]) == pytest.approx(np.abs(exact).max(), rel=error)
 
 
 def test_speed():
@@ -113,7 +113,7 @@ def test_speed():
         ring.model(speed=900.0)
     peak = forced(ring, 1, "tip", deviations=deviations, speed=speed).peaks(300.0, 700.0)
     standing = forced(ring, 1, "tip", deviations=deviations).peaks(300.0, 700.0)
-    assert peak[1].max() > 1.02 * standing[1].max()
+    assert np.nanmax(peak[1]) > 1.02 * np.nanmax(standing[1])
 
 
 def test_error_estimate_is_near_the_error():

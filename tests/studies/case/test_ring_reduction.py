@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from scipy import sparse
@@ -91,6 +92,28 @@ def test_frequencies_and_amplification_of_deviating_blades(structure, size, basi
     assert one.sector == np.argmax(response.max(axis=0))
 
 
+@pytest.mark.parametrize("basis", ["modes", "sectors"])
+def test_one_blade_that_deviates(structure, basis):
+    """No frequency is below the whole ring's, the error is near the estimate, and by sectors it is small."""
+    ring, sector, part = (
+        ring_reduction(structure, 2, basis=basis),
+        ring_sector(structure),
+        structure.solid.part(["blade"]),
+    )
+    told = {each["stiffness"]: each["frequency"] for each in ring.provenance["estimate"]["one_sector"]}
+    assert all(f"at {size:+.0%}" in ring.provenance["estimate"]["sentence"] for size in told)
+    for size in (0.0, -0.1, -0.3, -0.5, -0.9, 1.0):
+        deviations = Deviations(size * np.eye(6)[2])
+        exact = modes_of(*whole_ring(sector, part, deviations)[:2], 12)[0]
+        errors = np.sqrt(np.sort(ring.model(deviations).squares)[:12] / exact) - 1.0
+        assert errors.min() > -1e-11
+        if size in told:
+            assert 0.2 * told[size] < errors.max() < 2.0 * told[size] or size == -0.9
+            assert errors.max() < 2.0 * told[size]
+        if basis == "sectors":
+            assert errors.max() < (1e-5 if size == -0.9 else 2e-6)
+
+
 def test_command(tmp_path: Path, capsys):
     case, output = tmp_path / "case.toml", tmp_path / "ring.h5"
     case.write_text(CASE)
@@ -109,6 +132,29 @@ def test_command(tmp_path: Path, capsys):
     assert "basis: expected one of modes, sectors" in capsys.readouterr().err
     assert main(["reduce", str(case), "-o", str(output), "--basis", "sectors", "--json", "-"]) == 0
     assert kind_of(output) == "ring-sectors"
+
+
+def test_a_group_that_deviates_of_an_abaqus_mesh(structure, tmp_path: Path):
+    """The blade has the default material and is named by [ring] only; the mesh of the generator, written as .inp."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE)
+    assert main(["mesh", str(case), "-o", str(tmp_path / "disk.msh")]) == 0
+    mesh = meshio.read(tmp_path / "disk.msh")
+    lines = ["*NODE", *(f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1))]
+    names = {(dimension, tag): name for name, (tag, dimension) in mesh.field_data.items()}
+    number = 0
+    for block, tags in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True):
+        for cell, tag in zip(block.data + 1, tags, strict=True):
+            if block.type == "hexahedron":
+                number += 1
+                lines += [f"*ELEMENT, TYPE=C3D8, ELSET={names[3, tag]}", ", ".join(map(str, (number, *cell)))]
+            elif (2, tag) in names:
+                lines += [f"*NSET, NSET={names[2, tag]}", ", ".join(map(str, cell))]
+    (tmp_path / "disk.inp").write_text("\n".join(lines) + "\n")
+    case.write_text('[mesh]\nfile = "disk.inp"\ndegree = 1\n' + CASE[CASE.index("[material") :])
+    deviations = Deviations(-0.3 * np.eye(6)[1])
+    found, expected = (ring_reduction(one, 2) for one in (assemble(Case.load(case)), structure))
+    np.testing.assert_allclose(found.model(deviations).squares, expected.model(deviations).squares, rtol=1e-6)
 
 
 @pytest.mark.parametrize(
