@@ -163,12 +163,15 @@ class Solid:
     ) -> SystemMatrices:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
-        Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
+        Groups are of facets, or of edges and points, whose nodes have the weight one; one of both can be held, but is
+        no patch. Elastic supports are
         part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them,
         from the static solution of `statics` (default: the body's own).
         Raises UnstableError for a temperature at which the structure has buckled.
         """
-        patches = {name: self._patch(name) for name in self.domain.groups}
+        # facets weigh their nodes by area, edges and points by one: both in one group have no common weights
+        mixed = self.domain.facets.keys() & (self.domain.edges.keys() | self.domain.points.keys())
+        patches = {name: self._patch(name) for name in self.domain.groups if name not in mixed}
         stiffness = self._material_stiffness(ufl.dx)
         for name in self.elastic:
             stiffness = stiffness + self._support_stiffness(name)

@@ -58,7 +58,7 @@ class Domain:
     mesh           dolfinx.mesh.Mesh, metres
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
-    edges, points  groups of element edges and of vertices: name -> their indices
+    edges, points  groups of element edges and of vertices: name -> their indices, without those of its own facets
     path, sha256   the file and its hash
     """
 
@@ -74,13 +74,13 @@ class Domain:
     def groups(self) -> dict[str, list[tuple[int, np.ndarray]]]:
         """Name -> (dimension, indices) of the entities that supports and interfaces can act on.
 
-        A name means a facet group where there is one, else the edges and points of that name together.
+        A name means the facets, edges and points of that name together.
         """
         found: dict[str, list[tuple[int, np.ndarray]]] = {}
-        for dimension, groups in ((1, self.edges), (0, self.points)):
+        for dimension, groups in ((2, self.facets), (1, self.edges), (0, self.points)):
             for name, entities in groups.items():
                 found.setdefault(name, []).append((dimension, entities))
-        return found | {name: [(2, entities)] for name, entities in self.facets.items()}
+        return found
 
     def group(self, name: str) -> list[tuple[int, np.ndarray]]:
         """Return one of `groups`. Raises MeshError with those that exist, by kind."""
@@ -91,9 +91,11 @@ class Domain:
         return self.groups[name]
 
     def facet_group(self, name: str) -> np.ndarray:
-        """Return the facet indices of a group. Raises MeshError with the groups that exist."""
+        """Return the facet indices of a group. Raises MeshError with the groups that exist, and for other members."""
         if name not in self.facets:
             raise self._no_facets(name)
+        if len(self.groups[name]) > 1:
+            raise MeshError(f"{self.path}: group {name!r} holds edges or points besides its facets; take them out of it")
         return self.facets[name]
 
     def _no_facets(self, name: str, others: str = "") -> MeshError:
@@ -126,6 +128,7 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
             edges, points = _lower_groups(mesh, lines, nodes)
             facets = _members(tags, names[2])
             _check_boundary(mesh.topology, facets)
+            edges, points = (_beyond(mesh.topology, facets, own, d) for d, own in ((1, edges), (0, points)))
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
     return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), digest(file))
@@ -383,6 +386,21 @@ def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.nd
         what = "an edge" if kind == "edge" else "a corner"
         raise MeshError(f"{kind} group {name!r} holds what is not {what} of a volume element; mesh it with the volumes")
     return np.unique(order[places]).astype(np.int32)
+
+
+def _beyond(
+    topology: Any, facets: Mapping[str, np.ndarray], lower: Mapping[str, np.ndarray], dimension: int
+) -> dict[str, np.ndarray]:
+    """Return groups of edges (dimension 1) or vertices (0) without those of the facets of their name."""
+    found = {}
+    for name, entities in lower.items():
+        if name in facets:
+            topology.create_connectivity(2, dimension)
+            links = topology.connectivity(2, dimension)
+            entities = np.setdiff1d(entities, np.concatenate([links.links(facet) for facet in facets[name]]))
+        if entities.size:
+            found[name] = entities
+    return found
 
 
 def _check_boundary(topology: Any, groups: Mapping[str, np.ndarray]) -> None:

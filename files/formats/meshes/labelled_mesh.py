@@ -77,6 +77,7 @@ class LabelledMesh:
     node_sets     name -> labels of nodes, which may be absent
     element_sets  name -> labels of elements, which may be absent
     face_sets     name -> faces of solids, each as the labels of its corners
+    stiff         label of a shell or line with a stiffness of its own -> what gives it that
     """
 
     nodes: dict[int, np.ndarray] = field(default_factory=dict)
@@ -84,6 +85,7 @@ class LabelledMesh:
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     element_sets: dict[str, list[int]] = field(default_factory=dict)
     face_sets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
+    stiff: dict[int, str] = field(default_factory=dict)
 
     def coordinates(self, labels: Iterable[int]) -> np.ndarray:
         """Return the coordinates (n, 3) of nodes."""
