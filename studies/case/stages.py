@@ -142,7 +142,7 @@ def _mesh(case: Case) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(mesh, MeshFile):
             target = Path(folder) / f"{Path(mesh.file).stem}.msh"
-            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups)
+            yield convert(mesh.file, target, case.volume_groups, case.facet_groups)
         else:
             yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
 

@@ -547,6 +547,11 @@ class Case:
         ring = self.ring.groups.values() if self.ring is not None else ()
         return {*self.support.clamped, *self.support.elastic, *named, *ring}
 
+    @property
+    def volume_groups(self) -> set[str]:
+        """Every group of volume elements that materials name; "unnamed" are the elements outside of them."""
+        return set(self.material) - {"default", "unnamed"}
+
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
     ) -> None:

@@ -52,6 +52,13 @@ class DeckLine(NamedTuple):
         except ValueError as error:
             raise self.error(f"expected whole numbers ({error})") from error
 
+    def reals(self) -> list[float]:
+        """Return the numbers of the line, such as 1.5D+03. Raises MeshError."""
+        try:
+            return [float(word.upper().replace("D", "E")) for word in self.text.split()]
+        except ValueError as error:
+            raise self.error(f"expected numbers ({error})") from error
+
     def refuse(self, name: str, refused: Mapping[str, str]) -> None:
         """Raise MeshError for an entry whose name matches a pattern; refused: the patterns by the reason."""
         for why, pattern in refused.items():

@@ -42,7 +42,7 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
     if isinstance(mesh, MeshFile):
         yield Fact("mesh", mesh.file, "", f"{Path(mesh.file).stat().st_size / 1e6:.3g} MB")
         if mesh.foreign:
-            groups, nodes, extent, centres = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
+            groups, nodes, extent, centres = group_names(mesh.file, case.volume_groups, case.facet_groups)
             kinds = {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]}
             yield Fact("groups", {kind: names for kind, names in kinds.items() if names})
             _check_ring(case, mesh, centres, extent)
