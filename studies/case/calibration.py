@@ -223,8 +223,7 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
     elastic = dict(case.support.elastic)
     known = parts_by_name(case, structure.solid.domain.volumes)
     for name, factor in factors.items():
-        # the default's own number stands for all groups that have no other
-        for part in [name] if name == "material.default" else known[name]:
+        for part in known[name]:
             kind, group = part.split(".", 1)
             if kind == "support":
                 springs = elastic[group]
