@@ -25,6 +25,7 @@ from vanedamp.modal.cyclic_statics import RingStatics
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
+from vanedamp.modal.joints import coincident_nodes, free_motions
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 from vanedamp.modal.measurements import read_shapes, read_temperature
 from vanedamp.modal.mesh_import import convert
@@ -344,7 +345,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     bending, warnings = _first_bending(case, modes, matrices)
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
     lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
-    warnings += unit_doubts(structure, lowest)
+    warnings += unit_doubts(structure, lowest) + joint_doubts(structure, modes)
     if not modes.counted:
         warnings += (_UNCOUNTED,)
     if case.ring is not None:
@@ -442,6 +443,28 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
     remarks = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
     return tuple(f"units: {remark}" for remark in remarks)
+
+
+def joint_doubts(structure: Structure, modes: Modes | None = None) -> tuple[str, ...]:
+    """Return warnings of nodes that lie where others do, and of modes of a held structure without strain."""
+    matrices, support = structure.matrices, structure.case.support
+    found, twins = [], coincident_nodes(matrices)
+    if twins.size:
+        place = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
+        found.append(
+            f"mesh: {twins.size} nodes lie where others do, such as at ({place}) m: parts are not joined there; merge "
+            "the nodes, unless a gap is meant"
+        )
+    if modes is not None and (support.clamped or support.elastic):
+        whole, parts = free_motions(modes, matrices)
+        if whole:
+            found.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
+        if parts:
+            found.append(
+                f"modes: {parts} at 0 Hz move parts of the structure against each other, which hang together by an "
+                "edge or a point only; join their nodes"
+            )
+    return tuple(found)
 
 
 def campbell_diagram(

@@ -14,7 +14,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.ring_stages import ring_reduction
-from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
+from vanedamp.studies.case.stages import assemble, joint_doubts, reduction, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import spot_lines
@@ -44,7 +44,9 @@ def run(arguments: Namespace, case: Case) -> None:
         "outputs": list(model.outputs),
         "hot_spots": hot_spots(model),
         "estimate": model.provenance["estimate"],
-        "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
+        "warnings": [
+            *unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])), *joint_doubts(structure)
+        ],
         "wall_time_s": time.perf_counter() - started,
     }
     fastest = model.at_speed(model.greatest_speed)
@@ -74,7 +76,7 @@ def _reduce_ring(arguments: Namespace, case: Case, started: float) -> None:
         "interface": list(ring.interface),
         "estimate": ring.provenance["estimate"],
         "greatest_speed": ring.greatest_speed if isinstance(ring, RingModel) else 0.0,
-        "warnings": list(unit_doubts(structure, float(frequencies.min()))),
+        "warnings": [*unit_doubts(structure, float(frequencies.min())), *joint_doubts(structure)],
         "wall_time_s": time.perf_counter() - started,
     }
     write_result(arguments, result, _ring_summary(ring), result["warnings"], output=ring.save)

@@ -194,13 +194,14 @@ class Reduce(CaseStage):
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
-        from vanedamp.studies.case.stages import assemble, reduction, unit_doubts
+        from vanedamp.studies.case.stages import assemble, joint_doubts, reduction, unit_doubts
 
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
         model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
         model.save(self.outputs[0])
         tools.warn(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
+        tools.warn(joint_doubts(structure))
         return str(model.provenance["estimate"]["sentence"])
 
 
