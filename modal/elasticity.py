@@ -119,6 +119,7 @@ class Solid:
     elastic      facet group -> ElasticSupport
     scale        metres per unit of length of the file
     temperature  of the structure: it changes the moduli, and what cannot expand is under stress
+    source       the user's file of which the mesh is a copy, and files that it includes, for results and errors
 
     Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh, TemperatureError for the
     temperature and ElasticityError for the rest.
@@ -132,12 +133,13 @@ class Solid:
         elastic: Mapping[str, ElasticSupport] | None = None,
         scale: float = 1.0,
         temperature: Temperature | None = None,
+        source: Sequence[str] = (),
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise ElasticityError(f"scale: expected a positive number of metres a unit of length, not {scale}")
         if degree not in (1, 2, 3):
             raise ElasticityError(f"degree: expected 1, 2 or 3, not {degree}")
-        self.domain = fenicsx.read(mesh, scale)
+        self.domain = fenicsx.read(mesh, scale, source)
         self.scale = scale
         self.degree = degree
         self.materials = _by_group(materials, self.domain)

@@ -7,6 +7,7 @@ that become scipy matrices.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib
 import logging
 import os
@@ -22,7 +23,6 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.files.store import digest
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 from vanedamp.modal.stack import loading
@@ -59,7 +59,7 @@ class Domain:
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
     edges, points  groups of element edges and of vertices: name -> their indices, without those of its own facets
-    path, sha256   the file and its hash
+    path, sha256   the file and the hash of its bytes, with those of files that it includes
     """
 
     mesh: Any
@@ -108,15 +108,18 @@ def versions() -> dict[str, str]:
     return {"dolfinx": dolfinx.__version__, "petsc4py": petsc4py.__version__, "gmsh": gmsh.__version__}
 
 
-def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
+def read(path: str | os.PathLike[str], scale: float = 1.0, source: Sequence[str | os.PathLike[str]] = ()) -> Domain:
     """Read a gmsh mesh, `scale` metres its unit of length.
+
+    source: the user's file of which it is a copy, and the files that this includes; they name it in results and errors.
 
     Raises MeshError: no file, not a mesh, no or mixed volume elements, inverted elements, loose parts, overlapping
     groups.
     """
-    file = Path(path)
+    files = [Path(file) for file in source or [path]]
+    file, sha256 = files[0], hashlib.sha256(b"".join(one.read_bytes() for one in files if one.is_file())).hexdigest()
     with msh.session("read"):
-        msh.merge(file)
+        msh.merge(Path(path))
         try:
             _prepare_groups()
             lines, nodes = msh.taken(1), msh.taken(0)
@@ -131,7 +134,7 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
             edges, points = (_beyond(mesh.topology, facets, own, d) for d, own in ((1, edges), (0, points)))
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
-    return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), digest(file))
+    return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), sha256)
 
 
 def vector_space(mesh: Any, degree: int) -> Any:

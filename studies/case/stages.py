@@ -110,7 +110,8 @@ def assemble(case: Case) -> Structure:
             name: ElasticSupport(table.stiffness, table.normal, table.tangential)
             for name, table in case.support.elastic.items()
         }
-        solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature))
+        source = case.mesh.files if isinstance(case.mesh, MeshFile) else ()
+        solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature), source)
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         ring = case.ring
