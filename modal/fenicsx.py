@@ -95,7 +95,9 @@ class Domain:
         if name not in self.facets:
             raise self._no_facets(name)
         if len(self.groups[name]) > 1:
-            raise MeshError(f"{self.path}: group {name!r} holds edges or points besides its facets; take them out of it")
+            raise MeshError(
+                f"{self.path}: group {name!r} holds edges or points besides its facets; take them out of it"
+            )
         return self.facets[name]
 
     def _no_facets(self, name: str, others: str = "") -> MeshError:

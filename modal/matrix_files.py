@@ -51,9 +51,9 @@ def read_matrices(
     stiffness, mass  .mtx (Matrix Market, symmetric or general, or Abaqus), .npz (scipy.sparse.save_npz), .csv (dense),
                      .mat, or CalculiX's .sti and .mas with their .dof, N/m and kg; of a file with several matrices
                      those named stiffness and mass, or K and M
-    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, of
-                     CalculiX, and of Abaqus with nodes in the matrices, in any order. Degrees of freedom that CalculiX's
-                     .dof leaves out are held
+    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, in
+                     any order for CalculiX, and for Abaqus' matrices that name their nodes. Degrees of freedom that
+                     CalculiX's .dof leaves out are held
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
     scale            metres per unit of length of the nodes: 1e-3 for mm

@@ -153,8 +153,8 @@ def _grouped(
         lost = np.setdiff1d(np.intersect1d(source.node_sets[name], source.cells), np.concatenate(held))
         if lost.size:
             raise MeshError(
-                f"{source.path}: node {source.nodes[lost[0]]} of the set {name!r} lies on an edge whose other nodes are "
-                "not all in the set; name all of them, or take it out"
+                f"{source.path}: node {source.nodes[lost[0]]} of the set {name!r} lies on an edge whose other nodes "
+                "are not all in the set; name all of them, or take it out"
             )
     return entities, groups
 
@@ -341,7 +341,7 @@ def _edges(source: _Source) -> np.ndarray:
 def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return what sets hold besides their facets (n, k): name -> indices into the edges, name -> corners of elements."""
+    """Return what sets hold besides their facets (n, k): name -> indices of edges, name -> corners of elements."""
     corners = np.unique(source.cells[:, : source.shape.corners])
     keys = {key: index for index, key in enumerate(_keys(edges, 2))}
     lines: dict[str, np.ndarray] = {}

@@ -45,7 +45,8 @@ def run(arguments: Namespace, case: Case) -> None:
         "hot_spots": hot_spots(model),
         "estimate": model.provenance["estimate"],
         "warnings": [
-            *unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])), *joint_doubts(structure)
+            *unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])),
+            *joint_doubts(structure),
         ],
         "wall_time_s": time.perf_counter() - started,
     }

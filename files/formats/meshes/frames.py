@@ -33,7 +33,6 @@ class Frame:
             local = [first, second, third]
         return np.asarray(self.origin + np.column_stack(local) @ self.axes)
 
-
     def directions(self, points: np.ndarray) -> np.ndarray:
         """Return the unit vectors (n, 3, 3) along its three coordinates at global points (n, 3), as rows.
 
