@@ -135,7 +135,7 @@ def _system(
             matrix, held = _placed(Path(path).with_suffix(".dof"), matrix, labels)
             fixed = np.union1d(fixed, held)
         elif getattr(matrix, "freedoms", None) is not None:
-            matrix = _by_node(Path(path), matrix, labels)
+            matrix = _by_node(Path(path), matrix, matrix.freedoms, labels)
         loaded[name] = matrix
         if matrix.shape != (coordinates.size, coordinates.size):
             raise MatricesError(
@@ -201,9 +201,9 @@ def _placed(path: Path, matrix: sparse.csr_array, labels: Mapping[int, int]) -> 
     return placed, np.setdiff1d(np.arange(size), places)
 
 
-def _by_node(path: Path, matrix: GlobalMatrix, labels: Mapping[int, int]) -> sparse.csr_array:
-    """Return a matrix in the order of the nodes, from the nodes of its rows."""
-    nodes, freedoms = np.transpose(matrix.freedoms)
+def _by_node(path: Path, matrix: GlobalMatrix, rows: np.ndarray, labels: Mapping[int, int]) -> sparse.csr_array:
+    """Return a matrix in the order of the nodes; rows: node and freedom (n, 2) of its own."""
+    nodes, freedoms = rows.T
     if np.any((freedoms < 1) | (freedoms > 3)):
         raise MatricesError(f"{path}: node {nodes[0]} has the freedom {max(freedoms)}; expected 1, 2 and 3")
     places = np.array([3 * _index(path, labels, str(node)) for node in nodes.tolist()]) + freedoms - 1

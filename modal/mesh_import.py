@@ -352,7 +352,7 @@ def _lower_groups(
             continue
         pairs, single = source.covers[1].get(name, set()), source.covers[0].get(name, set())
         elements = any(name in covers for covers in source.covers.values())
-        inside = _inside(source, [] if elements else source.node_sets[name])
+        inside = _inside(source, np.empty(0, dtype=int) if elements else source.node_sets[name])
         outside = np.ones(len(source.points), dtype=bool)
         faces = facets.get(name, np.empty((0, 1), dtype=int))
         outside[faces] = False

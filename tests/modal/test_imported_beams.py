@@ -1,6 +1,7 @@
 """A beam of bricks through other programs' files: what its sets hold, by the whole matrices; what is rejected."""
 
 import hashlib
+import json
 import re
 
 import gmsh
@@ -350,3 +351,19 @@ def test_a_folded_element_has_its_label(tmp_path):
         text += f"*ELSET, ELSET={name}, GENERATE\n{first}, 1016, 2\n"
     with pytest.raises(MeshError, match="such as element 1006 of volume group 'even'"):
         convert(written(tmp_path, text), tmp_path / "out.msh", volumes=["odd", "even"])
+
+
+def test_the_default_material_of_an_imported_mesh_is_tuned(tmp_path):
+    """A hundredth more of the frequency takes 1.0201 times the modulus."""
+    written(tmp_path, inp(beam(ROOT)))
+    text = CASE.format(file="beam.inp", held="fix", tip="tip")
+    (tmp_path / "case.toml").write_text(text)
+    first = solve_modes(assemble(Case.load(tmp_path / "case.toml")).matrices, 1).frequencies_hz[0]
+    text += f'[calibration.tune]\nfrequencies = [{1.01 * first}]\nmodes = [0]\nvary = ["material.default"]\n'
+    (tmp_path / "case.toml").write_text(text)
+    files = [str(tmp_path / name) for name in ("tuned.toml", "result.json")]
+    assert main(["calibrate", str(tmp_path / "case.toml"), "--case", files[0], "--json", files[1]]) == 0
+    assert json.loads((tmp_path / "result.json").read_text())["tuning"]["factor"] == pytest.approx(
+        {"material.default": 1.01**2}, rel=1e-6
+    )
+    assert Case.load(files[0]).material["default"].young == pytest.approx(2.1e11 * 1.01**2, rel=1e-6)

@@ -229,10 +229,10 @@ class _Deck:
         if kind == "NODE":
             first = [(line, words[:1]) for line, words in card.data]
             labels = self._members(card._replace(data=first), mesh.nodes, mesh.node_sets)
-            own = self._given(mesh.node_sets, name)
-            if own and set(own) != set(labels):
+            given = self._given(mesh.node_sets, name)
+            if given and set(given) != set(labels):
                 raise card.head.error(f"NAME={name}: a set of other nodes has this name; give it another")
-            own.extend(labels)
+            given.extend(labels)
             return
         own = self._given(mesh.face_sets, name)
         for line, words in card.data:
