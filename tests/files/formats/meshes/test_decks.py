@@ -218,7 +218,7 @@ def test_grid_points_of_nastran_are_in_global_coordinates(cards, expected, tmp_p
         ([*grids(CORNERS), "CONM2,9,1,,5."], "line 6: CONM2 adds mass"),
         ([*grids(CORNERS), "SET1,7,1,2,3,4,1,2,3,4"], "line 6: SET1: more than 8 values in a line; go on in the next"),
         ([*grids(CORNERS), "SET1,7,1,2,3,4,1,2,3,+,4"], "line 6: SET1: more than 8 values in a line"),
-        ([*grids(CORNERS), "SET1,7,1,2", ",3,4,1,2,3,4,1,2,3"], "line 7: : more than 8 values in a line"),
+        ([*grids(CORNERS), "SET1,7,1,2", ",3,4,1,2,3,4,1,2,3"], "line 7: continuation: more than 8 values in a line"),
         ([*grids(CORNERS), "INCLUDE 'more.bdf'"], "line 6: INCLUDE more.bdf: no such file in the deck's folder"),
     ],
 )
