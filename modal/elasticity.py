@@ -121,6 +121,7 @@ class Solid:
     elastic      facet group -> ElasticSupport
     scale        metres per unit of length of the file
     temperature  of the structure: it changes the moduli, and what cannot expand is under stress
+    source       the user's file of which the mesh is a copy, and files that it includes, for results and errors
 
     Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh, TemperatureError for the
     temperature and ElasticityError for the rest.
@@ -134,12 +135,13 @@ class Solid:
         elastic: Mapping[str, ElasticSupport] | None = None,
         scale: float = 1.0,
         temperature: Temperature | None = None,
+        source: Sequence[str] = (),
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise ElasticityError(f"scale: expected a positive number of metres a unit of length, not {scale}")
         if degree not in (1, 2, 3):
             raise ElasticityError(f"degree: expected 1, 2 or 3, not {degree}")
-        self.domain = fenicsx.read(mesh, scale)
+        self.domain = fenicsx.read(mesh, scale, source)
         self.scale = scale
         self.degree = degree
         self.materials = _by_group(materials, self.domain)
@@ -165,12 +167,15 @@ class Solid:
     ) -> SystemMatrices:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
-        Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
+        Groups are of facets, or of edges and points, whose nodes have the weight one; one of both can be held, but is
+        no patch. Elastic supports are
         part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them,
         from the static solution of `statics` (default: the body's own).
         Raises UnstableError for a temperature at which the structure has buckled.
         """
-        patches = {name: self._patch(name) for name in self.domain.groups}
+        # facets weigh their nodes by area, edges and points by one: both in one group have no common weights
+        mixed = self.domain.facets.keys() & (self.domain.edges.keys() | self.domain.points.keys())
+        patches = {name: self._patch(name) for name in self.domain.groups if name not in mixed}
         stiffness = self._material_stiffness(ufl.dx)
         for name in self.elastic:
             stiffness = stiffness + self._support_stiffness(name)

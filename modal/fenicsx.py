@@ -7,6 +7,7 @@ that become scipy matrices.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib
 import inspect
 import logging
@@ -23,7 +24,6 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.files.store import digest
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 from vanedamp.modal.stack import loading
@@ -59,8 +59,8 @@ class Domain:
     mesh           dolfinx.mesh.Mesh, metres
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
-    edges, points  groups of element edges and of vertices: name -> their indices
-    path, sha256   the file and its hash
+    edges, points  groups of element edges and of vertices: name -> their indices, without those of its own facets
+    path, sha256   the file and the hash of its bytes, with those of files that it includes
     """
 
     mesh: Any
@@ -75,13 +75,13 @@ class Domain:
     def groups(self) -> dict[str, list[tuple[int, np.ndarray]]]:
         """Name -> (dimension, indices) of the entities that supports and interfaces can act on.
 
-        A name means a facet group where there is one, else the edges and points of that name together.
+        A name means the facets, edges and points of that name together.
         """
         found: dict[str, list[tuple[int, np.ndarray]]] = {}
-        for dimension, groups in ((1, self.edges), (0, self.points)):
+        for dimension, groups in ((2, self.facets), (1, self.edges), (0, self.points)):
             for name, entities in groups.items():
                 found.setdefault(name, []).append((dimension, entities))
-        return found | {name: [(2, entities)] for name, entities in self.facets.items()}
+        return found
 
     def group(self, name: str) -> list[tuple[int, np.ndarray]]:
         """Return one of `groups`. Raises MeshError with those that exist, by kind."""
@@ -92,9 +92,13 @@ class Domain:
         return self.groups[name]
 
     def facet_group(self, name: str) -> np.ndarray:
-        """Return the facet indices of a group. Raises MeshError with the groups that exist."""
+        """Return the facet indices of a group. Raises MeshError with the groups that exist, and for other members."""
         if name not in self.facets:
             raise self._no_facets(name)
+        if len(self.groups[name]) > 1:
+            raise MeshError(
+                f"{self.path}: group {name!r} holds edges or points besides its facets; take them out of it"
+            )
         return self.facets[name]
 
     def _no_facets(self, name: str, others: str = "") -> MeshError:
@@ -107,15 +111,18 @@ def versions() -> dict[str, str]:
     return {"dolfinx": dolfinx.__version__, "petsc4py": petsc4py.__version__, "gmsh": gmsh.__version__}
 
 
-def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
+def read(path: str | os.PathLike[str], scale: float = 1.0, source: Sequence[str | os.PathLike[str]] = ()) -> Domain:
     """Read a gmsh mesh, `scale` metres its unit of length.
+
+    source: the user's file of which it is a copy, and the files that this includes; they name it in results and errors.
 
     Raises MeshError: no file, not a mesh, no or mixed volume elements, inverted elements, loose parts, overlapping
     groups.
     """
-    file = Path(path)
+    files = [Path(file) for file in source or [path]]
+    file, sha256 = files[0], hashlib.sha256(b"".join(one.read_bytes() for one in files if one.is_file())).hexdigest()
     with msh.session("read"):
-        msh.merge(file)
+        msh.merge(Path(path))
         try:
             _prepare_groups()
             lines, nodes = msh.taken(1), msh.taken(0)
@@ -127,9 +134,10 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
             edges, points = _lower_groups(mesh, lines, nodes)
             facets = _members(tags, names[2])
             _check_boundary(mesh.topology, facets)
+            edges, points = (_beyond(mesh.topology, facets, own, d) for d, own in ((1, edges), (0, points)))
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
-    return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), digest(file))
+    return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), sha256)
 
 
 def vector_space(mesh: Any, degree: int) -> Any:
@@ -399,6 +407,21 @@ def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.nd
         what = "an edge" if kind == "edge" else "a corner"
         raise MeshError(f"{kind} group {name!r} holds what is not {what} of a volume element; mesh it with the volumes")
     return np.unique(order[places]).astype(np.int32)
+
+
+def _beyond(
+    topology: Any, facets: Mapping[str, np.ndarray], lower: Mapping[str, np.ndarray], dimension: int
+) -> dict[str, np.ndarray]:
+    """Return groups of edges (dimension 1) or vertices (0) without those of the facets of their name."""
+    found = {}
+    for name, entities in lower.items():
+        if name in facets:
+            topology.create_connectivity(2, dimension)
+            links = topology.connectivity(2, dimension)
+            entities = np.setdiff1d(entities, np.concatenate([links.links(facet) for facet in facets[name]]))
+        if entities.size:
+            found[name] = entities
+    return found
 
 
 def _check_boundary(topology: Any, groups: Mapping[str, np.ndarray]) -> None:

@@ -17,6 +17,7 @@ from scipy import io, sparse
 
 from vanedamp.files.csv_input import csv_table
 from vanedamp.files.foreign import existing
+from vanedamp.files.formats.matrices.abaqus import GlobalMatrix
 from vanedamp.files.formats.matrices.matlab import read_mat
 from vanedamp.files.formats.matrices.registry import read_mtx, read_npz
 from vanedamp.files.formats.matrices.table import read_table
@@ -50,8 +51,9 @@ def read_matrices(
     stiffness, mass  .mtx (Matrix Market, symmetric or general, or Abaqus), .npz (scipy.sparse.save_npz), .csv (dense),
                      .mat, or CalculiX's .sti and .mas with their .dof, N/m and kg; of a file with several matrices
                      those named stiffness and mass, or K and M
-    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, of
-                     CalculiX in any order. Degrees of freedom that its .dof leaves out are held
+    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, in
+                     any order for CalculiX, and for Abaqus' matrices that name their nodes. Degrees of freedom that
+                     CalculiX's .dof leaves out are held
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
     scale            metres per unit of length of the nodes: 1e-3 for mm
@@ -132,6 +134,8 @@ def _system(
         if Path(path).suffix.lower() in _CALCULIX:
             matrix, held = _placed(Path(path).with_suffix(".dof"), matrix, labels)
             fixed = np.union1d(fixed, held)
+        elif getattr(matrix, "freedoms", None) is not None:
+            matrix = _by_node(Path(path), matrix, matrix.freedoms, labels)
         loaded[name] = matrix
         if matrix.shape != (coordinates.size, coordinates.size):
             raise MatricesError(
@@ -172,7 +176,8 @@ def _matrix(path: Path, name: str) -> sparse.csr_array:
         )
     try:
         found = _READERS[path.suffix.lower()](str(path))
-        return sparse.csr_array(_named(path, name, found) if isinstance(found, dict) else found)
+        matrix = _named(path, name, found) if isinstance(found, dict) else found
+        return matrix if isinstance(matrix, GlobalMatrix) else sparse.csr_array(matrix)
     except MatricesError:
         raise
     except Exception as error:  # the readers raise what they stumble over
@@ -194,6 +199,19 @@ def _placed(path: Path, matrix: sparse.csr_array, labels: Mapping[int, int]) -> 
     rows, columns = (np.array(places)[index] for index in (entries.row, entries.col))
     placed = sparse.csr_array((entries.data, (rows, columns)), shape=(size, size))
     return placed, np.setdiff1d(np.arange(size), places)
+
+
+def _by_node(path: Path, matrix: GlobalMatrix, rows: np.ndarray, labels: Mapping[int, int]) -> sparse.csr_array:
+    """Return a matrix in the order of the nodes; rows: node and freedom (n, 2) of its own."""
+    nodes, freedoms = rows.T
+    if np.any((freedoms < 1) | (freedoms > 3)):
+        raise MatricesError(f"{path}: node {nodes[0]} has the freedom {max(freedoms)}; expected 1, 2 and 3")
+    places = np.array([3 * _index(path, labels, str(node)) for node in nodes.tolist()]) + freedoms - 1
+    if len(places) != 3 * len(labels):
+        lost = next(label for label, index in labels.items() if 3 * index not in set(places.tolist()))
+        raise MatricesError(f"{path}: the matrix has no node {lost}; give the nodes of the matrix only")
+    entries = sparse.coo_array(matrix)
+    return sparse.csr_array((entries.data, (places[entries.row], places[entries.col])), shape=matrix.shape)
 
 
 def _named(path: Path, name: str, found: Mapping[str, Any]) -> Any:

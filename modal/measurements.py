@@ -2,8 +2,8 @@
 
 Temperatures come from CSV only.
 
-Universal files (datasets 15 or 2411, 55, 58) are read and written in SI units and in the global frame; pyuff is an
-optional dependency.
+Universal files (datasets 15 or 2411, 55, 58) are read and written in SI units, their points in the global frame; shapes
+may be along the axes of coordinate systems of their nodes (2420, 18). pyuff is an optional dependency.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vanedamp.files.foreign import existing, reading
 from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
 from vanedamp.files.formats.lab_units import Unit
 from vanedamp.files.formats.lab_units import unit as lab_unit
+from vanedamp.files.formats.meshes.frames import Frame
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
     FORCE,
@@ -37,6 +38,7 @@ from vanedamp.files.formats.universal_datasets import (
     pyuff,
     write_universal,
 )
+from vanedamp.files.formats.universal_systems import frame_of, systems
 from vanedamp.files.store import write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import QUANTITIES, UNITS, Frf
@@ -65,7 +67,8 @@ def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
 
     CSV: a header `x, y, z, dx, dy, dz, <mode>, ...`, then a row for every measured displacement: its point (m), its
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
-    Universal: datasets 15 or 2411 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
+    Universal: datasets 15 or 2411 (nodes), 55 (normal or complex modes), 2420 or 18 (coordinate systems of the nodes'
+    displacements; global where they name none). Raises MeasurementError.
     """
     file = existing(path, MeasurementError)
     if file.suffix.lower() not in _UNIVERSAL:
@@ -332,11 +335,24 @@ def _of(file: Path) -> Iterator[None]:
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:
     found = datasets(file)
-    nodes: dict[int, np.ndarray] = {}
+    nodes: dict[int, tuple[np.ndarray, int]] = {}  # coordinates, and the system of the displacements
+    known = systems(file)
+
+    def frame(system: int) -> Frame:
+        return frame_of(system, lambda why: MeasurementError(f"{file}: {why}"), known)
+
     for dataset in found:
         if dataset["type"] in (15, 2411):
             points = np.column_stack([dataset["x"], dataset["y"], dataset["z"]])
-            nodes |= dict(zip(np.asarray(dataset["node_nums"], dtype=int).tolist(), points, strict=True))
+            labels, given, own = (
+                np.asarray(dataset[key], dtype=int).tolist() for key in ("node_nums", "def_cs", "disp_cs")
+            )
+            for label, system in zip(labels, given, strict=True):
+                if not frame(system).is_global:
+                    raise MeasurementError(
+                        f"{file}: node {label} is given in coordinate system {system}; write global coordinates"
+                    )
+            nodes |= dict(zip(labels, zip(points, own, strict=True), strict=True))
     modes = [d for d in found if d["type"] == 55 and d["analysis_type"] in (NORMAL_MODE, COMPLEX_MODE)]
     if not nodes or not modes:
         raise MeasurementError(f"{file}: holds no nodes (dataset 15 or 2411) or no mode shapes (dataset 55)")
@@ -352,9 +368,10 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
     # exact zeros in every mode are axes that no sensor looked along
     seen = np.abs(shapes).max(axis=0) > 0.0
     with _of(file):
+        axes = [frame(nodes[n][1]).directions(nodes[n][0][None]) for n in numbers.tolist()]
         return MeasuredShapes(
-            points=np.repeat([nodes[n] for n in numbers.tolist()], 3, axis=0)[seen],
-            directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
+            points=np.repeat([nodes[n][0] for n in numbers.tolist()], 3, axis=0)[seen],
+            directions=np.concatenate(axes).reshape(-1, 3)[seen],
             shapes=shapes[:, seen],
             frequencies_hz=np.array(frequencies),
             damping_ratios=np.array([damping_ratio(mode) for mode in modes]),

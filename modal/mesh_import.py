@@ -1,9 +1,8 @@
 """Meshes of other programs as gmsh files: Abaqus, CalculiX, Nastran, Ansys, universal files, MED and others.
 
 Sets of volume elements become volume groups. Facet groups are the boundary facets whose nodes are all in a node set,
-those that shell elements of a set cover, or faces that a surface names. A node set without such a facet becomes a group
-of its nodes, and of the element edges whose nodes are all in it; sets of line and of point elements become groups of
-edges and of points.
+those that shell elements of a set cover, or faces that a surface names. The other nodes of a set, and the element edges
+that they complete, become a group of edges and one of points, of the same name; so do line and point elements of a set.
 """
 
 from __future__ import annotations
@@ -26,7 +25,8 @@ from vanedamp.modal.msh import same_rows
 class _Shape(NamedTuple):
     """A kind of volume cell: its nodes and the nodes of its facets and edges, corners first (VTK's order).
 
-    elements: gmsh's types by dimension from 0; order: gmsh's order of the nodes of a cell.
+    elements: gmsh's types by dimension from 0, which take the first nodes of facets and edges; order: gmsh's order of
+    the nodes of a cell.
     """
 
     corners: int
@@ -46,9 +46,23 @@ _BRICK = _Shape(
     [(0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7)],
     (15, 1, 3, 5), list(range(8)),
 )  # fmt: skip
-# a dolfinx geometry knows no 20-node brick: its edges become straight
-_SHAPES = {"tetra": _TETRA, "tetra10": _TETRA10}
-_SHAPES |= dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), _BRICK)
+_BRICK27 = _Shape(
+    8, 4,
+    [(0, 3, 2, 1, 11, 10, 9, 8, 24), (4, 5, 6, 7, 12, 13, 14, 15, 25), (0, 1, 5, 4, 8, 17, 12, 16, 22),
+     (1, 2, 6, 5, 9, 18, 13, 17, 21), (2, 3, 7, 6, 10, 19, 14, 18, 23), (3, 0, 4, 7, 11, 16, 15, 19, 20)],
+    [(0, 1, 8), (1, 2, 9), (2, 3, 10), (3, 0, 11), (4, 5, 12), (5, 6, 13), (6, 7, 14), (7, 4, 15),
+     (0, 4, 16), (1, 5, 17), (2, 6, 18), (3, 7, 19)],
+    (15, 8, 10, 12),
+    [*range(8), 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14, 24, 22, 20, 21, 23, 25, 26],
+)  # fmt: skip
+# with nodes between its corners in the file, whose edges are straight
+_BRICK20 = _BRICK27._replace(
+    facets=[facet[:8] for facet in _BRICK27.facets], elements=_BRICK.elements, order=_BRICK.order
+)
+_SHAPES = {"tetra": _TETRA, "tetra10": _TETRA10, "hexahedron": _BRICK}
+_SHAPES |= {"hexahedron20": _BRICK20, "hexahedron27": _BRICK27}
+# distance of a node from the middle of its edge, over the size of the element, from which the edge is curved
+_CURVED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +70,7 @@ class _Source:
     """A mesh as read: volume cells of one shape, and named sets of them and of nodes, by index.
 
     labels  of the cells, in the file
+    nodes   labels of the points in the file, which come first among the points
     covers  dimension -> name -> corners (sorted) of the shells, lines and points of a set, of faces of a surface
     absent  name -> the first member of a set that the mesh does not have
     """
@@ -65,6 +80,7 @@ class _Source:
     shape: _Shape
     cells: np.ndarray
     labels: np.ndarray
+    nodes: list[int]
     cell_sets: dict[str, np.ndarray]
     covers: dict[int, dict[str, set[tuple[int, ...]]]]
     node_sets: dict[str, np.ndarray]
@@ -85,10 +101,11 @@ def convert(
              and points; left out: all
     scale    metres per unit of length of the file: 1e-3 for millimetres
 
-    Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
-    with straight edges (the displacements have a degree of their own). Raises MeshError.
+    Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones,
+    where an edge is curved 27-node ones of the same shape (the displacements have a degree of their own). Raises
+    MeshError, also for shells with a stiffness of their own unless `facets` names their set.
     """
-    source = _source(Path(path), read_mesh(Path(path)))
+    source = _source(Path(path), read_mesh(Path(path)), facets or ())
     entities, groups = _grouped(source, volumes, facets)
     _check_disjoint(source.path, groups)
     with msh.session(str(source.path)):
@@ -109,14 +126,14 @@ def group_names(
 
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
-    source = _source(Path(path), read_mesh(Path(path)))
+    source = _source(Path(path), read_mesh(Path(path)), facets)
     entities, groups = _grouped(source, volumes, facets)
     _check_disjoint(source.path, groups)
     with msh.session(str(source.path)):
         _fill_model(source, entities, groups, 1.0)
         centres = msh.centres()
     _, groups = _grouped(source, None, None)
-    used = np.unique(source.cells)
+    used = np.unique(source.cells[:, source.shape.order])
     extent = float(np.ptp(source.points[used], axis=0).max())
     return {dimension: list(named) for dimension, named in groups.items()}, used.size, extent, centres
 
@@ -128,12 +145,22 @@ def _grouped(
     surface, edges = _boundary(source), _edges(source)
     groups = {3: _wanted(source, source.cell_sets, volumes, "set of volume elements")}
     groups[2] = _facet_groups(source, surface, facets)
-    groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
-    return {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}, groups
+    faces = {name: surface[members] for name, members in groups[2].items()}
+    groups[1], groups[0] = _lower_groups(source, edges, faces, facets)
+    entities = {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}
+    for name in sorted((facets or ()) & source.node_sets.keys()):
+        held = [entities[d][groups[d][name]].ravel() for d in (2, 1, 0) if name in groups[d]]
+        lost = np.setdiff1d(np.intersect1d(source.node_sets[name], source.cells), np.concatenate(held))
+        if lost.size:
+            raise MeshError(
+                f"{source.path}: node {source.nodes[lost[0]]} of the set {name!r} lies on an edge whose other nodes "
+                "are not all in the set; name all of them, or take it out"
+            )
+    return entities, groups
 
 
-def _source(path: Path, mesh: LabelledMesh) -> _Source:
-    """Return the mesh by indices, with its volume elements of one kind."""
+def _source(path: Path, mesh: LabelledMesh, skins: Collection[str]) -> _Source:
+    """Return the mesh by indices, with its volume elements of one kind; skins: sets whose shells are mere facets."""
     if not mesh.nodes:
         raise MeshError(f"{path}: holds no nodes: empty, or not of the format of {path.suffix}")
     points = mesh.coordinates(mesh.nodes)
@@ -145,13 +172,24 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
         missing = [node for node in nodes if node not in place]
         if missing:
             raise MeshError(f"{path}: element {label}: there is no node {missing[0]}")
+    named = {label for name in skins for label in mesh.element_sets.get(name, ())}
+    stiff = next((label for label in mesh.stiff if label not in named), None)
+    if stiff is not None:
+        raise MeshError(
+            f"{path}: element {stiff} ({mesh.elements[stiff][0]}) has a stiffness and a mass of its own by "
+            f"{mesh.stiff[stiff]}, which are not imported; mesh it as a solid, or remove it; where it is only a skin, "
+            "name its set as a support or an interface"
+        )
     shape, cells, order = _cells(path, mesh, place)
+    if len(shape.edges[0]) == 3 and shape.corners == 8:
+        shape, cells, points = _bricks(points, cells)
     return _Source(
         path=path,
         points=points,
         shape=shape,
         cells=cells,
         labels=np.array(list(order)),
+        nodes=list(mesh.nodes),
         cell_sets=_indexed(mesh.element_sets, order),
         covers=_covers(mesh, place),
         node_sets=_indexed(mesh.node_sets, place),
@@ -167,13 +205,41 @@ def _cells(path: Path, mesh: LabelledMesh, place: dict[int, int]) -> tuple[_Shap
         found = ", ".join(sorted(solids)) or "none"
         raise MeshError(f"{path}: volume elements: {found}; expected one kind, tetrahedra or hexahedra")
     shape = _SHAPES[solids.pop()]
-    width = len(shape.order)
-    cells = np.array([[place[node] for node in mesh.elements[label][1][:width]] for label in volumes])
+    cells = np.array([[place[node] for node in mesh.elements[label][1]] for label in volumes])
     pair = same_rows(np.sort(cells[:, : shape.corners], axis=1))
     if pair is not None:
         first, second = (list(volumes)[index] for index in pair)
         raise MeshError(f"{path}: volume elements {first} and {second} have the same nodes; remove one of them")
     return shape, cells, dict(zip(volumes, range(len(volumes)), strict=True))
+
+
+def _bricks(points: np.ndarray, cells: np.ndarray) -> tuple[_Shape, np.ndarray, np.ndarray]:
+    """Return shape, cells and points of bricks with 20 or 27 nodes, where curved with 27.
+
+    The nodes that a 20-node brick lacks are put where its own shape functions have them: the shape stays the same, and
+    a dolfinx geometry knows no 20-node brick.
+    """
+    places = points[cells]
+    corners, middles = places[:, :8], places[:, 8:20]
+    pairs = np.array(_BRICK27.edges)[:, :2]
+    off = [middles - corners[:, pairs].mean(axis=2)]
+    # in the order of the nodes 20 to 25
+    faces = np.array(sorted(_BRICK27.facets, key=lambda facet: facet[8]))
+    centres = 0.5 * places[:, faces[:, 4:8]].sum(axis=2) - 0.25 * places[:, faces[:, :4]].sum(axis=2)
+    inner = 0.25 * (middles.sum(axis=1) - corners.sum(axis=1))
+    if cells.shape[1] == 27:
+        off.append(places[:, 20:] - np.concatenate([centres, inner[:, None]], axis=1))
+    sizes = np.ptp(corners, axis=1).max(axis=1)
+    if np.all(np.linalg.norm(np.concatenate(off, axis=1), axis=2).max(axis=1) <= _CURVED * sizes):
+        return _BRICK20, cells[:, :20], points
+    if cells.shape[1] == 27:
+        return _BRICK27, cells, points
+    keys = np.sort(cells[:, faces[:, :4]], axis=2).reshape(-1, 4)
+    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    added = len(points) + number.reshape(-1, 6)
+    inside = len(points) + first.size + np.arange(len(cells))
+    whole = np.concatenate([cells, added, inside[:, None]], axis=1)
+    return _BRICK27, whole, np.concatenate([points, centres.reshape(-1, 3)[first], inner])
 
 
 def _absent(mesh: LabelledMesh) -> dict[str, str]:
@@ -232,9 +298,8 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
     keys = {key: index for index, key in enumerate(_keys(surface, source.shape.facet_corners))}
     groups: dict[str, np.ndarray] = {}
     for name, nodes in source.node_sets.items():
-        inside = np.zeros(len(source.points), dtype=bool)
-        inside[nodes] = True
-        groups[name] = np.flatnonzero(inside[surface].all(axis=1))
+        groups[name] = np.flatnonzero(_inside(source, nodes)[surface].all(axis=1))
+        _check_alike(source, name, wanted)
     for name, faces in source.covers[2].items():
         covered = np.array([keys[face] for face in faces if face in keys], dtype=int)
         if name in (wanted or ()) and covered.size < len(faces):
@@ -247,8 +312,28 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
     return _wanted(source, lower | groups, wanted, "set or surface")
 
 
+def _inside(source: _Source, nodes: np.ndarray) -> np.ndarray:
+    """Return which points (bool) are in a set of nodes, or are no nodes of the file."""
+    inside = np.ones(len(source.points), dtype=bool)
+    inside[: len(source.nodes)] = False
+    inside[nodes] = True
+    return inside
+
+
+def _check_alike(source: _Source, name: str, wanted: Collection[str] | None) -> None:
+    """Raise MeshError for a wanted name that means both nodes, and elements or faces with other corners."""
+    keys = [key for covers in source.covers.values() for key in covers.get(name, ())]
+    if name in (wanted or ()) and keys:
+        corners = np.unique(source.cells[:, : source.shape.corners])
+        if set(np.intersect1d(source.node_sets[name], corners).tolist()) != {node for key in keys for node in key}:
+            raise MeshError(
+                f"{source.path}: {name!r} is a set of nodes, and one of elements or a surface with other nodes; give "
+                "them two names"
+            )
+
+
 def _edges(source: _Source) -> np.ndarray:
-    """Return the nodes of the element edges: (n, 2), of quadratic cells (n, 3) with the node between them last."""
+    """Return the nodes of the element edges: (n, 2), where there is a node between them (n, 3) with that last."""
     edges = np.concatenate([source.cells[:, edge] for edge in source.shape.edges])
     return np.asarray(edges[np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True)[1]])
 
@@ -256,27 +341,31 @@ def _edges(source: _Source) -> np.ndarray:
 def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
+    """Return what sets hold besides their facets (n, k): name -> indices of edges, name -> corners of elements."""
     corners = np.unique(source.cells[:, : source.shape.corners])
     keys = {key: index for index, key in enumerate(_keys(edges, 2))}
     lines: dict[str, np.ndarray] = {}
     points: dict[str, np.ndarray] = {}
     groups = source.node_sets | source.covers[1] | source.covers[0]
     for name in groups:
-        if name in facets or name not in (groups.keys() - source.absent.keys() if wanted is None else wanted):
+        if name not in (groups.keys() - source.absent.keys() if wanted is None else wanted):
             continue
-        inside = np.zeros(len(source.points), dtype=bool)
         pairs, single = source.covers[1].get(name, set()), source.covers[0].get(name, set())
-        inside[[] if pairs or single else source.node_sets[name]] = True
+        elements = any(name in covers for covers in source.covers.values())
+        inside = _inside(source, np.empty(0, dtype=int) if elements else source.node_sets[name])
+        outside = np.ones(len(source.points), dtype=bool)
+        faces = facets.get(name, np.empty((0, 1), dtype=int))
+        outside[faces] = False
         given = [keys[pair] for pair in pairs if pair in keys]
-        lines[name] = np.union1d(np.flatnonzero(inside[edges].all(axis=1)), np.array(given, dtype=int))
+        beyond = np.flatnonzero(inside[edges].all(axis=1) & outside[edges].any(axis=1))
+        lines[name] = np.union1d(beyond, np.array(given, dtype=int))
         inside[[node for (node,) in single]] = True
-        points[name] = corners[inside[corners]]
+        points[name] = corners[(inside & outside)[corners]]
         if wanted is None:
             continue
         if len(given) < len(pairs):
             raise MeshError(f"{source.path}: the set {name!r} holds a line that is no edge of a volume element")
-        if not points[name].size and not lines[name].size:
+        if not points[name].size and not lines[name].size and not faces.size:
             raise MeshError(f"{source.path}: the set {name!r} holds no corner of a volume element")
     return _kept(lines), _kept(points)
 
@@ -311,18 +400,19 @@ def _fill_model(
     Raises MeshError for folded cells, by their labels.
     """
     rest = np.setdiff1d(np.arange(len(source.cells)), np.concatenate([np.empty(0, int), *groups[3].values()]))
-    used = np.unique(source.cells)
+    used = np.unique(source.cells[:, source.shape.order])
     number = np.zeros(len(source.points), dtype=int)
     number[used] = np.arange(1, used.size + 1)
     volumes = groups[3] | ({"": rest} if rest.size else {})
     for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
-        nodes = number[entities[dimension]]
-        nodes = nodes[:, source.shape.order] if dimension == 3 else nodes
+        kind = source.shape.elements[dimension]
+        width = gmsh.model.mesh.getElementProperties(kind)[3]
+        nodes = number[entities[dimension][:, source.shape.order if dimension == 3 else slice(width)]]
         for name, members in named.items():
             entity = gmsh.model.addDiscreteEntity(dimension)
             if dimension == 3 and entity == 1:
                 gmsh.model.mesh.addNodes(3, entity, number[used], (scale * source.points[used]).ravel())
-            gmsh.model.mesh.addElementsByType(entity, source.shape.elements[dimension], [], nodes[members].ravel())
+            gmsh.model.mesh.addElementsByType(entity, kind, [], nodes[members].ravel())
             if name:
                 gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
     try:

@@ -90,11 +90,17 @@ def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray)
     motion: functionals (N, 3) of the motion along, across and of the rotation, or (N, 2) without a rotation;
     functional: (N,) of the rigid model's interface coordinate, which the mode moves.
     """
-    along = motion[:, 0] @ shape
-    if not _moves(along, motion[:, 0], shape):
+    along = motion_along(shape, motion[:, 0], functional)
+    if along is None:
         return None
-    normal_motion, *rotation = (motion[:, 1:].T @ shape / along).tolist()
-    return CavityMotion(float(along / (functional @ shape)), normal_motion, *(rotation or [0.0]))
+    normal_motion, *rotation = (motion[:, 1:].T @ shape / (motion[:, 0] @ shape)).tolist()
+    return CavityMotion(along, normal_motion, *(rotation or [0.0]))
+
+
+def motion_along(shape: np.ndarray, along: np.ndarray, functional: np.ndarray) -> float | None:
+    """Return the motion of a functional (N,) in a mode, for unit displacement of the other; None where it rests."""
+    displacement = float(along @ shape)
+    return displacement / float(functional @ shape) if _moves(displacement, along, shape) else None
 
 
 def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bool:

@@ -11,7 +11,9 @@ from tomlkit.items import AbstractTable, Array, InlineTable
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_output import write_commented
+from vanedamp.modal.rigid_model import motion_along
 from vanedamp.studies.case.calibration import Calibration
+from vanedamp.studies.case.stages import interface
 from vanedamp.studies.case.tables import FILES
 from vanedamp.studies.file_kinds import KINDS
 
@@ -69,7 +71,7 @@ def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
 def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     """Return the tables of a scene with the rigid model of a calibration, its force and its cavities.
 
-    A case without cavities that move across gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
+    A case without cavities gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
     """
     rigid, fatigue = calibration.rigid, calibration.analysis.fatigue
     structure: dict[str, Any] = {
@@ -85,7 +87,8 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     motions = {
         label: {"normal_motion": motion.normal_motion, "rotation": motion.rotation}
         for label, motion in calibration.analysis.cavities.items()
-    } or {"c1": {}}
+    }
+    motions = motions | {name: {} for name in _floors(calibration)} or {"c1": {}}
     body = {"mass": _rounded(_BODY * rigid.mass / len(motions)), "friction": 0.4, "restitution": 0.7}
     low, high = (round(share * rigid.frequency_hz, 1) for share in _RANGE)
     sweep: dict[str, Any] = {} if len(motions) > 1 else {f"cavity.{next(iter(motions))}.gap": gaps}
@@ -99,6 +102,21 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     }
 
 
+def _floors(calibration: Calibration) -> dict[str, float]:
+    """Return the cavities that only a floor's motion along gives, NAME_floor, with that motion in the rigid model."""
+    analysis, case = calibration.analysis, calibration.case
+    assert analysis.first_bending is not None and analysis.functional is not None
+    shape = analysis.modes.shapes[analysis.first_bending]
+    motions: dict[str, float] = {}
+    for label, table in case.interface.items():
+        name = label.removesuffix("_floor")
+        if label != name and name not in analysis.cavities and not table.planar and table.motion == "translation":
+            vector = interface(case, analysis.structure.matrices, [label]).vectors[:, 0]
+            along = motion_along(shape, vector, analysis.functional)
+            motions |= {} if along is None else {name: along}
+    return motions
+
+
 def _scene_notes(calibration: Calibration) -> dict[str, str]:
     """Return comments on the tables of the scene, by their names."""
     rigid, analysis = calibration.rigid, calibration.analysis
@@ -108,7 +126,8 @@ def _scene_notes(calibration: Calibration) -> dict[str, str]:
             f"The force brings the resonance without bodies to {analysis.fatigue.amplitude:.6g} m at {rigid.at}, "
             f"{analysis.fatigue.share:.0%} of the fatigue strength."
         )
-    motions = [f"{label} moves by {motion.along:.4g} of {rigid.at}" for label, motion in analysis.cavities.items()]
+    along = {label: motion.along for label, motion in analysis.cavities.items()} | _floors(calibration)
+    motions = [f"{name} moves by {value:.4g} of {rigid.at}" for name, value in along.items()]
     plane = f"Along itself {', '.join(motions)}, in this scene by 1; normal_motion and rotation are for planar bodies."
     return {
         "structure": f"{rigid.frequency_hz:.6g} Hz; damping ratio: {_damping_note(calibration)}.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import asdict, field
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 from scipy import linalg
 
-from vanedamp.files.formats.matrices.registry import read_matrices
+from vanedamp.files.formats.matrices.registry import read_matrices, row_freedoms
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import STRICT, Direction, InputError, Real, Whole, nearest, read_toml, validate
 from vanedamp.modal.units import model_doubts
@@ -96,6 +97,7 @@ class External:
             for key, name in names.items()
             if name
         }
+        _check_rows({key: folder / name for key, name in names.items() if name and Path(name).suffix and not in_file})
         damping, base_load = matrices.pop("damping", None), matrices.pop("base_load", None)
         interface: dict[str, int | np.ndarray] = {
             label: int(item.coordinate or 0) if item.row is None else np.array(item.row)
@@ -108,6 +110,19 @@ class External:
             provenance={"source": str(self.name or Path(path).name), "matrices": names, "versions": versions()},
         )  # fmt: skip
         return model, findings, _doubts(model)
+
+
+def _check_rows(files: dict[str, Path]) -> None:
+    """Raise InputError for matrices, by key, whose files give their rows to different nodes."""
+    rows = {key: freedoms for key, file in files.items() if (freedoms := row_freedoms(file)) is not None}
+    for (first, ones), (key, others) in itertools.pairwise(rows.items()):
+        odd = {tuple(row) for row in ones.tolist()} ^ {tuple(row) for row in others.tolist()}
+        if odd:
+            node, freedom = min(odd)
+            raise InputError(
+                f"matrices.{key}: has rows of other nodes than matrices.{first}: only one of them has node {node}, "
+                f"freedom {freedom}; write both of the same nodes"
+            )
 
 
 def _doubts(model: ReducedModel) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from vanedamp.modal.cyclic_statics import RingStatics
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
+from vanedamp.modal.joints import coincident_nodes, free_motions
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 from vanedamp.modal.measurements import read_shapes, read_temperature
 from vanedamp.modal.mesh_import import convert
@@ -107,7 +108,8 @@ def assemble(case: Case) -> Structure:
             name: ElasticSupport(table.stiffness, table.normal, table.tangential)
             for name, table in case.support.elastic.items()
         }
-        solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature))
+        source = case.mesh.files if isinstance(case.mesh, MeshFile) else ()
+        solid = Solid(path, materials, case.mesh.degree, springs, scale, _temperature(case.temperature), source)
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         ring = case.ring
@@ -348,7 +350,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     bending, warnings = _first_bending(case, modes, matrices)
     straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
     lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
-    warnings += unit_doubts(structure, lowest)
+    warnings += unit_doubts(structure, lowest) + joint_doubts(structure, modes)
     if not modes.counted:
         warnings += (_UNCOUNTED,)
     if case.ring is not None:
@@ -463,6 +465,28 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     return tuple(f"units: {remark}" for remark in remarks)
 
 
+def joint_doubts(structure: Structure, modes: Modes | None = None) -> tuple[str, ...]:
+    """Return warnings of nodes that lie where others do, and of modes of a held structure without strain."""
+    matrices, support = structure.matrices, structure.case.support
+    found, twins = [], coincident_nodes(matrices)
+    if twins.size:
+        place = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
+        found.append(
+            f"mesh: {twins.size} nodes lie where others do, such as at ({place}) m: parts are not joined there; merge "
+            "the nodes, unless a gap is meant"
+        )
+    if modes is not None and (support.clamped or support.elastic):
+        whole, parts = free_motions(modes, matrices)
+        if whole:
+            found.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
+        if parts:
+            found.append(
+                f"modes: {parts} at 0 Hz move parts of the structure against each other, which hang together by an "
+                "edge or a point only; join their nodes"
+            )
+    return tuple(found)
+
+
 def campbell_diagram(
     structure: Structure,
     report: Callable[[int, int], None] | None = None,
@@ -556,9 +580,9 @@ def reduction(
 
 
 def reduction_warnings(structure: Structure, model: ReducedModel) -> tuple[str, ...]:
-    """Return what to look at in a reduced model: units, strengths, and stresses that the mesh does not determine."""
+    """Return what to look at in a reduced model: units, joints, strengths, and stresses that the mesh decides."""
     made = model.provenance
-    found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))
+    found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])) + joint_doubts(structure)
     if made.get("fatigue") is not None or "hot_spots" in made:
         found += strength_warnings(structure)
     return found + tuple(spot_warnings(made))

@@ -557,8 +557,8 @@ class Case:
 
     @property
     def volume_groups(self) -> set[str]:
-        """Every group of volumes that materials and the ring name."""
-        return {*self.material, *(self.ring.deviating if self.ring is not None else ())} - {"default"}
+        """Every group of volumes that materials and the ring name; "unnamed" are the elements outside of them."""
+        return {*self.material, *(self.ring.deviating if self.ring is not None else ())} - {"default", "unnamed"}
 
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
@@ -570,14 +570,20 @@ class Case:
             _check_group("support.clamped", group, known)
         for group in self.hot_spots.exclude:
             _check_group("hot_spots.exclude", group, known)
+        mixed = {group for group in surfaces["facet"] if any(group in known[kind] for kind in known if kind != "facet")}
         for group in self.support.elastic:
             _check_group(f"support.elastic.{group}", group, surfaces)
+            if group in mixed:
+                raise InputError(
+                    f"support.elastic.{group}: holds edges or points besides its facets, which have no area; take them "
+                    "out of the set"
+                )
         for label, table in self.interface.items():
             for group in table.groups:
                 _check_group(f"interface.{label}.facets", group, known)
             # a facet group weighs its nodes by area, others each by one
-            kinds = {kind for kind, names in known.items() if set(table.groups) & set(names)}
-            if len(kinds) > 1:
+            kinds = [kind for kind, names in known.items() if set(table.groups) & set(names)]
+            if "facet" in kinds and len(kinds) > 1:
                 raise InputError(
                     f"interface.{label}.facets: groups of several kinds ({', '.join(sorted(kinds))}), whose nodes have "
                     "no common weights; take groups of one kind"
@@ -586,6 +592,8 @@ class Case:
                 _check_group(f"interface.{label}.{key}", group, surfaces)
         for key, group in (self.ring.groups if self.ring is not None else {}).items():
             _check_group(f"ring.{key}", group, surfaces)
+            if group in mixed:
+                raise InputError(f"ring.{key}: holds edges or points besides its facets; take them out of the set")
         for group in self.ring.deviating if self.ring is not None else ():
             _check_group("ring.deviating", group, {"volume": [*volumes]})
         for group in self.material:

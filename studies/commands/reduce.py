@@ -14,7 +14,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.ring_stages import ring_reduction
-from vanedamp.studies.case.stages import assemble, reduction, reduction_warnings, unit_doubts
+from vanedamp.studies.case.stages import assemble, joint_doubts, reduction, reduction_warnings, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.hot_spots import plus_minus, spot_lines
@@ -76,7 +76,7 @@ def _reduce_ring(arguments: Namespace, case: Case, started: float) -> None:
         "interface": list(ring.interface),
         "estimate": ring.provenance["estimate"],
         "greatest_speed": ring.greatest_speed if isinstance(ring, RingModel) else 0.0,
-        "warnings": list(unit_doubts(structure, float(frequencies.min()))),
+        "warnings": [*unit_doubts(structure, float(frequencies.min())), *joint_doubts(structure)],
         "wall_time_s": time.perf_counter() - started,
     }
     if case.rotation is not None and case.rotation.gyroscopic:

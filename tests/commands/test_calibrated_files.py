@@ -92,6 +92,21 @@ def test_only_tuned_numbers_differ_and_say_what_they_were(rig):
     assert "# the foundation\n" in text
 
 
+def test_the_rigid_scene_has_cavities_that_only_a_floor_gives(tmp_path, capsys):
+    """A floor's motion along is that of the facets' mean; one that is a cavity with its motion across comes once."""
+    floors = '[interface.{}_floor]\nfacets = "{}"\ndirection = [0, 0, 1]\n'
+    text = CASE.format(young=2e11, springs=1e14) + floors.format("c2", "top") + floors.format("cavity", "tip")
+    (tmp_path / "case.toml").write_text(text)
+    assert main(["calibrate", str(tmp_path / "case.toml"), "--scene", str(tmp_path / "rigid.toml")]) == 0
+    scene = Scene.load(tmp_path / "rigid.toml")
+    assert [cavity.name for cavity in scene.cavity] == ["cavity", "c2"] == [body.cavity for body in scene.damper]
+    structure = assemble(Case.load(tmp_path / "case.toml"))
+    shape = solve_modes(structure.matrices, 1).shapes[0].reshape(-1, 3)[:, 2]
+    top, tip = (structure.matrices.patches[name] for name in ("top", "tip"))
+    mean = [patch.weights @ shape[patch.nodes] / patch.area for patch in (top, tip)]
+    assert f"c2 moves by {mean[0] / mean[1]:.4g} of tip" in (tmp_path / "rigid.toml").read_text().replace("\n# ", " ")
+
+
 def test_the_rigid_scene_is_the_calibrated_mode(rig, capsys):
     rigid, excitation, cavity = (
         json.loads((rig / "calibration.json").read_text())[key] for key in ("rigid", "excitation", "cavity")

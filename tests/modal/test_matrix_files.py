@@ -151,6 +151,31 @@ def test_matrices_of_calculix_leave_held_coordinates_out(folder, tmp_path):
         read_matrices(*files)
 
 
+def test_matrices_of_abaqus_are_placed_by_their_nodes(folder, tmp_path):
+    """Nodes in another order than in nodes.csv, which has numbers of its own; the matrices' rows ascend by node."""
+    given = truss()
+    labels = 500 - 3 * np.arange(14)
+    for name, file in (("stiffness", "k.mtx"), ("mass", "m.mtx")):
+        entries = sparse.coo_array(getattr(given, name))
+        rows = [(labels[i // 3], i % 3 + 1, labels[j // 3], j % 3 + 1, v) for i, j, v in
+                zip(entries.row, entries.col, entries.data.tolist(), strict=True)]  # fmt: skip
+        (tmp_path / file).write_text("".join(f"{a},{b}, {c},{d}, {v!r}\n" for a, b, c, d, v in rows))
+    places = zip(labels.tolist(), given.coordinates.tolist(), strict=True)
+    text = "".join(f"{label},{x!r},{y!r},{z!r}\n" for label, (x, y, z) in places)
+    (tmp_path / "own.csv").write_text(text)
+    again = read_matrices(tmp_path / "k.mtx", tmp_path / "m.mtx", tmp_path / "own.csv")
+    for name in ("stiffness", "mass"):
+        ours, theirs = getattr(given, name), getattr(again, name)
+        assert abs(ours - theirs).max() <= 1e-15 * abs(ours).max()
+    for csv, told in (
+        (text.replace("500,", "501,"), "m.mtx: node '500' is not among the nodes|k.mtx: node '500' is not among"),
+        (text + "7,0,0,0\n", r"k\.mtx: the matrix has no node 7; give the nodes of the matrix only"),
+    ):
+        (tmp_path / "own.csv").write_text(csv)
+        with pytest.raises(MatricesError, match=told):
+            read_matrices(tmp_path / "k.mtx", tmp_path / "m.mtx", tmp_path / "own.csv")
+
+
 def test_matrices_of_abaqus_may_have_the_ending_of_matrix_market(folder, tmp_path):
     given = truss()
     for name, file in (("stiffness", "job_STIF1.mtx"), ("mass", "job_MASS1.mtx")):

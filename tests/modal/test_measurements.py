@@ -49,6 +49,47 @@ def test_shapes_through_a_universal_file(tmp_path, kind):
     assert again.damping_ratios == pytest.approx(given.damping_ratios, rel=1e-4)  # of an eigenvalue of six digits
 
 
+@pytest.mark.parametrize("dataset", [2420, 18])
+@pytest.mark.parametrize("kind", [0, 1])
+def test_displacements_along_axes_of_their_nodes(tmp_path, dataset, kind):
+    """A motion (1, 2, 3) of a point at (3, 4, 5), given along x' = z, y' = x, z' = y about (3, 0, 5), or radially."""
+    pytest.importorskip("pyuff")
+    write_shapes(MeasuredShapes([(3.0, 4.0, 5.0)] * 3, np.eye(3), [[1.0, 2.0, 3.0]], [100.0]), tmp_path / "global.uff")
+    # the axis z' is y, on which the point lies 4 above the origin: its radius is zero, unless the origin moves to x = 2
+    origin, values = ((3, 0, 5), (3.0, 1.0, 2.0)) if kind == 0 else ((2, 0, 5), (1.0, -3.0, 2.0))
+    system = (
+        "  2420\n         1\npart\n{label:10}{kind:10}         1\nlocal\n0. 0. 1.\n1. 0. 0.\n0. 1. 0.\n{x} {y} {z}\n"
+    )
+    if dataset == 18:  # the origin, a point on x', one in the plane of x' and z'
+        system = "    18\n{label:10}{kind:10}         0         1         1\nlocal\n"
+        system += "{x}. {y}. {z}. {x}. {y}. 9.\n{x}. 4. 6.\n"
+    text = (tmp_path / "global.uff").read_text()
+    head = "    -1\n" + system.format(label=7, kind=kind, **dict(zip("xyz", origin, strict=True))) + "    -1\n"
+    node = re.search(r"^ +1 +0 +0 +0", text, re.MULTILINE)[0]
+    numbers = "".join(f"{value:13.5e}" for value in (1.0, 2.0, 3.0))
+    assert text.count(node) == 1 and text.count(numbers) == 1
+    text = text.replace(node, f"{1:10}{0:10}{7:10}{0:10}").replace(
+        numbers, "".join(f"{value:13.5e}" for value in values)
+    )
+    (tmp_path / "local.uff").write_text(head + text)
+    again = read_shapes(tmp_path / "local.uff")
+    assert again.points == pytest.approx(np.tile([3.0, 4.0, 5.0], (3, 1)))
+    assert again.shapes @ again.directions == pytest.approx(np.array([[1.0, 2.0, 3.0]]), abs=1e-12)
+    for old, new, told in (
+        (f"{1:10}{0:10}{7:10}", f"{1:10}{0:10}{8:10}", "the coordinate system 8 is not given in the file"),
+        (
+            f"{1:10}{0:10}{7:10}",
+            f"{1:10}{7:10}{7:10}",
+            "node 1 is given in coordinate system 7; write global coordinates",
+        ),
+        (f"\n{7:10}{kind:10}", f"\n{7:10}{2:10}", "spherical"),
+    ):
+        assert (head + text).count(old) == 1
+        (tmp_path / "bad.uff").write_text((head + text).replace(old, new))
+        with pytest.raises(MeasurementError, match=rf"bad\.uff: .*{told}"):
+            read_shapes(tmp_path / "bad.uff")
+
+
 @pytest.mark.parametrize("name", ["frf.csv", "frf.uff"])
 def test_responses_round_trip(tmp_path, name):
     if name.endswith("uff"):

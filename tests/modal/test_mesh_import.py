@@ -115,13 +115,11 @@ def test_the_same_frequencies_through_another_programs_file(meshes, tmp_path, ki
 def test_bricks_of_twenty_nodes_keep_their_corners(meshes, tmp_path):
     points, cells = cells_of(meshes["hexahedron"], "hexahedron")
     edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
-    middle = np.array([[0.5 * (points[cell[a]] + points[cell[b]]) for a, b in edges] for cell in cells])
-    extra = len(points) + np.arange(12 * len(cells)).reshape(len(cells), 12)
-    mesh = meshlane.Mesh(
-        np.concatenate([points, middle.reshape(-1, 3)]),
-        [("hexahedron20", np.column_stack([cells, extra]))],
-        point_sets={"ROOT": np.flatnonzero(np.isclose(points[:, 0], 0.0))},
-    )
+    pairs, extra = np.unique(np.sort(cells[:, edges], axis=2).reshape(-1, 2), axis=0, return_inverse=True)
+    cells = np.column_stack([cells, len(points) + extra.reshape(-1, 12)])
+    points = np.concatenate([points, points[pairs].mean(axis=1)])
+    root = np.flatnonzero(np.isclose(points[:, 0], 0.0))
+    mesh = meshlane.Mesh(points, [("hexahedron20", cells)], point_sets={"ROOT": root})
     mesh.write(tmp_path / "bricks.inp")
     solid = Solid(convert(tmp_path / "bricks.inp", tmp_path / "bricks.msh"), {"default": STEEL})
     ours = assemble(meshes["hexahedron"], {"default": STEEL}, {"root": "xyz"})

@@ -175,3 +175,22 @@ def test_a_model_in_tonnes_and_millimetres_is_told(tmp_path, monkeypatch, capsys
         assert ("effective mass of 0.000148 kg at the interface" in captured.err) == told
         assert len(result["warnings"]) == told
     assert ReducedModel.load("rom.h5").mass[0, 0] == pytest.approx(0.148, rel=1e-12)
+
+
+@pytest.mark.parametrize(("node", "accepted"), [(3, True), (4, False)])
+def test_matrices_of_abaqus_have_the_same_nodes(tmp_path, monkeypatch, capsys, node, accepted):
+    """Equal sizes are no proof: the masses of nodes 1, 2 and 4 are not those of 1, 2 and 3."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "k.mtx").write_text("1,1, 1,1, 2e6\n2,1, 1,1, -1e6\n2,1, 2,1, 2e6\n3,1, 2,1, -1e6\n3,1, 3,1, 1e6\n")
+    (tmp_path / "m.mtx").write_text(f"1,1, 1,1, 1.0\n{node},1, {node},1, 2.0\n2,1, 2,1, 1.0\n")
+    table = '[matrices]\nstiffness = "k.mtx"\nmass = "m.mtx"\ndamping_ratio = 0.1\n[interface.x]\ncoordinate = 0\n'
+    (tmp_path / "external.toml").write_text(table)
+    assert main(["import", "external.toml", "-o", "rom.h5", "--json", "-"]) == (0 if accepted else 2)
+    captured = capsys.readouterr()
+    if accepted:
+        chain = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+        right = np.sqrt(np.linalg.eigvals(np.diag([1.0, 1.0, 0.5]) @ (1e6 * chain)).real) / (2.0 * np.pi)
+        assert json.loads(captured.out)["frequency_hz"] == pytest.approx(np.sort(right), rel=1e-9)
+    else:
+        told = "has rows of other nodes than matrices.mass: only one of them has node 3, freedom 1"
+        assert f"matrices.stiffness: {told}" in captured.err

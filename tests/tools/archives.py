@@ -56,8 +56,9 @@ def ansys_archive(mesh):
         numbers = [given, given, 1, 1, 0, 0, 0, 0, len(nodes), 0, label, *nodes]
         lines += ["".join(f"{number:9d}" for number in part) for part in (numbers[:19], numbers[19:]) if part]
     lines.append(f"{-1:9d}")
-    for name, members in mesh.element_sets.items():
-        lines += ansys_component(name, "ELEM", members)
+    for entity, sets in (("ELEM", mesh.element_sets), ("NODE", mesh.node_sets)):
+        for name, members in sets.items():
+            lines += ansys_component(name, entity, members)
     return "\n".join([*lines, "/GO", "FINISH"]) + "\n"
 
 

@@ -21,6 +21,15 @@ _ENTRIES = 4
 _NAMES = {"stiffness": "stiffness", "mass": "mass", "viscousdamping": "damping", "damping": "damping"}
 
 
+class GlobalMatrix(sparse.csr_array):
+    """A symmetric matrix of *MATRIX OUTPUT.
+
+    freedoms  (n, 2) node and freedom of its rows, ascending; None where the file only counts rows
+    """
+
+    freedoms: np.ndarray | None = None
+
+
 def is_matrix_market(path: Path) -> bool:
     """Whether an .mtx file is one of Matrix Market, which says so in its first line."""
     with path.open(encoding="latin-1") as stream:
@@ -50,7 +59,7 @@ def _text(value: float) -> str:
 
 
 def read_matrices(path: Path) -> dict[str, Any]:
-    """Read stiffness, mass and damping of a substructure by name; one global matrix, sparse, has the name "".
+    """Read stiffness, mass and damping of a substructure by name; one global matrix, a GlobalMatrix, has the name "".
 
     Global matrices come from *MATRIX OUTPUT: FORMAT=MATRIX INPUT (node, freedom, node, freedom, entry), of nodes
     that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry), as CalculiX writes .sti and .mas.
@@ -127,7 +136,8 @@ def _unpacked(name: str, entries: np.ndarray, whole: bool) -> np.ndarray:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def _global(places: np.ndarray, values: np.ndarray) -> sparse.csr_array:
+def _global(places: np.ndarray, values: np.ndarray) -> GlobalMatrix:
+    freedoms = None
     if places.shape[1] == 4:
         freedoms, index = np.unique(places.reshape(-1, 2), axis=0, return_inverse=True)
         nodes, kinds = (len(np.unique(freedoms[:, column])) for column in (0, 1))
@@ -146,4 +156,6 @@ def _global(places: np.ndarray, values: np.ndarray) -> sparse.csr_array:
     last = len(rows) - 1 - np.unique((rows * size + columns)[::-1], return_index=True)[1]
     matrix = sparse.csr_array((values[last], (rows[last], columns[last])), shape=(size, size))
     triangle = not sparse.triu(matrix, 1).count_nonzero() or not sparse.tril(matrix, -1).count_nonzero()
-    return sparse.csr_array(matrix + matrix.T - sparse.diags(matrix.diagonal())) if triangle else matrix
+    whole = GlobalMatrix(matrix + matrix.T - sparse.diags(matrix.diagonal()) if triangle else matrix)
+    whole.freedoms = freedoms
+    return whole

@@ -52,6 +52,12 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
 
 
+def row_freedoms(path: str | os.PathLike[str]) -> np.ndarray | None:
+    """Return node and freedom (n, 2) of the rows of a matrix file; None of one that does not give them."""
+    matrix = read_mtx(str(path)).get("") if Path(path).suffix.lower() == ".mtx" else None
+    return getattr(matrix, "freedoms", None)
+
+
 def read_npz(path: str | os.PathLike[str]) -> Any:
     """Return the matrix of scipy.sparse.save_npz. Raises what the libraries raise for a damaged file."""
     return within_shape(sparse.load_npz(path))

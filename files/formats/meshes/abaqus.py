@@ -57,6 +57,8 @@ _REFUSED = {
     ),
     "adds mass, which is not imported; mesh it, or remove the keyword": r"\*(MASS|ROTARY INERTIA|NONSTRUCTURAL MASS)",
 }
+# give shells, membranes and trusses a stiffness and a mass; *SURFACE SECTION a mass, where it has a DENSITY
+_SECTIONS = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "SOLID SECTION", "SURFACE SECTION")
 
 
 class _Card(NamedTuple):
@@ -83,12 +85,16 @@ _Member = TypeVar("_Member")
 
 @dataclass
 class _Deck:
-    """The part of a deck read so far."""
+    """The part of a deck read so far.
+
+    of_part: the names that the part gave to sets, by kind, as the assembly begins, which may give them again.
+    """
 
     mesh: LabelledMesh = field(default_factory=LabelledMesh)
     opened: list[_Card] = field(default_factory=list)
     meshed: str | None = None
-    instances: int = 0
+    instance: str = ""
+    of_part: dict[int, set[str]] = field(default_factory=dict)
     frame: Frame = field(default_factory=Frame)
 
     def read(self, card: _Card) -> None:
@@ -96,6 +102,8 @@ class _Deck:
         keyword = card.keyword
         card.head.refuse(f"*{keyword}", _REFUSED)
         begun, ended = keyword, keyword.removeprefix("END ")
+        if begun == "ASSEMBLY":
+            self.of_part = {id(sets): set(sets) for sets in self._kinds()}
         if begun in _SCOPES:
             self.opened.append(card)
             self.frame = Frame()
@@ -108,7 +116,7 @@ class _Deck:
         follow = {
             "NODE": self._node, "ELEMENT": self._element, "NSET": self._node_set, "ELSET": self._element_set,
             "SURFACE": self._surface, "SYSTEM": self._system, "INSTANCE": self._instance, "PART": self._part,
-        }.get(keyword)  # fmt: skip
+        }.get(keyword, self._section if keyword in _SECTIONS else None)  # fmt: skip
         if follow is not None:
             follow(card)
 
@@ -117,6 +125,37 @@ class _Deck:
         if self.opened:
             card = self.opened[-1]
             raise card.head.error(f"is not closed by *END {card.keyword}: the file is cut short; write it again")
+
+    def _kinds(self) -> tuple[dict[str, Any], ...]:
+        return self.mesh.node_sets, self.mesh.element_sets, self.mesh.face_sets
+
+    def _given(self, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
+        """Return the members so far of a set that is being given.
+
+        One of the assembly hides the part's of its name, which the assembly knows as <instance>.<name>.
+        """
+        spelled = _spelling(sets, name)
+        hidden = self.of_part.get(id(sets), set())
+        if self.opened and self.opened[-1].keyword == "ASSEMBLY" and spelled in hidden:
+            hidden.remove(spelled)
+            sets[f"{self.instance}.{spelled}"] = sets.pop(spelled)
+            spelled = name
+        return sets.setdefault(spelled, [])
+
+    def _add(self, sets: dict[str, list[int]], name: str | None, labels: list[int]) -> None:
+        if name:
+            self._given(sets, name).extend(labels)
+
+    def _section(self, card: _Card) -> None:
+        """Note the shells and trusses to which a section gives a stiffness."""
+        named, mesh = card.parameters.get("ELSET"), self.mesh
+        if named is None or (card.keyword == "SURFACE SECTION" and "DENSITY" not in card.parameters):
+            return
+        if card.keyword == "SOLID SECTION" and _spelling(mesh.element_sets, named) not in mesh.element_sets:
+            return
+        for label in _known(card.head, mesh.element_sets, named):
+            if KINDS[mesh.elements[label][0]][0] < 3:
+                mesh.stiff[label] = f"*{card.keyword} in line {card.head.number}"
 
     def _check_scope(self, card: _Card) -> None:
         """Reject a second part: labels are unique within one part only."""
@@ -145,7 +184,7 @@ class _Deck:
         places = self.frame.to_global(frame.to_global(np.array(points)))
         for (line, _), label, place in zip(card.data, labels, places, strict=True):
             self.mesh.add_node(line, label, place)
-        _add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
+        self._add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element(self, card: _Card) -> None:
         given = card.parameters.get("TYPE", "").upper()
@@ -166,7 +205,7 @@ class _Deck:
                 nodes = [nodes[0], nodes[2], nodes[1]]
             self.mesh.add_element(line, label, kind, nodes)
             labels.append(label)
-        _add(self.mesh.element_sets, card.parameters.get("ELSET"), labels)
+        self._add(self.mesh.element_sets, card.parameters.get("ELSET"), labels)
 
     def _node_set(self, card: _Card) -> None:
         mesh, named = self.mesh, card.parameters.get("ELSET")
@@ -174,11 +213,11 @@ class _Deck:
             labels = self._members(card, mesh.nodes, mesh.node_sets)
         else:
             labels = [node for label in _known(card.head, mesh.element_sets, named) for node in mesh.elements[label][1]]
-        _add(mesh.node_sets, card.parameters.get("NSET"), labels)
+        self._add(mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element_set(self, card: _Card) -> None:
         members = self._members(card, self.mesh.elements, self.mesh.element_sets)
-        _add(self.mesh.element_sets, card.parameters.get("ELSET"), members)
+        self._add(self.mesh.element_sets, card.parameters.get("ELSET"), members)
 
     def _surface(self, card: _Card) -> None:
         """Take in faces of elements, by their numbers or all that are free; or the nodes of a node-based surface."""
@@ -190,9 +229,12 @@ class _Deck:
         if kind == "NODE":
             first = [(line, words[:1]) for line, words in card.data]
             labels = self._members(card._replace(data=first), mesh.nodes, mesh.node_sets)
-            _add(mesh.node_sets, name, labels)
+            given = self._given(mesh.node_sets, name)
+            if given and set(given) != set(labels):
+                raise card.head.error(f"NAME={name}: a set of other nodes has this name; give it another")
+            given.extend(labels)
             return
-        own = mesh.face_sets.setdefault(_spelling(mesh.face_sets, name), [])
+        own = self._given(mesh.face_sets, name)
         for line, words in card.data:
             if "COMBINE" in card.parameters:
                 own.extend(face for other in filter(None, words) for face in _known(line, mesh.face_sets, other))
@@ -240,7 +282,7 @@ class _Deck:
                 if plain.isdecimal():
                     labels.append(int(plain))
                 elif plain:
-                    labels.extend(_known(line, sets, plain))
+                    labels.extend(_known(line, sets, word))
         for label in labels:
             if label not in known and "GENERATE" not in card.parameters:
                 raise card.head.error(f"names {label}, which is not given before it")
@@ -264,9 +306,9 @@ class _Deck:
         self.frame = Frame(origin, axes)
 
     def _instance(self, card: _Card) -> None:
-        self.instances += 1
-        if self.instances > 1:
+        if self.instance:
             raise card.head.error("is the second one; write one part with all of the mesh, in global coordinates")
+        self.instance = card.parameters.get("NAME", "instance")
         rows = [row for _, row in card.numbers()]
         if not rows:
             return
@@ -300,15 +342,11 @@ def _spelling(sets: Mapping[str, object], name: str) -> str:
 
 def _known(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
     """Return the members of a set. Raises MeshError for a set that no line before has given."""
-    own = _spelling(sets, name)
-    if own not in sets:
-        raise line.error(f"names the set {name!r}, which is not given before it")
+    plain = name.rpartition(".")[2]  # without the name of an instance
+    own = next((spelled for spelled in (_spelling(sets, name), _spelling(sets, plain)) if spelled in sets), None)
+    if own is None:
+        raise line.error(f"names the set {plain!r}, which is not given before it")
     return sets[own]
-
-
-def _add(sets: dict[str, list[int]], name: str | None, labels: list[int]) -> None:
-    if name:
-        sets.setdefault(_spelling(sets, name), []).extend(labels)
 
 
 def _cards(path: Path) -> Iterator[_Card]:

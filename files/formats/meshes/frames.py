@@ -33,6 +33,26 @@ class Frame:
             local = [first, second, third]
         return np.asarray(self.origin + np.column_stack(local) @ self.axes)
 
+    def directions(self, points: np.ndarray) -> np.ndarray:
+        """Return the unit vectors (n, 3, 3) along its three coordinates at global points (n, 3), as rows.
+
+        Raises ValueError for a spherical system.
+        """
+        if self.kind == "spherical":
+            raise ValueError("displacements along the coordinates of a spherical system are not known")
+        x, y, z = self.axes
+        if self.kind == "rectangular":
+            return np.tile(self.axes, (len(points), 1, 1))
+        local = (np.asarray(points) - self.origin) @ self.axes.T
+        angle = np.arctan2(local[:, 1], local[:, 0])[:, None]
+        outward, around = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+        return np.stack([outward, around, np.tile(z, (len(points), 1))], axis=1)
+
+    @property
+    def is_global(self) -> bool:
+        """Whether coordinates in it are the global ones."""
+        return self.kind == "rectangular" and np.allclose(self.axes, np.eye(3)) and not np.any(self.origin)
+
 
 def through(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return rows a, b, c (3, 3), right-handed: a along `first`, b in the plane of both on the side of `second`.

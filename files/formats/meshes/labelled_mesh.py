@@ -52,6 +52,13 @@ class DeckLine(NamedTuple):
         except ValueError as error:
             raise self.error(f"expected whole numbers ({error})") from error
 
+    def reals(self) -> list[float]:
+        """Return the numbers of the line, such as 1.5D+03. Raises MeshError."""
+        try:
+            return [float(word.upper().replace("D", "E")) for word in self.text.split()]
+        except ValueError as error:
+            raise self.error(f"expected numbers ({error})") from error
+
     def refuse(self, name: str, refused: Mapping[str, str]) -> None:
         """Raise MeshError for an entry whose name matches a pattern; refused: the patterns by the reason."""
         for why, pattern in refused.items():
@@ -77,6 +84,7 @@ class LabelledMesh:
     node_sets     name -> labels of nodes, which may be absent
     element_sets  name -> labels of elements, which may be absent
     face_sets     name -> faces of solids, each as the labels of its corners
+    stiff         label of a shell or line with a stiffness of its own -> what gives it that
     """
 
     nodes: dict[int, np.ndarray] = field(default_factory=dict)
@@ -84,6 +92,7 @@ class LabelledMesh:
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     element_sets: dict[str, list[int]] = field(default_factory=dict)
     face_sets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
+    stiff: dict[int, str] = field(default_factory=dict)
 
     def coordinates(self, labels: Iterable[int]) -> np.ndarray:
         """Return the coordinates (n, 3) of nodes."""

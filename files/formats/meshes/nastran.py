@@ -52,6 +52,9 @@ _REFUSED = {
 # with bars that have a property: they are no mere lines of a mesh
 _REFUSED_BARS = _REFUSED | {_JOINS: f"{_REFUSED[_JOINS]}|CBAR"}
 
+# properties that give the shells of their number a stiffness and a mass
+_STIFF = ("PSHELL", "PCOMP", "PCOMPG", "PCOMPP", "PLPLANE", "PSHEAR")
+
 # the name of a set of the case control, as a card
 _COMMAND = "SET ="
 
@@ -93,7 +96,15 @@ def read(path: Path) -> LabelledMesh:
             _take_element(mesh, card)
     for card in commands + cards:
         _take_set(mesh, card)
+    for card in cards:
+        if card.name in _STIFF:
+            shells = (label for label in mesh.element_sets.get(card.fields[0], ()) if _is_shell(mesh, label))
+            mesh.stiff |= dict.fromkeys(shells, f"{card.name} {card.fields[0]} in line {card.line.number}")
     return mesh
+
+
+def _is_shell(mesh: LabelledMesh, label: int) -> bool:
+    return mesh.elements[label][0] in SHELLS.values()
 
 
 def _take_element(mesh: LabelledMesh, card: _Card) -> None:
@@ -275,7 +286,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
             commands.append(_Card.at(line, _COMMAND, [said[1], *said[2].replace(",", " ").split()]))
     cards: list[_Card] = []
     for line in found[begin + 1 : end]:
-        name, fields = _fields(line.text)
+        name, fields = _fields(line)
         if not name.startswith(("+", "*")) and name:
             cards.append(_Card.at(line, name.rstrip("*_"), fields))  # meshio writes CTETRA_
         elif cards:
@@ -295,11 +306,17 @@ def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
             yield line._replace(text=text)
 
 
-def _fields(text: str) -> tuple[str, list[str]]:
-    """Return the name and the data of one line, without its continuation marks."""
+def _fields(line: DeckLine) -> tuple[str, list[str]]:
+    """Return the name and the data of one line, without its continuation marks. Raises MeshError for a longer one."""
+    text = line.text
     width, count = (16, 4) if "*" in text[:8] else (8, 8)
     if "," in text:
         name, *words = (word.strip() for word in text.split(","))
+        mark, *more = [*words[count:], ""]
+        if any(more) or not (mark.startswith(("+", "*")) or re.fullmatch(r"(?![\d.-])\w*", mark)):
+            raise line.error(
+                f"{name.upper() or 'continuation'}: more than {count} values in a line; go on in the next one, which begins with a comma"
+            )
         return name.upper(), (words[:count] + [""] * count)[:count]
     name = text[:8].strip().upper()
     return name, [text[8 + width * place : 8 + width * (place + 1)].strip() for place in range(count)]

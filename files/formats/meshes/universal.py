@@ -1,6 +1,7 @@
 """Universal files (.unv) of I-deas, Salome and gmsh: nodes, elements and permanent groups.
 
-Reads the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), and of groups. Sources: SDRC, I-deas
+Reads the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), 2420 and 18 (coordinate systems), and of groups.
+Sources: SDRC, I-deas
 universal file datasets; Salome's SMESH, UNV drivers (groups of one pair or of two quadruples of numbers).
 
 Why not pyuff, which reads measurements: version 2.5.8 gives no members of groups (dataset 2477) and fails at the
@@ -14,9 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from vanedamp.files.formats.meshes.frames import Frame
 from vanedamp.files.formats.meshes.labelled_mesh import DeckLine, LabelledMesh, MeshError, deck_lines
+from vanedamp.files.formats.universal_systems import SYSTEMS, frame_of, systems_of
 
-_NODES, _ELEMENTS, _SYSTEMS = (2411, 781, 15), (2412, 780), (2420,)
+_NODES, _ELEMENTS = (2411, 781, 15), (2412, 780)
 # numbers that each member of a group has
 _GROUPS = dict.fromkeys((2417, 2429, 2430, 2432), 2) | dict.fromkeys((2435, 2452, 2467, 2477), 4)
 _NODE, _ELEMENT = 7, 8
@@ -45,17 +48,16 @@ def _whole(line: DeckLine, least: int = 0) -> list[int]:
 
 
 def _place(line: DeckLine) -> np.ndarray:
-    """Return the last three numbers of a line, such as 1.5D+03."""
-    try:
-        x, y, z = (float(word.upper().replace("D", "E")) for word in line.text.split()[-3:])
-    except ValueError as error:
-        raise line.error(f"expected three coordinates ({error})") from error
-    return np.array([x, y, z])
+    """Return the last three numbers of a line."""
+    place = np.array(line.reals()[-3:])
+    if place.size < 3:
+        raise line.error("expected three coordinates")
+    return place
 
 
 def read(path: Path) -> LabelledMesh:
     """Return the mesh of a file with its groups. Raises MeshError with file and line."""
-    mesh, moved, named = LabelledMesh(), set(), []
+    mesh, systems, named = LabelledMesh(), dict[int, Frame](), []
     for number, lines in _datasets(path):
         rows = iter(lines)
         try:
@@ -68,14 +70,14 @@ def read(path: Path) -> LabelledMesh:
                 for head in rows:
                     if head.text.strip():  # Salome leaves a line of an empty group blank
                         _take_group(mesh, head, rows, _GROUPS[number])
-            elif number in _SYSTEMS:
-                moved |= _moved_systems(rows)
+            elif number in SYSTEMS:
+                systems |= systems_of(number, rows, systems)
         except StopIteration:
             raise lines[-1].error(
                 f"dataset {number} ends within an entry: the file is damaged; write it again"
             ) from None
     for system, head in named:
-        if system in moved:
+        if not frame_of(system, head.error, systems).is_global:
             raise head.error(f"the node is given in coordinate system {system}; write global coordinates")
     return mesh
 
@@ -139,16 +141,3 @@ def _take_group(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine], wi
         labels = [label for kind, label in zip(members[::width], members[1::width], strict=True) if kind == code]
         if labels:
             sets.setdefault(name, []).extend(labels)
-
-
-def _moved_systems(rows: Iterator[DeckLine]) -> set[int]:
-    """Return the coordinate systems of a part that are not the global rectangular one."""
-    next(rows), next(rows)  # number and name of the part
-    moved = set()
-    for head in rows:
-        label, kind = _whole(head, 2)[:2]
-        next(rows)
-        axes = np.array([_place(next(rows)) for _ in range(4)])
-        if kind or not np.allclose(axes, np.eye(4, 3)):
-            moved.add(label)
-    return moved

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK
-from vanedamp.files.formats.meshes import abaqus, nastran
+from vanedamp.files.formats.meshes import abaqus, nastran, universal
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
@@ -109,6 +109,22 @@ def test_files_included_within_data(tmp_path):
     assert mesh.node_sets == {"foot": [1, 3, 5], "tip": [4, 2]}
 
 
+def test_a_set_of_the_assembly_hides_the_parts_of_its_name(tmp_path):
+    """Programs number the sets of either by themselves: an assembly's Set-1 is not the part's, for it p-1.Set-1.
+
+    Sets of other names, in capitals or not, stay the part's.
+    """
+    part = "*PART, NAME=p\n*NODE\n" + nodes(CORNERS) + TETRAHEDRON
+    part += "*NSET, NSET=Set-1\n3, 4\n*NSET, NSET=Set-2\n2\n*ELSET, ELSET=Set-1\n1\n*SURFACE, NAME=Surf-1\n1, S1\n"
+    assembly = "*END PART\n*ASSEMBLY, NAME=a\n*INSTANCE, NAME=p-1, PART=p\n*END INSTANCE\n"
+    assembly += "*NSET, NSET=SET-1, INSTANCE=p-1\n1\n*NSET, NSET=set-1, INSTANCE=p-1\n2\n"
+    assembly += "*NSET, NSET=both\np-1.Set-1, Set-1\n*SURFACE, NAME=Surf-1\np-1.Set-1, S2\n*END ASSEMBLY\n"
+    mesh = abaqus.read(written(tmp_path, part + assembly))
+    assert mesh.node_sets == {"p-1.Set-1": [3, 4], "Set-2": [2], "SET-1": [1, 2], "both": [3, 4, 1, 2]}
+    assert mesh.element_sets == {"all": [1], "Set-1": [1]}
+    assert mesh.face_sets == {"p-1.Surf-1": [(1, 2, 3)], "Surf-1": [(1, 4, 2)]}
+
+
 PLAIN = "*NODE\n" + nodes(CORNERS) + TETRAHEDRON
 
 
@@ -200,6 +216,9 @@ def test_grid_points_of_nastran_are_in_global_coordinates(cards, expected, tmp_p
         ([*grids(CORNERS), "RBE2,9,1,123,2,3"], "line 6: RBE2 joins or stiffens grid points"),
         ([*grids(CORNERS), "CBAR,9,1,1,2,0.,0.,1.", "PBAR,1,1,2.,3."], "line 6: CBAR joins or stiffens grid points"),
         ([*grids(CORNERS), "CONM2,9,1,,5."], "line 6: CONM2 adds mass"),
+        ([*grids(CORNERS), "SET1,7,1,2,3,4,1,2,3,4"], "line 6: SET1: more than 8 values in a line; go on in the next"),
+        ([*grids(CORNERS), "SET1,7,1,2,3,4,1,2,3,+,4"], "line 6: SET1: more than 8 values in a line"),
+        ([*grids(CORNERS), "SET1,7,1,2", ",3,4,1,2,3,4,1,2,3"], "line 7: continuation: more than 8 values in a line"),
         ([*grids(CORNERS), "INCLUDE 'more.bdf'"], "line 6: INCLUDE more.bdf: no such file in the deck's folder"),
     ],
 )
@@ -207,6 +226,50 @@ def test_what_would_change_a_nastran_mesh_is_refused(cards, told, tmp_path):
     with pytest.raises(MeshError, match=told) as refused:
         convert(written(tmp_path, bulk(*cards), "deck.bdf"), tmp_path / "out.msh")
     assert str(refused.value).count("\n") == 0
+
+
+@pytest.mark.parametrize("mark", [",+", ",+A1", ",A", ",", "", ",*"])
+def test_lines_of_nastran_with_a_mark_of_continuation(mark, tmp_path):
+    cards = [*grids(CORNERS), f"SET1,7,1,2,1,2,1,2,1{mark}", "+A1,3,4"]
+    mesh = nastran.read(written(tmp_path, bulk(*cards), "deck.bdf"))
+    assert mesh.node_sets == {"set 7 grids": [1, 2, 3, 4]}
+
+
+LOCAL = """    -1
+  2411
+         1         2         2        11
+   0.0000000000000000D+00   1.0000000000000000D-02  -2.0000000000000000D-02
+    -1
+    -1
+"""
+
+
+@pytest.mark.parametrize(
+    ("systems", "told"),
+    [
+        ("  2420\n         1\npart\n         2         0         1\nlocal\n0. -1. 0.\n1. 0. 0.\n0. 0. 1.\n0. 0. 0.\n",
+         "line 3: the node is given in coordinate system 2; write global coordinates"),
+        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 0. 1. 0.\n0. 0. 1.\n",
+         "line 3: the node is given in coordinate system 2; write global coordinates"),
+        ("  18\n         2         1         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n0. 0. 1.\n",
+         "line 3: the node is given in coordinate system 2; write global coordinates"),
+        ("  18\n         3         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n0. 0. 1.\n",
+         "line 3: the coordinate system 2 is not given in the file"),
+        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n2. 0. 0.\n",
+         "line 8: coordinate system 2: its points lie on a line"),
+        ("  2420\n         1\npart\n         2         0         1\nlocal\n1. 1. 0.\n1. 0. 0.\n0. 0. 1.\n0 0 0\n",
+         "line 10: coordinate system 2: its axes are not perpendicular unit vectors"),
+        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n", "ends within an"),
+        ("  18\n         2         0         0         1         1\nlocal\n0. 0. 0. 1. 0. 0.\n0. 0. 1.\n", None),
+    ],
+)  # fmt: skip
+def test_nodes_in_systems_of_universal_files(systems, told, tmp_path):
+    path = written(tmp_path, LOCAL + systems + "    -1\n", "deck.unv")
+    if told is None:  # the axes are the global ones
+        assert universal.read(path).nodes[1].tolist() == [0.0, 0.01, -0.02]
+        return
+    with pytest.raises(MeshError, match=told):
+        universal.read(path)
 
 
 def test_a_cylindrical_deck_has_the_frequencies_of_the_block(tmp_path, monkeypatch, capfd):
