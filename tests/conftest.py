@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.processes import startup, without_stages
+from tests.tools.processes import PATIENCE, startup, without_stages
 
 
 def pytest_addoption(parser):
@@ -131,7 +131,9 @@ def browser():
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as engine:
         opened = engine.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield opened
+        context = opened.new_context(viewport={"width": 1400, "height": 1000})
+        context.set_default_timeout(1000 * PATIENCE)
+        yield context
         opened.close()
 
 

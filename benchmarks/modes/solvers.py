@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 COUNT = 10
-#: what `vanedamp modal` runs on one rank
-OURS = "lanczos"
-#: and where factors need too much memory; without factors
+#: what `vanedamp modal` runs where factors need too much memory, without factors
 ITERATIVE = "iterative"
 NAMES = {
     "lanczos": "block Lanczos, CHOLMOD",

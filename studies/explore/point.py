@@ -110,6 +110,7 @@ def panel(of: str = "") -> html.Div:
             html.P(id=f"{name}-stale"),
             html.Div(views, id=f"{name}-views", style=_HIDDEN),
             dcc.Store(id=f"{name}-run"),
+            dcc.Store(id=f"{name}-shown"),
             dcc.Store(id=f"{name}-asked"),
             dcc.Interval(id=f"{name}-clock", interval=_EVERY, disabled=True),
         ],
@@ -126,7 +127,6 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
 
     @app.callback(
         Output(f"{name}-run", "data"),
-        Output(f"{name}-clock", "disabled"),
         Output(f"{name}-status", "children"),
         Output(f"{name}-value", "value"),
         Output(f"{name}-asked", "data"),
@@ -147,12 +147,12 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         trigger = str(ctx.triggered_id).removeprefix(of)
         value = chosen_value(trigger, click, given, figure)
         if scene is None:
-            return no_update, no_update, "There is no curve yet.", no_update, no_update
+            return no_update, "There is no curve yet.", no_update, no_update
         if value is None:
             wanted = "click a point of the damped curve" if trigger == "curve" else "give a number, in SI units"
-            return no_update, no_update, f"No point: {wanted}.", no_update, no_update
+            return no_update, f"No point: {wanted}.", no_update, no_update
         key = runs.begin(scene | {"sweep": sweep}, value, former)
-        return key, False, "running …", value, {"scene": scene, "sweep": sweep}
+        return key, "running …", value, {"scene": scene, "sweep": sweep}
 
     @app.callback(
         Output(f"{name}-history", "figure"),
@@ -161,7 +161,7 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         Output(f"{name}-motion", "style"),
         Output(f"{name}-views", "style"),
         Output(f"{name}-status", "children", allow_duplicate=True),
-        Output(f"{name}-clock", "disabled", allow_duplicate=True),
+        Output(f"{name}-shown", "data"),
         Input(f"{name}-clock", "n_intervals"),
         State(f"{name}-run", "data"),
         State(f"{name}-motion", "style"),
@@ -170,11 +170,18 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
     def look(_: Any, key: Any, frame: dict[str, Any]) -> tuple[Any, ...]:
         view = runs.look(key)
         if isinstance(view, str):
-            return *[no_update] * 5, view, False
+            return *[no_update] * 5, view, no_update
         if view.history is None:
-            return *[no_update] * 4, _HIDDEN, view.summary, True
+            return *[no_update] * 4, _HIDDEN, view.summary, key
         shown = frame | {"display": "block" if view.motion else "none"}
-        return view.history, view.phase, view.motion, shown, {}, view.summary, True
+        return view.history, view.phase, view.motion, shown, {}, view.summary, key
+
+    app.clientside_callback(  # an answer that is late is of a run before: the clock goes on until the last run is shown
+        ClientsideFunction("explore", "seen"),
+        Output(f"{name}-clock", "disabled"),
+        Input(f"{name}-run", "data"),
+        Input(f"{name}-shown", "data"),
+    )
 
     app.clientside_callback(  # in the browser: it is asked whenever the curve moves
         ClientsideFunction("explore", "stale"),

@@ -25,13 +25,12 @@ class Visit:
     """A page in a browser, with all that it asks for and complains of."""
 
     def __init__(self, browser, address):
-        self.page = browser.new_page(viewport={"width": 1400, "height": 900})
+        self.page = browser.new_page()
         self.requests, self.complaints, self.figures = [], [], []
         self.page.route("**/*", self._route)
         self.page.on("console", lambda message: self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("response", self._note)
-        self.page.set_default_timeout(1000 * PATIENCE)
         self.page.goto(address)
         self.settled()
 

@@ -37,8 +37,7 @@ def opened(browser, folder, *words):
     )  # fmt: skip
     try:
         address = server.stdout.readline().strip()
-        page = browser.new_page(viewport={"width": 1300, "height": 1000})
-        page.set_default_timeout(1000 * PATIENCE)
+        page = browser.new_page()
         requests, complaints = [], []
         page.on("request", lambda request: requests.append(request.url))
         page.on("console", lambda message: complaints.append(message.text))

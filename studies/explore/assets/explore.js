@@ -32,6 +32,11 @@ window.dash_clientside = window.dash_clientside || {};
       return [wished, quiet()];
     },
 
+    // whether the run that was asked for is the one that is shown
+    seen: function (run, shown) {
+      return !run || run === shown;
+    },
+
     // whether a motion that was asked for is that of the scene seen now
     stale: function (scene, sweep, asked) {
       const now = scene && JSON.stringify({ scene: scene, sweep: sweep });

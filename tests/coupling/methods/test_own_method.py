@@ -4,6 +4,7 @@ Leapfrog (Stoermer-Verlet, drift - kick - drift) with springs for contacts, of s
 (2003).
 """
 
+import math
 import os
 import re
 import subprocess
@@ -301,7 +302,7 @@ def test_what_it_cannot_do_is_refused():
 
 def test_appears_in_the_chart(tmp_path, monkeypatch):
     """Measured like ours, and drawn: in the legend with its own marks, beside all that did not fail."""
-    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
+    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, (), longest=math.inf)
     lossy = scene(damper=[DATA["damper"][0] | {"restitution": 0.9}])
     measured = charts.Chart("one body", lambda: lossy, True, effort)
     chart = measured.measure(Rows(tmp_path, "work-precision", {}, measured.rows()), 0)
