@@ -22,7 +22,8 @@ from vanedamp.files.toml_input import validate
 from vanedamp.modal import petsc
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.rom.reduction import reduce
-from vanedamp.studies.case.stages import Structure, assemble, interface, reduction
+from vanedamp.studies.case.stages import assemble, interface, reduction
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case
 
 #: natural modes, modes of the reduced model, its patches with three displacements each, and hot spots

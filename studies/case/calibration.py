@@ -21,7 +21,8 @@ from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
 from vanedamp.studies.case.checkpoint import CaseCheckpoint
-from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
+from vanedamp.studies.case.stages import ModalAnalysis, assemble, base_inertia, modal_analysis
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case, MaterialTable
 from vanedamp.studies.terminal import stage
 

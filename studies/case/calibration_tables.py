@@ -76,7 +76,7 @@ class HotSpotTable:
     """Where hot spots may lie: the one that sets the excitation, and those of a reduced model."""
 
     exclude: dict[str, Positive] = field(default_factory=dict)
-    """groups of facets, edges or points near which stress does not count, and up to which distance: {clamp = 0.002}
-    [m]"""
+    """groups of facets, edges or points near which stress does not count, and up to which distance in m:
+    {clamp = 2e-3}"""
     distance: Positive | None = None
     """least distance between two hot spots of a reduced model (default: 5 % of the structure's size) [m]"""

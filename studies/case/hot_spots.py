@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +15,8 @@ from vanedamp.modal.stress import near_groups, singular_point
 from vanedamp.rom.recovery import SHOWN, with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.terminal import stage
-
-if TYPE_CHECKING:
-    from vanedamp.studies.case.stages import Structure
 
 #: least distance between hot spots over the structure's size
 _APART = 0.05

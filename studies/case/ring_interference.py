@@ -11,7 +11,8 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
-from vanedamp.studies.case.stages import Structure, campbell_diagram
+from vanedamp.studies.case.stages import campbell_diagram
+from vanedamp.studies.case.structure import Structure
 
 #: about the speed of [rotation], speeds of operation where nothing says them
 _ABOUT = 0.05

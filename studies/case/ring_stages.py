@@ -13,7 +13,8 @@ from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
-from vanedamp.studies.case.stages import MODES, Structure, interface
+from vanedamp.studies.case.stages import MODES, interface
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.terminal import stage
 
 

@@ -33,7 +33,6 @@ from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effe
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
-from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.statics import Statics
 from vanedamp.modal.stress import HotSpot, PeakStress, hot_spot, nodal_von_mises, peak_stresses
 from vanedamp.modal.temperature import Temperature
@@ -54,6 +53,7 @@ from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.checkpoint import CaseCheckpoint
 from vanedamp.studies.case.hot_spots import excluded_places, with_hot_spots
 from vanedamp.studies.case.operation_tables import TemperatureTable
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 from vanedamp.studies.hot_spots import level_warnings, spot_warnings
 from vanedamp.studies.terminal import stage
@@ -69,29 +69,6 @@ _UNCOUNTED = (
 _SECTOR_ONLY = "ring: these are modes of one sector whose faces are free; `vanedamp ring` has those of the ring"
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
-
-
-@dataclass(frozen=True, eq=False)
-class Structure:
-    """A case with its finite elements: the solid on its mesh, and the matrices.
-
-    rotating: matrices of a case that rotates; `matrices` holds at its speed.
-    """
-
-    case: Case
-    solid: Solid
-    matrices: SystemMatrices
-    rotating: RotatingMatrices | None = None
-
-    def mesh(self) -> tuple[dict[str, Variable], int]:
-        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
-        cells, types, points = self.solid.vtk_mesh()
-        corners = cells.reshape(len(types), -1)[:, 1:]
-        variables = {
-            "coordinates": Variable(points, ("node", "axis"), "m"),
-            "cell": Variable(corners, ("cells", "corner")),
-        }
-        return variables, int(types[0])
 
 
 @stage("mesh and matrices")

@@ -16,7 +16,8 @@ from vanedamp.modal.records.interference import Interference
 from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_interference import ring_interference
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
-from vanedamp.studies.case.stages import Structure, assemble, unit_doubts
+from vanedamp.studies.case.stages import assemble, unit_doubts
+from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.headline import format_margin
