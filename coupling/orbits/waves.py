@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Problem, solve
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Problem, least_squares, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
 #: largest fraction of the scale by which a travelling wave misses itself after a whole period; least time between
 #: events, over the period: sectors opposite to each other may have theirs together, though no part tells their order
 _CLOSED, _TOGETHER = 1e-6, 1e-9
+#: scaled distances at which a derivative is taken beside a wave, scaled residual of the wave, and steps to it
+_BESIDE, _RESIDUAL, _STEPS = (1e-6, 1e-6, 1e-5, 1e-4), 1e-10, 40
 
 
 def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
@@ -33,6 +35,8 @@ def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
     begin = problem.pack(np.asarray(start, float), math.nan)
     found = solve(problem, begin, problem.along_parameter, np.zeros(problem.size))
     if found.status is not OrbitStatus.OK:
+        found = _from_beside(problem.map, np.asarray(start, float)) or found
+    if found.status is not OrbitStatus.OK:
         return found
     passage, own = period_map(found.state, derivative=False), found.passage
     missed = float(np.abs((passage.state - found.state) / found.scale).max(initial=0.0))
@@ -46,3 +50,33 @@ def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
         status = PassageStatus.COINCIDENT
     whole = passage._replace(derivative=derivative, status=status, clearance=own.clearance)
     return replace(found, passage=whole, residual=max(missed, found.residual), map=period_map)
+
+
+def _from_beside(wave: PeriodMap, start: np.ndarray) -> Orbit | None:
+    """Return the wave by steps with a derivative that is taken beside it; None if they lead to none.
+
+    Where sectors have events at one instant, the derivative holds for motions in which they still meet, and Newton's
+    steps go astray. Beside the wave their events are apart.
+    """
+    state, scale, last = start, wave.scale, math.inf
+    random, beside = np.random.default_rng(0), None
+    for count in range(_STEPS):
+        passage = wave(state, derivative=False)
+        if not passage.serves(False):
+            return None
+        residual = (passage.state - state) / scale
+        missed = float(np.abs(residual).max(initial=0.0))
+        if missed > 0.1 * last or beside is None:
+            for distance in _BESIDE:
+                found = wave(state + distance * scale * random.standard_normal(len(state)))
+                if found.serves(True):
+                    beside = found
+                    break
+        if beside is None:
+            return None
+        if missed <= _RESIDUAL * (1.0 + float(np.abs(state / scale).max(initial=0.0))):
+            one_sided = beside._replace(status=PassageStatus.COINCIDENT)
+            return Orbit(OrbitStatus.OK, math.nan, state, 1, scale, one_sided, missed, count, map=wave)
+        state = state - scale * least_squares(beside.scaled(scale) - np.eye(len(state)), residual)
+        last = missed
+    return None

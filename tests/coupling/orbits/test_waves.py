@@ -90,24 +90,42 @@ def test_scenes_without_a_wave(changed):
         find_orbit(scene)
 
 
-def test_a_wave_of_a_ring_scene(tmp_path):
-    """Of a scene that names its cavity and its body once: the orbit is that of whole periods."""
-    chain = Chain(sectors=5, damping_ratio=0.01)
-    chain.ring().save(tmp_path / "ring.h5")
-    scene = vd.Scene.of({
-        "structure": {"model": "ring", "file": str(tmp_path / "ring.h5")},
+def ring_scene(path, sectors, order, periods):
+    """A scene that names its cavity and its body once."""
+    chain = Chain(sectors=sectors, damping_ratio=0.01)
+    chain.ring().save(path)
+    return vd.Scene.of({
+        "structure": {"model": "ring", "file": str(path)},
         "excitation": {
-            "frequency": float(np.sqrt(chain.squares([2])[0]) / (2 * np.pi)), "force": 25.0, "at": "tip", "wave": 2
+            "frequency": float(np.sqrt(chain.squares([order])[0]) / (2 * np.pi)), "force": 25.0, "at": "tip",
+            "wave": order,
         },
         "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all"}],
         "damper": [{"cavity": "c", "mass": 0.01, "friction": 0.2, "restitution": 0.3}],
-        "time": {"periods": 600, "transient": 300}, "orbit": {"wave": True},
+        "time": {"periods": periods, "transient": periods // 2}, "orbit": {"wave": True},
     }, "scene")  # fmt: skip
+
+
+def test_a_wave_of_a_ring_scene(tmp_path):
+    """The orbit is that of whole periods."""
+    scene = ring_scene(tmp_path / "ring.h5", 5, 2, 600)
     final = vd.simulate(scene).final
     wave, whole = find_orbit(scene, final), find_orbit(scene.replace({"orbit.wave": False}), final)
     assert wave.status == whole.status == "ok" and wave.stable and whole.stable
     assert np.abs(wave.state - whole.state).max() < 1e-8 * np.abs(whole.state).max()
     assert wave.impacts_per_period == whole.impacts_per_period
+
+
+def test_a_wave_whose_opposite_sectors_have_events_at_one_instant(tmp_path):
+    """Of an even number of sectors: the long run is the reference; multipliers do not decide stability."""
+    scene = ring_scene(tmp_path / "ring.h5", 4, 1, 200)
+    response = vd.simulate(scene)
+    wave = find_orbit(scene, response.final)
+    assert (response.classification, wave.status) == ("periodic-1", "ok")
+    assert wave.passage.status == "coincident" and not wave.stable
+    reached = wave.map.state_of(response.final)
+    assert np.abs(wave.state - reached).max() < 1e-4 * np.abs(reached).max()
+    assert wave.amplitude_mean == pytest.approx(response.amplitude_mean, rel=1e-4)
 
 
 def test_mistuned_rings_and_loads_in_phase_have_no_wave():
