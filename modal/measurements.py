@@ -24,6 +24,7 @@ from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
 from vanedamp.files.formats.lab_units import Unit
 from vanedamp.files.formats.lab_units import unit as lab_unit
 from vanedamp.files.formats.meshes.frames import Frame
+from vanedamp.files.formats.meshes.universal_systems import frame_of, systems
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
     FORCE,
@@ -38,7 +39,6 @@ from vanedamp.files.formats.universal_datasets import (
     pyuff,
     write_universal,
 )
-from vanedamp.files.formats.universal_systems import frame_of, systems
 from vanedamp.files.store import write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import QUANTITIES, UNITS, Frf

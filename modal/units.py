@@ -13,6 +13,8 @@ from collections.abc import Mapping
 SIZES, MASSES, SPEEDS, FREQUENCIES = (3e-3, 3.0), (1e-4, 1e4), (50.0, 2e4), (1.0, 1e6)
 #: no solid has a modulus (Pa), density (kg/m^3) or sound speed (m/s) outside these
 _MODULI, _DENSITIES, _FASTEST, _SLOWEST = (1.0, 2e12), (0.1, 3e4), 1e5, 1.0
+#: strength over Young's modulus: from porous stone to rubber
+_STRENGTHS = (1e-6, 1e2)
 #: kg, effective masses of a reduced model's first mode at its interface
 _MODEL_MASSES = (1e-3, 1e5)
 
@@ -34,6 +36,16 @@ def absurdity(young: float, density: float) -> str | None:
     return None
 
 
+def strength_absurdity(strength: float, young: float) -> str | None:
+    """Explain why no solid of this Young's modulus (Pa) has such a strength (Pa); None where one may."""
+    low, high = _STRENGTHS
+    if low * young <= strength <= high * young:
+        return None
+    slips = {"the strength is in MPa": 1e6 * strength / young, "young is in MPa": 1e-6 * strength / young}
+    slip = next((f", as when {what}" for what, ratio in slips.items() if low <= ratio <= high), "")
+    return f"{strength:.4g} Pa is {strength / young:.2g} times Young's modulus ({young:.4g} Pa){slip}"
+
+
 def doubts(
     materials: Mapping[str, tuple[float, float]], size: float, mass: float, first_hz: float | None
 ) -> tuple[str, ...]:
@@ -44,13 +56,7 @@ def doubts(
     mass       kg
     first_hz   first straining natural frequency; None if there is none
     """
-    found = []
-    for group, (young, density) in materials.items():
-        speed = math.sqrt(young / density)
-        if _outside(speed, SPEEDS):
-            slip = f", as when young is in MPa (then {1e6 * young:.3g} Pa)" if young < 1e7 else ""
-            found.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
-    found += _of_size(size)
+    found = _of_materials(materials) + _of_size(size)
     if _outside(mass, MASSES):
         found.append(f"the mass is {mass:.3g} kg")
     if first_hz is not None and _outside(first_hz, FREQUENCIES):
@@ -61,6 +67,21 @@ def doubts(
 def size_doubts(size: float) -> tuple[str, ...]:
     """Explain the same of the largest extent of a mesh, m, before it is read as a whole."""
     return _together(_of_size(size), "mesh in m")
+
+
+def material_doubts(materials: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+    """Explain why materials, as those of `doubts`, are implausible; one line, or none."""
+    return _together(_of_materials(materials), "young in Pa, density in kg/m^3")
+
+
+def _of_materials(materials: Mapping[str, tuple[float, float]]) -> list[str]:
+    found = []
+    for group, (young, density) in materials.items():
+        speed = math.sqrt(young / density)
+        if _outside(speed, SPEEDS):
+            slip = f", as when young is in MPa (then {1e6 * young:.3g} Pa)" if young < 1e7 else ""
+            found.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
+    return found
 
 
 def _of_size(size: float) -> list[str]:

@@ -47,5 +47,8 @@ def rainflow_cycles(history: np.ndarray, repeats: bool = False) -> Cycles:
     if repeats:
         history = np.roll(history, -int(np.argmax(history)))
         history = np.append(history, history[0])
-    found = [cycle[:3] for cycle in rainflow.extract_cycles(history[turning_points(history)].tolist())]
+    points = history[turning_points(history)].tolist()
+    found = [cycle[:3] for cycle in rainflow.extract_cycles(points)]
+    if len(points) == 2:  # two points are one range, a half cycle by section 5.4.4 (4), which the package leaves out
+        found = [(abs(points[1] - points[0]), 0.5 * (points[0] + points[1]), 0.5)]
     return Cycles(*np.array(found, dtype=float).reshape(-1, 3).T)

@@ -34,7 +34,7 @@ from vanedamp.meshes import benchmarks, sector, vane_cluster
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.sector import Sector
-from vanedamp.modal.units import absurdity
+from vanedamp.modal.units import absurdity, strength_absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable, HotSpotTable
 from vanedamp.studies.case.operation_tables import CampbellTable, RotationTable, TemperatureTable
 from vanedamp.studies.case.ring_tables import RingTable
@@ -207,6 +207,7 @@ class MaterialTable:
         return None if fatigue is None else fatigue.completed(strength)
 
 
+_STRENGTHS = ("strength", "tensile_strength", "yield_strength")
 #: keys by which a table below [material] is a material, or fatigue data
 _MATERIAL_KEYS = {"young", "poisson", "density"}
 _FATIGUE_KEYS = {item.name for item in fields(Fatigue)}
@@ -493,6 +494,12 @@ class Case:
             absurd = absurdity(table.young, table.density)
             if absurd is not None:
                 raise InputError(f"{path}: material.{group}.{absurd}; give young in Pa and density in kg/m^3")
+            strengths = {"fatigue_strength": table.fatigue_strength}
+            strengths |= {f"fatigue.{key}": getattr(table.fatigue, key, None) for key in _STRENGTHS}
+            for key, strength in strengths.items():
+                absurd = None if strength is None else strength_absurdity(strength, table.young)
+                if absurd is not None:
+                    raise InputError(f"{path}: material.{group}.{key}: {absurd}; give both in Pa")
         return case
 
     @property

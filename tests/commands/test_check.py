@@ -384,6 +384,48 @@ def test_parts_that_nobody_makes(tmp_path, capfd, table, key, fine, rough, told)
         assert [text for text in found if text == told] == expected
 
 
+@pytest.mark.parametrize(
+    ("contact", "wear", "told"),
+    [
+        ({"young": 2.1e11, "yield_strength": 9e8}, {"coefficient": 1e-4, "hardness": 2e9}, None),
+        ({"young": 1e7, "wall_young": 2.1e11, "yield_strength": 1e7}, {"rate": 1e-9}, None),
+        ({"young": 2.1e5}, {}, "contact.pair.young: no solid part has 2.1e+05 Pa"),
+        ({"young": 2.1e11, "wall_young": 210.0}, {}, "contact.pair.wall_young: no solid part has 210 Pa"),
+        ({"young": 2.1e11, "yield_strength": 900.0}, {}, "contact.pair.yield_strength: 900 Pa is 4.3e-09 times"),
+        ({}, {"coefficient": 1e-4, "hardness": 2000.0}, "wear.hardness: no solid part has 2000 Pa"),
+        ({}, {"rate": 1e-6}, "wear.rate: 1e-06 1/Pa is that of no solid part; 1 mm^3/(N m) is 1e-9 1/Pa"),
+        (
+            {}, {"rate": 1e-13, "pair": [{"damper": 0, "coefficient": 1e-4, "hardness": 200.0}]},
+            "wear.pair[0].hardness: no solid part has 200 Pa",
+        ),
+    ],
+)  # fmt: skip
+def test_moduli_strengths_and_wear_in_other_units(tmp_path, capfd, contact, wear, told):
+    pair = {"law": "newton"} | ({"pair": {"radius": 1e-3} | contact} if contact else {})
+    warnings = checked(tmp_path, capfd, DAMPED | {"contact": pair} | ({"wear": wear} if wear else {}))["warnings"]
+    found = [text for text in warnings if text.startswith(("contact.pair", "wear."))]
+    assert len(found) == (told is not None) and all(text.startswith(told) for text in found)
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("fatigue_strength = 400.0", "material.default.fatigue_strength: 400 Pa is 2e-09 times Young's modulus"),
+        ("fatigue = {strength = 4e8, tensile_strength = 1e15}",
+         "material.default.fatigue.tensile_strength: 1e+15 Pa is 5e+03 times"),
+    ],
+)  # fmt: skip
+def test_strengths_of_a_case_in_other_units(tmp_path, capfd, key, told):
+    (tmp_path / "case.toml").write_text(changed(BLOCK, ("density = 8000.0", f"density = 8000.0\n{key}")))
+    assert main(["check", str(tmp_path / "case.toml")]) == BAD_INPUT
+    assert told in capfd.readouterr().err
+
+
+def test_a_modulus_in_megapascals(tmp_path, capfd):
+    (warning,) = checked(tmp_path, capfd, changed(BLOCK, ("young = 2e11", "young = 2e5")))["warnings"]
+    assert warning.startswith("units: sound travels at 5 m/s in 'default', as when young is in MPa (then 2e+11 Pa)")
+
+
 def test_a_casing_of_implausible_friction(tmp_path, capfd):
     tables = DAMPED | {"friction_damper": [{"normal_force": 1.0, "friction": 3.0}]}
     assert warned(tmp_path, capfd, tables, "friction_damper[0].friction: 3 is implausible")

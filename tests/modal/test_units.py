@@ -10,7 +10,7 @@ from tests.tools.input_files import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.msh import session
-from vanedamp.modal.units import absurdity, doubts, model_doubts
+from vanedamp.modal.units import absurdity, doubts, model_doubts, strength_absurdity
 from vanedamp.studies.cli import BAD_INPUT, main
 
 # E in Pa, rho in kg/m^3 (Ashby, Materials Selection in Mechanical Design, 2011, appendix A)
@@ -38,6 +38,19 @@ def test_solids_that_exist_pass(name):
 )
 def test_solids_that_cannot_exist(young, density, told):
     assert absurdity(young, density).startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("strength", "young", "told"),
+    [
+        # fatigue strength of steel; tensile strengths of concrete, rubber, rock wool (Ashby, appendix A)
+        (4e8, 2.1e11, None), (2e6, 3e10, None), (2.5e7, 2e6, None), (1e4, 1e6, None),
+        (400.0, 2.1e11, "400 Pa is 1.9e-09 times Young's modulus (2.1e+11 Pa), as when the strength is in MPa"),
+        (4e8, 2.1e5, "4e+08 Pa is 1.9e+03 times Young's modulus (2.1e+05 Pa), as when young is in MPa"),
+    ],
+)  # fmt: skip
+def test_strengths_in_other_units_than_moduli(strength, young, told):
+    assert strength_absurdity(strength, young) == told
 
 
 @pytest.mark.parametrize(

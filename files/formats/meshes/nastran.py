@@ -315,7 +315,8 @@ def _fields(line: DeckLine) -> tuple[str, list[str]]:
         mark, *more = [*words[count:], ""]
         if any(more) or not (mark.startswith(("+", "*")) or re.fullmatch(r"(?![\d.-])\w*", mark)):
             raise line.error(
-                f"{name.upper() or 'continuation'}: more than {count} values in a line; go on in the next one, which begins with a comma"
+                f"{name.upper() or 'continuation'}: more than {count} values in a line; go on in the next one, which "
+                "begins with a comma"
             )
         return name.upper(), (words[:count] + [""] * count)[:count]
     name = text[:8].strip().upper()

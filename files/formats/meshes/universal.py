@@ -17,7 +17,7 @@ import numpy as np
 
 from vanedamp.files.formats.meshes.frames import Frame
 from vanedamp.files.formats.meshes.labelled_mesh import DeckLine, LabelledMesh, MeshError, deck_lines
-from vanedamp.files.formats.universal_systems import SYSTEMS, frame_of, systems_of
+from vanedamp.files.formats.meshes.universal_systems import SYSTEMS, frame_of, systems_of
 
 _NODES, _ELEMENTS = (2411, 781, 15), (2412, 780)
 # numbers that each member of a group has

@@ -21,6 +21,13 @@ def test_curve_on_both_sides_of_its_knee(after, exponent):
     assert cycles_to_failure(0.0, curve) == math.inf
 
 
+@pytest.mark.parametrize("history", [[0.0, 100.0], [100.0, 0.0], [0.0, 0.0, 40.0, 100.0, 100.0]])
+def test_two_points_are_half_a_cycle(history):
+    """ASTM E1049-85, section 5.4.4: a range that is left is half a cycle."""
+    assert [values.tolist() for values in rainflow_cycles(history)] == [[100.0], [50.0], [0.5]]
+    assert [values.tolist() for values in rainflow_cycles([7.0, 7.0])] == [[], [], []]
+
+
 def test_damage_of_a_sine_is_its_cycles_over_those_to_failure():
     """Goodman at a static stress of half the tensile strength doubles the amplitude."""
     curve = Fatigue(**CURVE, tensile_strength=1000e6).completed(None)

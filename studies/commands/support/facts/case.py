@@ -13,7 +13,7 @@ from vanedamp.files.toml_input import tables
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
 from vanedamp.modal.msh import checked_file
-from vanedamp.modal.units import size_doubts
+from vanedamp.modal.units import material_doubts, size_doubts
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
 
@@ -32,6 +32,8 @@ def facts(path: str | Path) -> list[Fact]:
     commands += ["ring"] if case.ring else []
     commands += [] if isinstance(case.mesh, MeshFile) else ["mesh"]
     found = [Fact("commands", commands), *_of_mesh(case), *_of_materials(case), *_of_results(case)]
+    materials = {name: (table.young, table.density) for name, table in case.material.items()}
+    warnings += [f"units: {doubt}" for doubt in material_doubts(materials)]
     warnings += [f"units: {doubt}" for fact in found if fact.key == "extent" for doubt in size_doubts(fact.value)]
     return [*found, Fact("files", case.files), Fact("warnings", warnings)]
 

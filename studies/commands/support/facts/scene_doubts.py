@@ -17,6 +17,7 @@ from vanedamp.coupling.system.linear_response import linear_amplitudes
 from vanedamp.coupling.system.reduced_model_file import ring_in_file
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.units import strength_absurdity
 from vanedamp.studies.headline import headline
 from vanedamp.studies.machining import fine_gap
 
@@ -24,6 +25,8 @@ from vanedamp.studies.machining import fine_gap
 _WIDE = 20.0
 #: friction beyond this is none of two dry solids: clean metals in air are below 1.5
 _ROUGH = 2.0
+#: Pa, moduli and hardnesses below these are those of no solid part; 1/Pa, K/H above which nothing wears
+_SOFTEST, _INDENTED, _WORN = 1e6, 1e6, 1e-8
 
 
 def sweep_doubts(scene: Scene) -> Iterator[str]:
@@ -69,6 +72,7 @@ def part_doubts(scene: Scene, mass: float | None) -> Iterator[str]:
     for number, cavity in enumerate(scene.cavity):
         if told := fine_gap(cavity.gap):
             yield f"cavity[{number}].gap: {told}"
+    yield from _material_doubts(scene)
     bodies = sum(body.mass for body in unrolled(scene).damper)
     if mass is not None and bodies > mass:
         yield (
@@ -82,6 +86,31 @@ def part_doubts(scene: Scene, mass: float | None) -> Iterator[str]:
             f"{alternating[0]}.sectors: {ring.sectors} sectors cannot alternate: sectors {ring.sectors - 1} and 0 are "
             "neighbours, and both have a cavity"
         )
+
+
+def _material_doubts(scene: Scene) -> Iterator[str]:
+    """Yield moduli, strengths and rates of wear that look like MPa for Pa."""
+    pair, wear = scene.contact.pair, scene.wear
+    moduli = {} if pair is None else {"young": pair.young, "wall_young": pair.wall_young}
+    for key, young in moduli.items():
+        if young is not None and young < _SOFTEST:
+            yield f"contact.pair.{key}: no solid part has {young:.4g} Pa; it is in Pa, not in MPa or GPa"
+    if pair is not None and pair.yield_strength is not None:
+        # of the softer of both, whichever that is
+        told = [strength_absurdity(pair.yield_strength, young) for young in moduli.values() if young is not None]
+        if all(told):
+            yield f"contact.pair.yield_strength: {told[0]}; both are in Pa"
+    rates = {} if wear is None else {"wear": wear} | {f"wear.pair[{n}]": one for n, one in enumerate(wear.pair)}
+    for name, one in rates.items():
+        if one.hardness is not None and one.hardness < _INDENTED:
+            yield (
+                f"{name}.hardness: no solid part has {one.hardness:.4g} Pa; it is in Pa, not in MPa or kgf/mm^2 "
+                "(HV 200 is 2e9 Pa)"
+            )
+        if one.rate is not None and one.rate > _WORN:
+            yield (
+                f"{name}.rate: {one.rate:.3g} 1/Pa is that of no solid part; 1 mm^3/(N m) is 1e-9 1/Pa, 1/MPa is 1e-6"
+            )
 
 
 def gap_doubts(scene: Scene, amplitude: float) -> Iterator[str]:
