@@ -155,7 +155,9 @@ class Solid:
 
     def stress(self, displacement: Any) -> Any:
         """Return the UFL stress tensor of a UFL displacement, Pa."""
-        strain = ufl.sym(ufl.grad(displacement))
+        return self._hooke(ufl.sym(ufl.grad(displacement)))
+
+    def _hooke(self, strain: Any) -> Any:
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(
@@ -206,11 +208,12 @@ class Solid:
         direction, origin, statics = unit_direction(axis), np.array(point, dtype=float), statics or Statics()
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
-        stress = self.stress(self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION))
+        displacement = self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION)
+        stress = self.stress(displacement)
         self._static_stresses["rotation"] = stress
         return RotatingMatrices(
             standing=matrices,
-            centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
+            centrifugal_stiffness=sparse.csr_array(self._prestress_stiffness(displacement, stress) - softening),
             gyroscopic=nodal_product(matrices.mass, 2.0 * cross_matrix(direction)),
             load=load,
             axis=direction,
@@ -303,9 +306,10 @@ class Solid:
         strain = self._field(lambda material, values: material.expansion * (values - reference))
         pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
         load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
-        stress = self.stress(self._static(statics, matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
+        displacement = self._static(statics, matrices, load, _NO_THERMAL_SOLUTION)
+        stress = self.stress(displacement) - pressure * ufl.Identity(3)
         self._static_stresses["temperature"] = stress
-        added = self._geometric_stiffness(stress)
+        added = self._prestress_stiffness(displacement, stress)
         share = statics.stable_share(matrices, added)
         if share < 1.0:
             raise UnstableError(
@@ -330,11 +334,18 @@ class Solid:
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
         return fenicsx.matrix(ufl.inner(self.stress(self._trial), ufl.sym(ufl.grad(self._test))) * measure)
 
-    def _geometric_stiffness(self, stress: Any) -> sparse.csr_array:
-        """Return the matrix of the integral of sigma_jk u_i,j v_i,k: the stiffness of a stress at rest."""
+    def _prestress_stiffness(self, displacement: Any, stress: Any) -> sparse.csr_array:
+        """Return what a static solution adds to the stiffness (N, N), to first order in its UFL displacement and stress.
+
+        The derivative of the first Piola-Kirchhoff stress F S: the geometric stiffness of the stress, and the strains
+        and stresses of the motion on the deformed shape, the initial-displacement stiffness (Bathe 2014, Finite Element
+        Procedures, section 6.3).
+        """
+        motion, turned = ufl.grad(self._trial), ufl.grad(displacement)
+        piola = motion * stress + turned * self.stress(self._trial) + self._hooke(ufl.sym(turned.T * motion))
         # exact for straight tetrahedra; the degree that UFL estimates takes four times as many points in hexahedra
         measure = ufl.dx(metadata={"quadrature_degree": 2 * self.degree + 1})
-        return fenicsx.matrix(ufl.inner(ufl.grad(self._trial) * stress, ufl.grad(self._test)) * measure)
+        return fenicsx.matrix(ufl.inner(piola, ufl.grad(self._test)) * measure)
 
     def _support_stiffness(self, name: str) -> sparse.csr_array:
         support, domain, trial = self.elastic[name], self.domain, self._trial
