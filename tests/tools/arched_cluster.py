@@ -18,16 +18,19 @@ AXIAL = np.array([-0.010, 0.0, 0.010])
 _CUBE = np.array([[0, 1 << a, 1 << a | 1 << b, 7] for a, b, _ in itertools.permutations(range(3))])
 
 
-def write(path):
-    """Write the mesh: the volume group "cluster" and the facet group "clamp"."""
-    number = np.arange(RADII.size * ANGLES.size * AXIAL.size).reshape(RADII.size, ANGLES.size, AXIAL.size)
-    radius, angle, x = (grid.ravel() for grid in np.meshgrid(RADII, np.radians(ANGLES), AXIAL, indexing="ij"))
+def write(path, parts=1):
+    """Write the mesh: the volume group "cluster" and the facet group "clamp". parts: cells for each interval above."""
+    radii, angles, axial = (
+        np.interp(np.arange((each.size - 1) * parts + 1) / parts, np.arange(each.size), each)
+        for each in (RADII, ANGLES, AXIAL)
+    )
+    number = np.arange(radii.size * angles.size * axial.size).reshape(radii.size, angles.size, axial.size)
+    radius, angle, x = (grid.ravel() for grid in np.meshgrid(radii, np.radians(angles), axial, indexing="ij"))
     points = np.column_stack([x, radius * np.sin(angle), radius * np.cos(angle)])
-    layers, sectors = RADII.size - 1, ANGLES.size - 1
     cells = [
         number[i : i + 2, j : j + 2, k : k + 2].ravel()[_CUBE]
-        for i, j, k in itertools.product(range(layers), range(sectors), range(AXIAL.size - 1))
-        if i in (0, layers - 1) or j in _VANES
+        for i, j, k in itertools.product(range(radii.size - 1), range(angles.size - 1), range(axial.size - 1))
+        if i // parts in (0, RADII.size - 2) or j // parts in _VANES
     ]
     tetrahedra = np.concatenate(cells)
     corners = points[tetrahedra]
