@@ -24,6 +24,8 @@ from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
+# steps, even in the squared speed, by which a structure is followed that first order in it would have unstable
+_SPEEDS = 8
 _NO_CENTRIFUGAL_SOLUTION = (
     "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no static "
     "solution; clamp a group in [support], or give it springs"
@@ -237,12 +239,7 @@ class Solid:
         if not speed:
             return slow
         before = self._deformation.tangent(self._expanded)
-        found = self._deformation.equilibrium(
-            lambda stiffness, force: statics.shape(replace(matrices, stiffness=stiffness), force),
-            matrices.stiffness - before - speed**2 * softening,
-            speed**2 * load,
-            self._expanded + speed**2 * bend,
-        )
+        found = self._shape_at(speed, slow, softening, before, bend)
         if found is None:
             slow.at(speed)
             raise UnstableError(
@@ -351,6 +348,34 @@ class Solid:
                 "that let it expand"
             )
         return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
+
+    def _shape_at(
+        self, speed: float, slow: RotatingMatrices, softening: sparse.csr_array, before: sparse.csr_array,
+        bend: np.ndarray,
+    ) -> np.ndarray | None:  # fmt: skip
+        """Return the displacements (N,) at a speed, to which the structure comes from standstill; None: nowhere stable.
+
+        slow, softening, before, bend: first order in the squared speed, mass across the axis, tangent at standstill,
+        displacements per squared speed.
+        """
+        standing, statics, here = slow.standing, slow.statics, self._expanded + speed**2 * bend
+        sure = statics.stable_share(standing, speed**2 * slow.centrifugal_stiffness) == 1.0
+        steps = 1 if sure else _SPEEDS
+        if not sure:  # beyond an instability another equilibrium may be found: go there along the stable ones
+            here = self._expanded
+        for square in speed**2 * np.arange(1, steps + 1) / steps:
+            found = self._deformation.equilibrium(
+                lambda stiffness, force: statics.shape(replace(standing, stiffness=stiffness), force),
+                standing.stiffness - before - square * softening, square * slow.load, here,
+            )  # fmt: skip
+            if found is None:
+                return None
+            here = found
+            if not sure:
+                added = self._deformation.tangent(here) - before - square * softening
+                if statics.stable_share(standing, sparse.csr_array(added)) < 1.0:
+                    return None
+        return here
 
     def _static(self, statics: Statics, matrices: SystemMatrices, load: np.ndarray, without: str) -> np.ndarray:
         """Return the displacements (N,) under a static load; without: the error where there are none."""

@@ -18,8 +18,9 @@ from vanedamp.modal import fenicsx
 from vanedamp.modal.eigen import SolverError
 from vanedamp.modal.fenicsx import ufl
 
-# of the largest displacement: a last step of Newton's method whose square is round-off
-_STEP = 1e-4
+# a last step of Newton's method: of the largest displacement, so that its square is round-off; of the size of the body,
+# below which all displacements are
+_STEP, _NONE = 1e-4, 1e-10
 _MOST_STEPS = 15
 
 
@@ -34,6 +35,7 @@ class Deformation:
 
     def __init__(self, space: Any, hooke: Callable[[Any], Any], growth: Any, degree: int) -> None:
         self._hooke, self._growth = hooke, growth
+        self._size = float(np.ptp(space.mesh.geometry.x, axis=0).max())
         self._field = fenicsx.field(space, 0.0)
         motion, test = ufl.grad(ufl.TrialFunction(space)), ufl.grad(ufl.TestFunction(space))
         gradient, stress = ufl.Identity(3) + ufl.grad(self._field), self.stress(self._field)
@@ -67,9 +69,7 @@ class Deformation:
     def tangent_change(self, displacement: np.ndarray, along: np.ndarray) -> sparse.csr_array:
         """Return the derivative (N, N) of the tangent along displacements (N,)."""
         # a central difference of what is quadratic has no error but round-off, least for strains of the order of one
-        size = np.ptp(self._field.function_space.mesh.geometry.x, axis=0).max() / max(
-            np.abs(along).max(), np.finfo(float).tiny
-        )
+        size = self._size / max(np.abs(along).max(), np.finfo(float).tiny)
         ahead, behind = (self.tangent(displacement + sign * size * along) for sign in (1.0, -1.0))
         return sparse.csr_array((ahead - behind) / (2.0 * size))
 
@@ -96,6 +96,6 @@ class Deformation:
             step, here = float(np.abs(found - here).max()), found
             if not step < np.inf:
                 return None
-            if step <= _STEP * np.abs(here).max():
+            if step <= max(_STEP * np.abs(here).max(), _NONE * self._size):
                 return here
         return None

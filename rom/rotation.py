@@ -206,6 +206,6 @@ def _sentence(
     if not linearisation:
         return sentence
     return (
-        f"{sentence}; the stiffness, linear in the squared speed, is right at standstill and {speeds[-1]:.4g} rad/s, and "
-        f"costs up to {100 * linearisation:.1g} % of natural frequencies between"
+        f"{sentence}; the stiffness, linear in the squared speed, is right at standstill and {speeds[-1]:.4g} rad/s "
+        f"and costs up to {100 * linearisation:.1g} % of natural frequencies between"
     )

@@ -76,7 +76,8 @@ _UNSEEN = 1e-9
 class Structure:
     """A case with its finite elements: the solid on its mesh, and the matrices.
 
-    rotating: matrices of a case that rotates, exact at its speed, at which `matrices` holds.
+    rotating: matrices of a case that rotates, exact at its speed, at which `matrices` holds; of one at standstill exact
+    at the highest speed that it names.
     """
 
     case: Case
@@ -85,7 +86,7 @@ class Structure:
     rotating: RotatingMatrices | None = None
 
     def rotating_to(self, speed: float) -> RotatingMatrices:
-        """Return the matrices over the speeds from standstill to one (rad/s), exact at both, for a case that rotates."""
+        """Return the matrices of a case that rotates for speeds up to one (rad/s), exact at standstill and there."""
         given = self.rotating
         assert given is not None
         if speed == given.exact_at:
@@ -127,7 +128,10 @@ def assemble(case: Case) -> Structure:
         _functional(case, matrices, label)
     if case.rotation is None:
         return Structure(case, solid, matrices)
-    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics, case.rotation.omega)
+    speed = case.rotation.omega or max(
+        case.rotation.greatest, 0.0 if case.campbell is None else case.campbell.speeds[-1]
+    )
+    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics, float(speed))
     return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
 
 

@@ -55,7 +55,8 @@ def _shape_functions(corners):
     gradients = np.concatenate(
         [np.einsum("qa,eax->eqax", 4.0 * linear - 1.0, slopes)]
         + [
-            4.0 * (np.einsum("q,ex->eqx", linear[:, i], slopes[:, j]) + np.einsum("q,ex->eqx", linear[:, j], slopes[:, i]))[
+            4.0
+            * (np.einsum("q,ex->eqx", linear[:, i], slopes[:, j]) + np.einsum("q,ex->eqx", linear[:, j], slopes[:, i]))[
                 :, :, None
             ]
             for i, j in _EDGES
