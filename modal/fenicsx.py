@@ -177,8 +177,8 @@ def cell_functions(domain: Domain, values: Callable[[str, np.ndarray], np.ndarra
     return function
 
 
-def field(space: Any, values: np.ndarray) -> Any:
-    """Return a function from the values of its DOFs."""
+def field(space: Any, values: np.ndarray | float) -> Any:
+    """Return a function from the values of its DOFs, or one for all."""
     function = fem.Function(space)
     function.x.array[:] = values
     return function

@@ -30,7 +30,7 @@ class Structure:
         assert given is not None
         if speed == given.exact_at:
             return given
-        return self.solid.rotating(given.standing, given.axis, given.point, given.statics, speed)
+        return self.solid.rotating(given.standing, given.axis.tolist(), given.point.tolist(), given.statics, speed)
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
         """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
