@@ -77,7 +77,7 @@ def modal_stress(x, length, width, height):
 
 @pytest.mark.parametrize(("shape_of", "stress_at"), [(static_shape, static_stress), (first_shape, modal_stress)])
 def test_bending_stress_of_a_cantilever(tmp_path, shape_of, stress_at):
-    """Under a tip load and in the first mode: within 2 % of beam theory, converging."""
+    """Under a tip load and in the first mode: converging to beam theory, which leaves out the mode's shear (0.4 %)."""
     errors = [bending_stress_errors(tmp_path / "beam.msh", cells, shape_of, stress_at) for cells in (2, 4, 8)]
-    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
-    assert errors[2] < 0.02
+    assert errors[0] > 3.0 * errors[1] > 3.0 * errors[2]
+    assert errors[2] < 0.005
