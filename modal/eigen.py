@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal import petsc
+from vanedamp.modal import parallel, petsc
 from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.iterative import Iteration, chosen
 from vanedamp.modal.matrices import SystemMatrices
@@ -147,8 +147,11 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
     ceiling = 0.5 * (values[last - 1] + values[last])
     expected = pencil.below(ceiling)
     if expected != last:
-        # copies of a multiple eigenvalue that the one Krylov space does not hold
-        values, vectors = _sliced(pencil, floor, ceiling, expected)
+        # copies of a multiple eigenvalue that the Krylov space of a narrow block does not hold
+        if parallel.COMM.size == 1 and expected <= _SLICE:
+            values, vectors = petsc.nearest_eigenpairs(*pencil, expected, floor, width=expected)
+        if np.count_nonzero(values < ceiling) != expected:
+            values, vectors = _sliced(pencil, floor, ceiling, expected)
     return values[:count], vectors[:count]
 
 

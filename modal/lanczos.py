@@ -37,13 +37,13 @@ def block(count: int) -> int:
     return min(max(count // 4, 4), 12)
 
 
-def directions(count: int) -> int:
-    """Return the most vectors that are kept for `count` eigenpairs; smaller problems are solved densely."""
-    return 2 * count + 16 * block(count)
+def directions(count: int, width: int = 0) -> int:
+    """Return the most vectors that are kept for `count` eigenpairs by blocks; smaller problems are solved densely."""
+    return 2 * count + 16 * (width or block(count))
 
 
 def eigenpairs(
-    solve: Solve, mass: Any, count: int, shift: float = 0.0, tolerance: float = 1e-11, spare: int = 0
+    solve: Solve, mass: Any, count: int, shift: float = 0.0, tolerance: float = 1e-11, spare: int = 0, width: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the eigenvalues (m,) nearest to a shift, nearest first, and mass-orthonormal vectors (m, n).
 
@@ -52,12 +52,14 @@ def eigenpairs(
     tolerance  of the residual of the shifted inverse, relative to its eigenvalue, in the norm of the mass: eigenvalues
                have its square; not below the round-off of the largest one
     spare      that many more pairs, to the square root of the tolerance
+    width      right-hand sides of a solve; of an eigenvalue with so many copies none is missed. Default: `block(count)`
 
-    n must be greater than `directions(count + spare)`. Raises NotConvergedError.
+    n must be greater than `directions(count + spare, width)`. Raises NotConvergedError.
     """
-    wanted, width = count + spare, block(count)
+    wanted = count + spare
     limits = np.r_[np.full(count, tolerance), np.full(spare, tolerance**0.5)]
-    space, random = _Krylov(mass, directions(wanted)), np.random.default_rng(0)
+    space, random = _Krylov(mass, directions(wanted, width)), np.random.default_rng(0)
+    width = width or block(count)
     for _ in range(_RESTARTS):
         while space.count <= space.most - width:
             if space.block == 0:  # at the start, or the space holds all that its start can reach

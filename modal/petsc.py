@@ -131,16 +131,16 @@ def negative_eigenvalues(matrix: sparse.csr_array) -> int:
 
 
 def nearest_eigenpairs(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, spare: int = 0
+    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, spare: int = 0, width: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return eigenvalues (m,) ascending and vectors (m, n) of K x = lambda M x nearest to a shift.
 
-    spare: more pairs than `count`, whose vectors have half the digits. Block Lanczos on one rank, Krylov-Schur (Stewart
-    2001, SIAM J. Matrix Anal. Appl. 23) on MUMPS on several. Raises SolverError when fewer converge than were asked
-    for.
+    spare: more pairs than `count`, whose vectors have half the digits; width: `lanczos.eigenpairs`. Block Lanczos on
+    one rank, Krylov-Schur (Stewart 2001, SIAM J. Matrix Anal. Appl. 23) on MUMPS on several. Raises SolverError when
+    fewer converge than were asked for.
     """
     wanted = count + spare
-    if mass.shape[0] <= directions(wanted):
+    if mass.shape[0] <= directions(wanted, width):
         values, vectors = linalg.eigh(stiffness.toarray(), mass.toarray())
         vectors = vectors.T
     elif parallel.COMM.size > 1:
@@ -149,11 +149,16 @@ def nearest_eigenpairs(
         matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
         with factorize(matrix, definite=shift <= 0.0) as factors:
             try:
-                values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare)
+                values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare, width=width)
             except NotConvergedError as error:
                 raise SolverError(str(error)) from error
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:wanted]
     return _ascending(values[nearest], vectors[nearest])
+
+
+def has_cholmod() -> bool:
+    """Say whether this PETSc is built with SuiteSparse."""
+    return bool(PETSc.Sys.hasExternalPackage("suitesparse"))
 
 
 def factorize(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
@@ -162,7 +167,7 @@ def factorize(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
     definite: whether it may be positive definite, for CHOLMOD. The result solves for right-hand sides (n,) or (n, k)
     with `.solve`; `.destroy()` or the end of a `with` block frees it. Raises SolverError for a singular matrix.
     """
-    if definite and PETSc.Sys.hasExternalPackage("suitesparse") and np.all(matrix.diagonal() > 0.0):
+    if definite and has_cholmod() and np.all(matrix.diagonal() > 0.0):
         with contextlib.suppress(SolverError):
             return Factorization(matrix, "cholmod")
     return Factorization(matrix)

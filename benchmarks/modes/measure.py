@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from benchmarks.apart import apart
 from benchmarks.benchmark import Benchmark, Result
@@ -28,10 +27,10 @@ from benchmarks.tables import table
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build
 from vanedamp.modal.iterative import chosen
+from vanedamp.modal.petsc import has_cholmod
 
-_CHOLMOD = PETSc.Sys.hasExternalPackage("suitesparse")
 #: what `vanedamp modal` runs on one rank
-OURS = "lanczos" if _CHOLMOD else "mumps"
+OURS = "lanczos" if has_cholmod() else "mumps"
 _WORKER = "benchmarks.modes.worker"
 # frequencies that differ by more than this between two solvers are another answer
 _AGREE = 1e-7
@@ -232,7 +231,7 @@ def _solvers() -> tuple[list[str], dict[str, str]]:
         for name, (module, package, remedy) in _PEERS.items()
         if name in NAMES and importlib.util.find_spec(module) is None
     }
-    if not _CHOLMOD:
+    if not has_cholmod():
         absent["lanczos"] = "this PETSc is built without SuiteSparse; Debian's and conda's have it"
     return [name for name in NAMES if name not in absent], absent
 

@@ -66,7 +66,7 @@ def test_a_full_space_restarts_with_what_it_has(monkeypatch):
         return solve(rows)
 
     solve = inverse(stiffness, mass, 0.0)
-    monkeypatch.setattr(lanczos, "directions", lambda count: count + 4 * COPIES)
+    monkeypatch.setattr(lanczos, "directions", lambda count, _width=0: count + 4 * COPIES)
     values, vectors = eigenpairs(counted, mass, 12)
     assert sum(solves) > lanczos.directions(12)
     assert values == pytest.approx(exact[:12], rel=1e-10)
@@ -107,6 +107,6 @@ def test_a_space_that_runs_out_of_directions():
 def test_too_little_time(monkeypatch):
     stiffness, mass, _ = rod()
     monkeypatch.setattr(lanczos, "_RESTARTS", 1)
-    monkeypatch.setattr(lanczos, "directions", lambda count: count + COPIES)
+    monkeypatch.setattr(lanczos, "directions", lambda count, _width=0: count + COPIES)
     with pytest.raises(NotConvergedError, match="of 12 modes converged"):
         eigenpairs(inverse(stiffness, mass, 0.0), mass, 12)
