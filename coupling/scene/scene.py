@@ -220,6 +220,7 @@ class Scene(OpenRecord, Displayed):
                 f'wear: each spring of law = "{self.contact.law}" counts as an impact; take law = "compliant" with a '
                 "stiffness"
             )
+        self._check_wear_pairs()
         if self.excitation.engine_order is not None and not self.speed:
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_rotation()
@@ -469,6 +470,19 @@ class Scene(OpenRecord, Displayed):
             raise ValueError(f"excitation.wave: {whose}; leave it out")
         if ring and excitation.travelling is not None and excitation.waveform is not None:
             raise ValueError("excitation.waveform: a wave around a ring takes sines; give harmonic")
+
+    def _check_wear_pairs(self) -> None:
+        """Raise ValueError for contacts with rates of their own that the scene has not."""
+        counts = {"casing": len(self.friction_damper), "stop": len(self.stop)}
+        for number, pair in enumerate(() if self.wear is None else self.wear.pair):
+            what = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
+            count = counts.get(pair.side or "", len(self.damper))
+            if pair.side is None:
+                count = max(count, *counts.values())
+            if pair.damper is not None and pair.damper >= count:
+                raise ValueError(
+                    f"wear.pair[{number}].damper: there are only {count} {what}, counted from 0 (got {pair.damper})"
+                )
 
     def _check_ranges(self) -> None:
         """Raise ValueError for a range that is none, or of no number of the scene."""

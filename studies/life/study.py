@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -115,7 +115,7 @@ class LifeStudy(NamedTuple):
             raise InputError(f"{path}: {error}") from None
         if reference == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        return cls(replace(scene, sweep={}), file.life, frozen(band), reference)
+        return cls(scene, file.life, frozen(band), reference)
 
     @property
     def starts(self) -> int:
@@ -170,9 +170,16 @@ class Wearing(NamedTuple):
         """Return the play of the cavities, m; nan without."""
         return np.array([cavity.play or np.nan for cavity in self.scene.cavity]) + self.play @ volume
 
+    @property
+    def losses(self) -> np.ndarray:
+        """Fractions (bodies, c) of each body per volume of wear, 1/m^3; nan where its size is not known."""
+        found: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
+        return found
+
     def lost(self, volume: np.ndarray) -> np.ndarray:
         """Return the fraction of each body that is worn away; nan where its size is not known."""
-        return self.shares @ volume / body_volumes(self.scene)
+        found: np.ndarray = self.losses @ volume
+        return found
 
     def worn(self, volume: np.ndarray) -> Scene:
         """Return the scene with its gaps, plays and masses after some wear."""
@@ -197,6 +204,10 @@ def _check(scene: Scene) -> None:
         )
     if isinstance(scene.structure, Prescribed):
         raise InputError('structure: a prescribed motion is not damped; take model = "rigid" or "rom"')
+    if scene.sweep:
+        raise InputError("sweep: a life runs at the points of its band only; leave the table out")
+    if scene.ensemble is not None and not scene.ranges:
+        raise InputError("ensemble: samples ranges, of which a life has none; leave the table out")
     for number in scene.ranges:
         raise InputError(f"{number}: a range is for `vanedamp run` and `vanedamp sweep`; give one number")
     if leaves_open(scene):

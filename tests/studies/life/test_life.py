@@ -186,6 +186,46 @@ def test_the_body_loses_its_share(found):
     assert record.lost[-1, 0] == pytest.approx(0.5 * volume.sum() / (0.01 * 0.005 * 0.005))
 
 
+SIZE = {"width": 0.01, "length": 0.005, "height": 0.005}
+VOLUME = 0.01 * 0.005 * 0.005
+
+
+def worn_on_the_floor(monkeypatch, rate, **table):
+    """The life of a body whose floor takes a volume per hour by its mass, m^3/h, and opens nothing."""
+    damper, data = Damper(), copy.deepcopy(SCENE)
+
+    def simulated(scene):
+        response = damper(scene)
+        for one in response.wear:
+            volume = rate(scene.damper[0].mass) if one.side == "floor" else 0.0
+            object.__setattr__(one, "volume_rate", volume)
+        return response
+
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    monkeypatch.setattr(fast, "simulate", simulated)
+    data["wear"] |= SIZE
+    data["life"] |= table
+    return life(LifeStudy.of(data))
+
+
+def test_the_loss_of_mass_is_controlled_as_gaps_are(monkeypatch):
+    """A body that wears in proportion to its mass: what is left falls exponentially."""
+    mass = SCENE["damper"][0]["mass"]
+    record = worn_on_the_floor(monkeypatch, lambda now: 2 * VOLUME / HOURS * now / mass, hours=HOURS, tolerance=0.01)
+    assert record.lost[:, 0] == pytest.approx(1 - np.exp(-record.time / HOURS), abs=2e-3)
+    assert record.time[-1] == pytest.approx(HOURS) and record.worn_away is None
+
+
+@pytest.mark.parametrize("steps", [None, 7])
+def test_a_body_that_is_worn_away_ends_the_life(monkeypatch, tmp_path, steps):
+    record = worn_on_the_floor(monkeypatch, lambda _: 2 * VOLUME / 300.0, hours=1000.0, steps=steps)
+    assert record.worn_away == pytest.approx(300.0, rel=1e-9)
+    assert record.sentence.startswith("Body 0 is worn away after 300 h: the reduction is 70% as new and 70% at")
+    assert record.time[-1] < 300.0 and record.lost[-1, 0] < 1.0
+    record.save(tmp_path / "life.h5")
+    assert LifeRecord.load(tmp_path / "life.h5").worn_away == record.worn_away == record.to_json()["worn_away"]
+
+
 @pytest.mark.parametrize(
     ("table", "change", "said"),
     [
@@ -207,6 +247,10 @@ def test_the_body_loses_its_share(found):
         ("life", {"band": None}, "life.band: missing"),
         ("structure", {"model": "prescribed"}, "structure"),
         ("solver", {"method": "moreau"}, "exact"),
+        ("wear", {"pair": [{"damper": 1, "rate": 1e-14}]}, "wear.pair[0].damper: there are only 1 bodies"),
+        ("wear", {"pair": [{"damper": 0, "side": "stop", "rate": 1e-14}]}, "there are only 0 stops"),
+        (None, {"sweep": {"damper.0.mass": [0.001]}}, "sweep: a life runs at the points of its band"),
+        (None, {"ensemble": {"samples": 8}}, "ensemble: samples ranges, of which a life has none"),
         (None, {"wear": None}, "wear: missing"),
         (None, {"life": None}, "life"),
     ],
