@@ -85,7 +85,7 @@ class _Expected:
                 end = now.time + left / falls
                 halved = max(math.ceil(math.log2(step / (_CLOSE * table.hours))), 0)
         evaluations = len(STAGES) * steps_left(now, end, step, steps) + halved
-        self.total = asked + evaluations * len(self._study.frequencies) + self._study.starts
+        self.total = asked + evaluations * self._study.each + self._study.starts
 
 
 class WornAway(Exception):

@@ -15,6 +15,7 @@ from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
+from vanedamp.coupling.scene.paths import Range
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.grid import Points
@@ -27,6 +28,8 @@ from vanedamp.studies.worst_start import STARTS
 
 #: about how often a life is evaluated over its band
 _EVALUATIONS = 20
+#: how often the spacing of a band is halved about its worst point
+HALVINGS = 3
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
 
@@ -123,9 +126,20 @@ class LifeStudy(NamedTuple):
         return 2 * len(self.frequencies) * (1 if why_no_restart(self.scene) else len(STARTS))
 
     @property
+    def refines(self) -> bool:
+        """Whether the worst point is sought between those of the band, too: not where these are listed."""
+        spaced = isinstance(getattr(self.table, self.table.key), Range) and len(self.frequencies) > 1
+        return spaced and (self.table.over_band == "worst" or self.table.dwell == "peak")
+
+    @property
+    def each(self) -> int:
+        """Runs over the band, at most."""
+        return len(self.frequencies) + 2 * HALVINGS * self.refines
+
+    @property
     def runs(self) -> int:
         """About how many runs a life takes."""
-        return _EVALUATIONS * len(self.frequencies) + self.starts
+        return _EVALUATIONS * self.each + self.starts
 
     def wearing(self, contacts: Sequence[Contact]) -> Wearing:
         """Return how the scene wears at its contacts.
@@ -145,10 +159,10 @@ class LifeStudy(NamedTuple):
         area = np.where(np.isnan(area), 1.0, area)
         return Wearing(scene, gap / area, play / area, body_shares(scene, contacts))
 
-    def points(self, scene: Scene) -> list[Scene]:
-        """Return a scene at the frequencies of the band."""
+    def points(self, scene: Scene, frequencies: Sequence[float]) -> list[Scene]:
+        """Return a scene at some frequencies (f,), Hz."""
         made = Points(scene)
-        return [made.scene(drive(scene, float(frequency))) for frequency in self.frequencies]
+        return [made.scene(drive(scene, float(frequency))) for frequency in frequencies]
 
 
 class Wearing(NamedTuple):

@@ -109,6 +109,62 @@ def test_dwell_weighs_the_points_of_the_band(found, monkeypatch):
     assert rates == pytest.approx([rates[1] / 2, GAP / HOURS / 2, rates[1], rates[1] / 4])
 
 
+def _of_curve(monkeypatch, curve, num, **table):
+    """The record of a life of an hour whose amplitude over the reference is a curve of the frequency, Hz."""
+    damper = Damper()
+
+    def simulated(scene):
+        response = damper(scene)
+        response.amplitude_mean_dynamic = case.reference * curve(scene.frequency)
+        return response
+
+    case = study(hours=1.0, band={"start": 2340.0, "stop": 2450.0, "num": num}, **table)
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    monkeypatch.setattr(fast, "simulate", simulated)
+    return life(case)
+
+
+@pytest.mark.parametrize("num", [12, 23, 45])
+@pytest.mark.parametrize("jumps", [False, True], ids=["smooth", "jump"])
+def test_the_worst_point_is_sought_between_those_of_the_band(monkeypatch, num, jumps):
+    """Whatever the spacing, the band of the reduction holds that of the curve: a resonance, or one that drops."""
+
+    def curve(frequency):
+        if jumps and frequency > 2391.7:
+            return 0.05
+        return 0.4 / np.hypot(1.0, (frequency - 2393.7) / 4.0)
+
+    worst = curve(2391.7 if jumps else 2393.7)
+    record = _of_curve(monkeypatch, curve, num)
+    off, told = 1.0 - worst - record.reduction[0], record.reduction_band[0]
+    assert abs(off) <= told < 0.05
+    assert record.amplitude.shape[1] == num
+    # the time spent at the band's points is as before
+    assert record.depth_rate[0, 1] == pytest.approx(GAP / HOURS / 2)
+
+
+def test_lists_of_frequencies_and_means_are_taken_as_they_are(monkeypatch, found):
+    record = _of_curve(monkeypatch, lambda frequency: 0.2 + 1e-3 * (frequency - 2340.0), 12, over_band="mean")
+    assert record.runs == 12 * (1 + 3 * (len(record.time) - 1))
+    listed = found(study(hours=1.0))[0]
+    assert listed.runs == 2 * (1 + 3 * (len(listed.time) - 1))
+
+
+def test_resumes_between_the_points_of_a_band(monkeypatch, tmp_path):
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    case, kept = study(hours=1.0, band={"start": 2400.0, "stop": 2420.0, "num": 3}), tmp_path / "life.h5.partial"
+    monkeypatch.setattr(fast, "simulate", whole := Damper())
+    runs = life(case).runs
+    assert runs == whole.calls > 3 * 4
+    for fail in (2, 5, 11):
+        monkeypatch.setattr(fast, "simulate", stopped := Damper(fail=fail))
+        with pytest.raises(KeyboardInterrupt):
+            life(case, checkpoint=kept)
+        monkeypatch.setattr(fast, "simulate", rest := Damper())
+        assert life(case, checkpoint=kept).runs == runs == stopped.calls - 1 + rest.calls
+        kept.unlink()
+
+
 def test_failed_runs_damp_nothing_and_are_reported(found):
     record, _ = found(study(hours=10.0), status=Status.DIVERGED)
     assert record.trouble == record.runs and record.reduction == pytest.approx(0.0)
