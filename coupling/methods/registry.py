@@ -41,10 +41,11 @@ def respond(
     watch: looks at more samples than are asked for.
     """
     started = time.perf_counter()
-    run = run_of(scene, events, samples_per_period, start, watch)
+    logs = scene.wear is not None and scene.yields  # the energies of their impacts are in the log
+    run = run_of(scene, events or logs, samples_per_period, start, watch)
     ended = run_scene(run, scene, progress, watch)
     outcome = run.outcome() if watch is None else watch.close(run.outcome())
-    response = evaluate(scene, outcome, ended, started)
+    response = evaluate(scene, outcome, ended, started, events)
     warnings = response.warnings + wall_warnings(scene, {}, np.array(response.penetration))
     return replace(response, final=final_state(scene, run), warnings=warnings)
 

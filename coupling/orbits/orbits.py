@@ -26,6 +26,7 @@ from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.coupling.scene.paths import namesake
 from vanedamp.coupling.scene.rotation import FREQUENCY, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -146,6 +147,8 @@ class _Search:
         self.low = given if self.table.from_ is None else self.table.from_
         if track is not None:
             self.second = number_of_motion(scene, track.parameter, "orbit.track.parameter", _STARTS)
+            if namesake(scene.to_dict(), track.parameter, [path]) is not None:
+                raise InputError(f"orbit.track.parameter: {track.parameter} is orbit.parameter; take another number")
             self.first_second = self.second if track.from_ is None else track.from_
             if track.to == self.first_second or not 0.0 <= self._share(self.second) <= 1.0:
                 raise InputError(

@@ -14,7 +14,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.contact_work import ContactWork
-from vanedamp.coupling.response.event_log import Rows, events_of
+from vanedamp.coupling.response.event_log import Rows, events_of, impact_energies
 from vanedamp.coupling.response.figures import (
     FIGURES,
     NO_CONTACT,
@@ -178,8 +178,8 @@ def _run_until_known(
     return ended
 
 
-def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter)."""
+def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: bool = True) -> Response:
+    """Return the response of a run that began at `started` (time.perf_counter). events: keep the list of events."""
     system, records, done, status = run.system, run.records, run.periods, ended.status
     first = min(ended.transient, max(done - 1, 0))
     row = np.empty(len(FIGURES))
@@ -210,7 +210,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         periods=done,
         transient=first,
         counters=run.counters,
-        event_list=events_of(run.rows, run.log),
+        event_list=events_of(run.rows, run.log) if events else [],
         penetration=run.penetration,
         **figures,
         **_series(system, records, done),
@@ -228,13 +228,23 @@ def _worn(scene: Scene, work: tuple[ContactWork, ...], friction: float) -> dict[
 def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
     """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
     records, rows, window = run.records, run.rows, slice(first, run.periods)
+    struck = _struck(run)
     found = []
     for row, (number, side, corner) in enumerate(rows.places):
         friction = _friction(scene, run, row)
         sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
-        course = np.stack([sliding, records.struck[window, row]], axis=1)
+        course = np.stack([sliding, struck[window, row]], axis=1)
         found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
     return tuple(found)
+
+
+def _struck(run: Outcome) -> np.ndarray:
+    """Return the sums (periods + 1, rows) of the energies of impacts to the power of [wear], J^n."""
+    struck, exponent = run.records.struck.copy(), float(run.records.exponent[0])
+    struck[:, np.flatnonzero(np.isfinite(run.rows.spring))] = 0.0  # known only as a contact ends
+    period, row, energy = impact_energies(run.rows, run.log, run.system.period)
+    np.add.at(struck, (np.minimum(period, len(struck) - 1), row), energy**exponent)
+    return struck
 
 
 def _friction(scene: Scene, run: Outcome, row: int) -> float:

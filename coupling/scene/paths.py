@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -33,6 +33,35 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
 
 def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
+    for place in list(_places(node, steps, path)):
+        table = node
+        for step in place[:-1]:
+            table = table[step]
+        table[place[-1]] = value
+
+
+def namesake(data: Any, path: str, others: Iterable[str]) -> str | None:
+    """Return which of some paths names a value that `path` names as well, or one within it; None: none of them.
+
+    Values are compared by their places in plain scene data: cavity.gap, cavity.0.gap and cavity.c.gap may be one.
+    """
+    own = _known_places(data, path)
+    for other in others:
+        if any(place[: len(whole)] == whole for place in _known_places(data, other) for whole in own):
+            return other
+    return None
+
+
+def _known_places(data: Any, path: str) -> set[tuple[Any, ...]]:
+    """Return the places that a path names; none where it names no place, which is said elsewhere."""
+    try:
+        return set(_places(data, path.split("."), path))
+    except InputError:
+        return set()
+
+
+def _places(node: Any, steps: list[str], path: str, before: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the keys and indices that lead to each value at the end of `steps`. Raises InputError as `assign`."""
     if not steps:
         raise InputError(f"scene: {path}: names a table, not a value")
     head, rest = steps[0], steps[1:]
@@ -41,31 +70,33 @@ def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     if isinstance(node, list):
         entries, rest = _entries(node, head, steps, path)
         for entry in entries:
-            assign(entry, rest, value, path)
+            yield from _places(node[entry], rest, path, (*before, entry))
     elif rest:
         if head not in node:
             raise InputError(f"scene: {path}: no table '{head}'; {nearest(head, list(node))}")
-        assign(node[head], rest, value, path)
+        yield from _places(node[head], rest, path, (*before, head))
     else:
-        node[head] = value
+        yield (*before, head)
 
 
-def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[list[Any], list[str]]:
+def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[list[int], list[str]]:
+    """Return the entries of a list that the first of `steps` names, all where it is their key, and the steps left."""
     if head.isdecimal():
         if int(head) >= len(nodes):
             raise InputError(f"scene: {path}: there are only {len(nodes)} entries, counted from 0")
-        return [nodes[int(head)]], steps[1:]
-    named = [node for node in nodes if node.get("name") == head] or [
-        node
-        for node in nodes
-        if str(node.get("name")).partition("@")[0] == head  # its copies in sectors of a ring
+        return [int(head)], steps[1:]
+    names = [str(node["name"]) if "name" in node else None for node in nodes]
+    named = [number for number, name in enumerate(names) if name == head] or [
+        number
+        for number, name in enumerate(names)
+        if name is not None and name.partition("@")[0] == head  # its copies in sectors of a ring
     ]
     if named:
         return named, steps[1:]
     if len(steps) > 1:
-        names = [str(node["name"]) for node in nodes if "name" in node]
-        raise InputError(f"scene: {path}: no entry '{head}'; {nearest(head, names) if names else 'use its index'}")
-    return nodes, steps
+        known = [name for name in names if name is not None]
+        raise InputError(f"scene: {path}: no entry '{head}'; {nearest(head, known) if known else 'use its index'}")
+    return list(range(len(nodes))), steps
 
 
 def number_at(node: Any, path: str) -> float:
@@ -79,8 +110,9 @@ def number_at(node: Any, path: str) -> float:
         head, *steps = steps
         inner = []
         for one in nodes:
-            if isinstance(one, list):
-                entries, rest = _entries(one, head, [head, *steps], path)
+            if isinstance(one, list) and (head.isdecimal() or all(isinstance(entry, dict) for entry in one)):
+                found, rest = _entries(one, head, [head, *steps], path)
+                entries = [one[entry] for entry in found]
                 if len(rest) > len(steps):  # the step is a key of every entry
                     entries = [entry[head] for entry in entries if head in entry]
                 inner += entries

@@ -23,7 +23,7 @@ from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
 from vanedamp.coupling.scene.orbit import Orbit
-from vanedamp.coupling.scene.paths import Range, assign, axis_values, number_at
+from vanedamp.coupling.scene.paths import Range, assign, axis_values, namesake, number_at
 from vanedamp.coupling.scene.ramp import Ramp
 from vanedamp.coupling.scene.ranges import EnsembleTable, read
 from vanedamp.coupling.scene.registration import ELEMENTS, Contact
@@ -220,6 +220,7 @@ class Scene(OpenRecord, Displayed):
                 f'wear: each spring of law = "{self.contact.law}" counts as an impact; take law = "compliant" with a '
                 "stiffness"
             )
+        self._check_wear_pairs()
         if self.excitation.engine_order is not None and not self.speed:
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_rotation()
@@ -236,6 +237,8 @@ class Scene(OpenRecord, Displayed):
                 raise ValueError(f"sweep.{path}: {_NO_AXIS}")
         if self.ranges:
             self._check_ranges()
+        if len(self.axes) + len(self.ranges) > 1:
+            self._check_twins()
 
     @property
     def speed(self) -> float:
@@ -468,6 +471,19 @@ class Scene(OpenRecord, Displayed):
         if ring and excitation.travelling is not None and excitation.waveform is not None:
             raise ValueError("excitation.waveform: a wave around a ring takes sines; give harmonic")
 
+    def _check_wear_pairs(self) -> None:
+        """Raise ValueError for contacts with rates of their own that the scene has not."""
+        counts = {"casing": len(self.friction_damper), "stop": len(self.stop)}
+        for number, pair in enumerate(() if self.wear is None else self.wear.pair):
+            what = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
+            count = counts.get(pair.side or "", len(self.damper))
+            if pair.side is None:
+                count = max(count, *counts.values())
+            if pair.damper is not None and pair.damper >= count:
+                raise ValueError(
+                    f"wear.pair[{number}].damper: there are only {count} {what}, counted from 0 (got {pair.damper})"
+                )
+
     def _check_ranges(self) -> None:
         """Raise ValueError for a range that is none, or of no number of the scene."""
         for path, (low, high) in self.ranges.items():
@@ -477,12 +493,23 @@ class Scene(OpenRecord, Displayed):
                 raise ValueError(
                     f'ranges.{path}: distribution = "log-uniform" takes a range above zero, not [{low:g}, {high:g}]'
                 )
-            if path in self.axes:
-                raise ValueError(f"sweep.{path}: is a range as well; it can be one of them")
             try:
                 self.number(path)
             except InputError as error:
                 raise ValueError(f"ranges.{str(error).removeprefix('scene: ')}") from None
+
+    def _check_twins(self) -> None:
+        """Raise ValueError where two axes or ranges are of one value: the later would hide the earlier."""
+        data, axes, ranges = self.to_dict(), list(self.axes), list(self.ranges)
+        for number, path in enumerate(axes):
+            if (other := namesake(data, path, ranges)) is not None:
+                same = "" if other == path else f" (ranges.{other})"
+                raise ValueError(f"sweep.{path}: is a range as well{same}; it can be one of them")
+            if (other := namesake(data, path, axes[:number])) is not None:
+                raise ValueError(f"sweep.{path}: names the same value as {other}; leave one of them out")
+        for number, path in enumerate(ranges):
+            if (other := namesake(data, path, ranges[:number])) is not None:
+                raise ValueError(f"ranges.{path}: names the same number as {other}; leave one of them out")
 
     def _check_elements(self) -> None:
         """Raise ValueError for an element that the structure, or something else in the scene, does not fit."""
@@ -592,7 +619,7 @@ class Scene(OpenRecord, Displayed):
         makes it a range. Raises InputError.
         """
         data = self.to_dict()
-        data["ranges"] = {path: ends for path, ends in data["ranges"].items() if path not in values}
+        data["ranges"] = {path: ends for path, ends in data["ranges"].items() if namesake(data, path, values) is None}
         for path, value in values.items():
             assign(data, path.split("."), value, path)
         return read(Scene, data, "scene")

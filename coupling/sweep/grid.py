@@ -14,7 +14,7 @@ import numpy as np
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
-from vanedamp.coupling.scene.paths import assign, axis_values
+from vanedamp.coupling.scene.paths import assign, axis_values, namesake
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -312,6 +312,7 @@ def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
         if not usual and len(numeric) != 1:
             raise InputError(f"continuation.along: name the axis of the sweep, one of {', '.join(numeric) or 'none'}")
         along = (usual or numeric)[0]
+    along = along if along in axes else namesake(scene.to_dict(), along, axes) or along
     if along not in axes:
         raise InputError(f"continuation.along: the sweep has no axis '{along}'; {nearest(along, list(axes))}")
     if not _ordered(axes[along]):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.model_order.choices import leaves_open
-from vanedamp.coupling.scene.paths import axis_values
+from vanedamp.coupling.scene.paths import axis_values, namesake
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -50,8 +50,11 @@ class IdentificationStudy:
             raise InputError(f'solver.method: identification takes "exact", not "{self.scene.solver.method}"')
         if leaves_open(self.scene):
             raise InputError('structure.modes, damper.shape: "auto" chooses anew for other numbers; say which they are')
-        for path, number in self.numbers.items():
+        paths, data = list(self.numbers), self.scene.to_dict()
+        for place, (path, number) in enumerate(self.numbers.items()):
             self._check_number(path, number)
+            if (other := namesake(data, path, paths[:place])) is not None:
+                raise InputError(f"numbers: {path} names the same number as {other}; leave one of them out")
         for measured in self.measured:
             self._check_measured(measured)
         for path, values in self.propose.items():
@@ -82,7 +85,7 @@ class IdentificationStudy:
         """Raise InputError for a measurement that the scene cannot have."""
         where = f"{measured.kind} '{measured.name}'"
         for path in measured.changes:
-            if path in self.numbers:
+            if namesake(self.scene.to_dict(), path, self.numbers) is not None:
                 raise InputError(f"{where}: {path} is one of the numbers that are sought; leave it out of `set`")
         try:
             scene = self.base.replace(measured.changes)

@@ -17,7 +17,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.worker import OF_A_POINT, SweepError
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError, tables
-from vanedamp.studies.life.study import Contact, LifeStudy
+from vanedamp.studies.life.study import HALVINGS, Contact, LifeStudy
 
 #: statuses of runs that came to their end, whose figures count; those but the first are reported
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
@@ -90,7 +90,19 @@ class Runs(SceneCheckpoint):
 
     def at(self, scene: Scene) -> Found:
         """Run a scene over the band, unless the runs are kept, and return its means. Raises SweepError."""
-        points = self.study.points(scene)
+        rows, beyond = self._at(scene, self.study.frequencies.tolist()), 0.0
+        band = len(rows)
+        if self.study.refines:
+            more, beyond = self._refined(scene, rows)
+            rows = rows + more
+        width = _RATES + 2 * len(self.contacts)
+        found = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])
+        self.trouble += int(np.count_nonzero(found[:, _OK] != 1.0))
+        return self._means(found, band, beyond)
+
+    def _at(self, scene: Scene, frequencies: Sequence[float]) -> list[np.ndarray]:
+        """Return the rows of a scene at some frequencies."""
+        points = self.study.points(scene, frequencies)
         kept = self._rows[self.asked : self.asked + len(points)]
         self.asked += len(points)
         for row, contacts in self._run(points[len(kept) :]):
@@ -98,11 +110,27 @@ class Runs(SceneCheckpoint):
             self._rows.append(row)
             self.changed()
             self._progress(len(self._rows))
-        rows = self._rows[self.asked - len(points) : self.asked]
-        width = _RATES + 2 * len(self.contacts)
-        found = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])
-        self.trouble += int(np.count_nonzero(found[:, _OK] != 1.0))
-        return self._means(found)
+        return self._rows[self.asked - len(points) : self.asked]
+
+    def _refined(self, scene: Scene, band: Sequence[np.ndarray]) -> tuple[list[np.ndarray], float]:
+        """Return rows about the worst point of the band, at ever smaller spacing, and how much worse it may be, m.
+
+        That is by what the last halving has made it worse, or half of what the one before has: each comes nearer to
+        the worst by a quarter of the rest in a smooth curve, and by half in one that ends in a jump.
+        """
+        places, heights = self.study.frequencies.tolist(), [_height(row) for row in band]
+        more, rise = list[np.ndarray](), 0.0
+        for _ in range(HALVINGS if max(heights) > 0.0 else 0):
+            order = np.argsort(places)
+            top = int(np.argmax(heights))
+            at = int(np.flatnonzero(order == top)[0])
+            beside = [order[near] for near in (at - 1, at + 1) if 0 <= near < len(order)]
+            middles = [(places[top] + places[near]) / 2 for near in beside]
+            found = self._at(scene, middles)
+            places, more = places + middles, more + found
+            heights += [_height(row) for row in found]
+            rise = max(max(heights) - heights[top], rise / 2)
+        return more, rise
 
     def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
         """Return variables of the file, its contacts, and how much is finished, in words."""
@@ -117,30 +145,39 @@ class Runs(SceneCheckpoint):
             return map(run_point, points, measures)
         return _handed_out(self._executor, points, measures)
 
-    def _means(self, found: np.ndarray) -> Found:
-        """Return the means over the band (f, columns)."""
+    def _means(self, found: np.ndarray, band: int, beyond: float) -> Found:
+        """Return the means of points (k, columns), those of the band first.
+
+        beyond: m, by which the worst may be worse.
+        """
         table, c = self.study.table, len(self.contacts)
         ok = np.isfinite(found[:, _AMPLITUDE])
-        amplitude = found[:, _AMPLITUDE] / self.study.reference
-        spread = found[:, _CONFIDENCE] / self.study.reference
+        amplitude, spread = found[:, _AMPLITUDE] / self.study.reference, found[:, _CONFIDENCE] / self.study.reference
         # runs that failed say nothing of their frequencies; where all have, nothing is damped
         counted = np.where(ok, amplitude, -np.inf) if ok.any() else np.ones(len(found))
         highest = int(np.argmax(counted))
-        weights = np.ones(len(found))
+        weights = np.arange(len(found)) < band
         if table.dwell == "peak":
             weights = np.arange(len(found)) == highest
         elif not isinstance(table.dwell, str):
-            weights = np.array(table.dwell)
+            weights = np.r_[table.dwell, np.zeros(len(found) - band)]
         weights = weights * ok
         weights = weights / max(weights.sum(), np.finfo(float).tiny)
         rates = np.where(ok[:, None], found[:, _RATES:], 0.0)
-        worst = table.over_band == "worst"
-        known = np.where(ok, spread, 0.0)
+        own, known = counted[:band], np.where(ok, spread, 0.0)
+        reduction, confidence = 1.0 - float(counted[highest]), float(known[highest]) + beyond / self.study.reference
+        if table.over_band == "mean":
+            reduction = 1.0 - float(own[np.isfinite(own)].mean())
+            confidence = float(np.sqrt((known[:band] ** 2).sum()) / max(ok[:band].sum(), 1))
         return Found(
-            weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude, spread,
-            1.0 - float(counted[highest] if worst else counted[np.isfinite(counted)].mean()),
-            float(known[highest] if worst else np.sqrt((known**2).sum()) / max(ok.sum(), 1)),
+            weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude[:band], spread[:band],
+            reduction, confidence,
         )  # fmt: skip
+
+
+def _height(row: np.ndarray) -> float:
+    """Return the amplitude in a row of a run, m; -inf where it failed."""
+    return float(row[_AMPLITUDE]) if np.isfinite(row[_AMPLITUDE]) else -np.inf
 
 
 def _handed_out(executor: Executor, points: Sequence[Scene], measures: Sequence[str]) -> Any:

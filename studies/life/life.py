@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from vanedamp.studies.worst_start import worst_start
 
 #: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
 _CLOSE = 0.01
+#: fraction of a body's mass below which it is worn away
+_LEFT = 0.05
 
 
 def life(
@@ -82,7 +85,11 @@ class _Expected:
                 end = now.time + left / falls
                 halved = max(math.ceil(math.log2(step / (_CLOSE * table.hours))), 0)
         evaluations = len(STAGES) * steps_left(now, end, step, steps) + halved
-        self.total = asked + evaluations * len(self._study.frequencies) + self._study.starts
+        self.total = asked + evaluations * self._study.each + self._study.starts
+
+
+class WornAway(Exception):
+    """A body is worn away within a step, as steps of a fixed number may."""
 
 
 class _Course:
@@ -99,24 +106,30 @@ class _Course:
 
     def rates(self, volume: np.ndarray) -> Found:
         """Return what is found with some wear."""
+        if np.any(self.wearing.lost(volume) >= 1.0):
+            raise WornAway
         if self._new is not None:  # the first runs have told the contacts
             found, self._new = self._new, None
             return found
         return self._runs.at(self.wearing.worn(volume))
 
     def scale(self, volume: np.ndarray) -> np.ndarray:
-        """Return the volumes (c,), m^3, by which contacts together open gap or play by as much as it is.
+        """Return the volumes (c,), m^3, by which contacts together change gap, play or a body's mass by all of it.
 
         inf for those that do not.
         """
-        scale = np.full(len(volume), np.inf)
-        for travel, matrix in (
-            (self.wearing.gaps(volume), self.wearing.gap), (self.wearing.plays(volume), self.wearing.play)
+        scale, wearing = np.full(len(volume), np.inf), self.wearing
+        lost = wearing.lost(volume)
+        known = np.isfinite(lost)
+        for size, matrix in (
+            (wearing.gaps(volume), wearing.gap), (wearing.plays(volume), wearing.play),
+            (1.0 - lost[known], wearing.losses[known]),
         ):  # fmt: skip
             opens = matrix > 0.0
-            own = np.nan_to_num(travel, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
+            own = np.nan_to_num(size, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
             scale = np.minimum(
-                scale, np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0)
+                scale,
+                np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0, initial=np.inf),
             )
         return scale
 
@@ -126,15 +139,26 @@ def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
     table, before, damped = course.study.table, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
     start = np.zeros(course.wearing.gap.shape[1])
-    for now in integrate(course.rates, start, table.hours, steps):
-        if before is not None and _passes(before, now, table.threshold):
-            yield from _halved(course, before, now)
-        yield now
-        expected.at(course.asked, before, now, steps)
-        damped = damped or now.found.reduction >= table.threshold
-        if damped and now.found.reduction + now.found.reduction_confidence < table.threshold:
-            return
-        before = now
+    with suppress(WornAway):
+        for now in integrate(course.rates, start, table.hours, steps):
+            if before is not None and _passes(before, now, table.threshold):
+                yield from _halved(course, before, now)
+            yield now
+            expected.at(course.asked, before, now, steps)
+            damped = damped or now.found.reduction >= table.threshold
+            if damped and now.found.reduction + now.found.reduction_confidence < table.threshold:
+                return
+            if np.any(course.wearing.lost(now.state) >= 1.0 - _LEFT):
+                return
+            before = now
+
+
+def _worn_away(wearing: Wearing, last: Moment[Found]) -> tuple[float, int] | None:
+    """Return when a body is worn away at the rates of the last moment, h, and its number; None: never, or not known."""
+    rate, left = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
+    spans = np.divide(left, rate, out=np.full(len(left), np.inf), where=np.isfinite(left) & (rate > 0.0))
+    first = int(np.argmin(spans))
+    return (last.time + float(spans[first]), first) if np.isfinite(spans[first]) else None
 
 
 def _passes(before: Moment[Found], after: Moment[Found], threshold: float) -> bool:
@@ -185,12 +209,17 @@ def _record(
     }  # fmt: skip
     late = np.divide(shift, gap_rate, out=np.zeros_like(shift), where=gap_rate > 0.0).max(axis=1)
     hours = _hours(values["time"], values["reduction"], values["reduction_band"], late, study.table.threshold)
+    last = moments[-1]
+    early_end = last.time < study.table.hours * (1.0 - 1e-12) and not hours[0]
+    thin = bool(np.any(wearing.lost(last.state) >= 1.0 - _LEFT))
+    worn = _worn_away(wearing, last) if early_end or thin else None
     return LifeRecord(
         study={"life": tables(study.table), "scene": study.scene.to_dict()},
         reference=study.reference, frequency=study.frequencies, contacts=tuple(runs.contacts),
         **{name: frozen(array) for name, array in values.items()},
         hours=hours, runs=runs.asked, trouble=runs.trouble,
-        sentence=sentence_of(hours, study.table, values, starts), starts=starts, provenance=provenance,
+        sentence=sentence_of(hours, study.table, values, starts, worn), starts=starts,
+        worn_away=None if worn is None else worn[0], provenance=provenance,
     )  # fmt: skip
 
 

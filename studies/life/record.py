@@ -46,6 +46,7 @@ class LifeRecord:
                        the hours; 0: never reached
     runs, trouble      number of runs, and of those with another status than ok
     sentence           the answer in words
+    worn_away          h after which a body is worn away, which ends the life; None: none is
     starts             worst of the damper over starts (worst_start.worst_start), as "new" and at the "end"
     """
 
@@ -71,11 +72,12 @@ class LifeRecord:
     trouble: int
     sentence: str
     starts: Mapping[str, Any] = field(default_factory=dict)
+    worn_away: float | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, arrays as nested lists."""
-        data = {name: getattr(self, name) for name in _PLAIN}
+        data = {name: getattr(self, name) for name in (*_PLAIN, "worn_away")}
         data |= {
             "study": dict(self.study),
             "starts": dict(self.starts),
@@ -109,7 +111,7 @@ class LifeRecord:
         attributes = {name: getattr(self, name) for name in _PLAIN} | {
             "hours": json.dumps(self.hours), "study": dict(self.study), "provenance": dict(self.provenance),
             "starts": dict(self.starts),
-            "contacts": json.dumps([list(one) for one in self.contacts]),
+            "contacts": json.dumps([list(one) for one in self.contacts]), "worn_away": json.dumps(self.worn_away),
         }  # fmt: skip
         save(path, _KIND, variables, attributes)
 
@@ -120,6 +122,7 @@ class LifeRecord:
         values, attributes = load(path, _KIND)
         given: dict[str, Any] = {name: attributes[name] for name in _PLAIN}
         given |= {name: json.loads(attributes.get(name, "{}")) for name in ("study", "starts", "provenance")}
+        given["worn_away"] = json.loads(attributes.get("worn_away", "null"))
         given["hours"] = tuple(json.loads(attributes["hours"]))
         given["contacts"] = tuple(Contact(*one) for one in json.loads(attributes["contacts"]))
         given |= {name: frozen(values[name]) for name in _ARRAYS}
@@ -128,21 +131,31 @@ class LifeRecord:
 
 def sentence_of(
     hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray],
-    starts: Mapping[str, Any],
+    starts: Mapping[str, Any], worn: tuple[float, int] | None = None,
 ) -> str:  # fmt: skip
-    """Return how long the damper damps, in words: at rest at first, and what is left from the worst start."""
+    """Return how long the damper damps, in words: at rest at first, and what is left from the worst start.
+
+    worn: hours after which a body is worn away, and its number.
+    """
     worst = [f"{word}, {worst_words(starts[name])}" for name, word in (("new", "as new"), ("end", "at the end"))]
     if starts["new"]["starts"] == 1:
         worst = [worst_words(starts["new"])]
-    return "; ".join([_hours_of(hours, table, values), *worst])
+    return "; ".join([_hours_of(hours, table, values, worn), *worst])
 
 
 def _hours_of(
-    hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray]
-) -> str:
+    hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray],
+    worn: tuple[float, int] | None,
+) -> str:  # fmt: skip
     """Return how long the damper damps, by runs that begin as the scene."""
     lost, early, late = hours
     reduction, first, last = f"{table.threshold:.0%}", values["reduction"][0], values["reduction"][-1]
+    if worn is not None:
+        doubt = "" if lost is None else f", and does not damp by {reduction} before"
+        return (
+            f"Body {worn[1]} is worn away after {worn[0]:.0f} h{doubt}: the reduction is {first:.0%} as new and "
+            f"{last:.0%} at the end"
+        )
     if lost == 0.0:
         return (
             f"Does not damp by {reduction} at any time in {table.hours:g} h: {first:.0%} as new, {last:.0%} at the end"

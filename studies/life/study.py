@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -15,6 +15,7 @@ from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
+from vanedamp.coupling.scene.paths import Range
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.grid import Points
@@ -27,6 +28,8 @@ from vanedamp.studies.worst_start import STARTS
 
 #: about how often a life is evaluated over its band
 _EVALUATIONS = 20
+#: how often the spacing of a band is halved about its worst point
+HALVINGS = 3
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
 
@@ -115,7 +118,7 @@ class LifeStudy(NamedTuple):
             raise InputError(f"{path}: {error}") from None
         if reference == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        return cls(replace(scene, sweep={}), file.life, frozen(band), reference)
+        return cls(scene, file.life, frozen(band), reference)
 
     @property
     def starts(self) -> int:
@@ -123,9 +126,20 @@ class LifeStudy(NamedTuple):
         return 2 * len(self.frequencies) * (1 if why_no_restart(self.scene) else len(STARTS))
 
     @property
+    def refines(self) -> bool:
+        """Whether the worst point is sought between those of the band, too: not where these are listed."""
+        spaced = isinstance(getattr(self.table, self.table.key), Range) and len(self.frequencies) > 1
+        return spaced and (self.table.over_band == "worst" or self.table.dwell == "peak")
+
+    @property
+    def each(self) -> int:
+        """Runs over the band, at most."""
+        return len(self.frequencies) + 2 * HALVINGS * self.refines
+
+    @property
     def runs(self) -> int:
         """About how many runs a life takes."""
-        return _EVALUATIONS * len(self.frequencies) + self.starts
+        return _EVALUATIONS * self.each + self.starts
 
     def wearing(self, contacts: Sequence[Contact]) -> Wearing:
         """Return how the scene wears at its contacts.
@@ -145,10 +159,10 @@ class LifeStudy(NamedTuple):
         area = np.where(np.isnan(area), 1.0, area)
         return Wearing(scene, gap / area, play / area, body_shares(scene, contacts))
 
-    def points(self, scene: Scene) -> list[Scene]:
-        """Return a scene at the frequencies of the band."""
+    def points(self, scene: Scene, frequencies: Sequence[float]) -> list[Scene]:
+        """Return a scene at some frequencies (f,), Hz."""
         made = Points(scene)
-        return [made.scene(drive(scene, float(frequency))) for frequency in self.frequencies]
+        return [made.scene(drive(scene, float(frequency))) for frequency in frequencies]
 
 
 class Wearing(NamedTuple):
@@ -170,9 +184,16 @@ class Wearing(NamedTuple):
         """Return the play of the cavities, m; nan without."""
         return np.array([cavity.play or np.nan for cavity in self.scene.cavity]) + self.play @ volume
 
+    @property
+    def losses(self) -> np.ndarray:
+        """Fractions (bodies, c) of each body per volume of wear, 1/m^3; nan where its size is not known."""
+        found: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
+        return found
+
     def lost(self, volume: np.ndarray) -> np.ndarray:
         """Return the fraction of each body that is worn away; nan where its size is not known."""
-        return self.shares @ volume / body_volumes(self.scene)
+        found: np.ndarray = self.losses @ volume
+        return found
 
     def worn(self, volume: np.ndarray) -> Scene:
         """Return the scene with its gaps, plays and masses after some wear."""
@@ -197,6 +218,10 @@ def _check(scene: Scene) -> None:
         )
     if isinstance(scene.structure, Prescribed):
         raise InputError('structure: a prescribed motion is not damped; take model = "rigid" or "rom"')
+    if scene.sweep:
+        raise InputError("sweep: a life runs at the points of its band only; leave the table out")
+    if scene.ensemble is not None and not scene.ranges:
+        raise InputError("ensemble: samples ranges, of which a life has none; leave the table out")
     for number in scene.ranges:
         raise InputError(f"{number}: a range is for `vanedamp run` and `vanedamp sweep`; give one number")
     if leaves_open(scene):

@@ -66,12 +66,14 @@ def _spot(name: str, facts: Mapping[str, Any], found: Mapping[str, Any]) -> dict
 def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
     """Return charts of stress, damage and wear along the axis of a sweep's resonance, or its first.
 
-    Other axes are held at their first values, which `held` names. The worst of the axis' points has the highest
-    utilisation, or without a strength the highest stress.
+    Other axes are held at their values of the worst point, which `held` names. It has the highest utilisation, or
+    without a strength the highest stress, or without stress the fastest wear.
     """
     axis = resonance_axis(sweep.scene, sweep.axes)[0] or next(iter(sweep.axes))
-    line = tuple(slice(None) if path == axis else 0 for path in sweep.axes)
-    held = {path: values[0] for path, values in sweep.axes.items() if path != axis and len(values) > 1}
+    *point, spot = _worst(sweep)
+    places = dict(zip(sweep.axes, point, strict=True))
+    line = tuple(slice(None) if path == axis else place for path, place in places.items())
+    held = {path: values[places[path]] for path, values in sweep.axes.items() if path != axis and len(values) > 1}
     x, title = np.asarray(sweep.axes[axis], float), axis_title(axis, sweep.units()[axis])
     shown: dict[str, Any] = {"file": file, "held": held, "axis": title, "charts": [], "worst": None}
     if sweep.stress:
@@ -80,7 +82,12 @@ def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
         rows = ([spot, *row] for spot, own in curves.items() for row in zip(x, *own.values(), strict=True))
         figure = dressed(stress_figure(x, title, curves), height=460)
         shown["charts"].append(page.chart("stress", figure, ("hot_spot", axis, *CURVES), rows, [file]))
-        shown["worst"] = _worst(x, stress, list(sweep.hot_spots))
+        used, highest = (float(sweep.stress[name][(*point, spot)]) for name in ("utilisation", "stress_von_mises"))
+        if np.isfinite(highest):
+            spots = list(sweep.hot_spots)
+            shown["worst"] = {
+                "at": float(x[places[axis]]), "spot": spots[spot], "utilisation": used, "stress": highest,
+            }  # fmt: skip
     quantities = {
         "damage per hour, 1/h": sweep.stress.get("damage_per_hour"),
         "depth of wear, nm/h": 1e9 * sweep.wear["wear_depth_rate"] if sweep.wear else None,
@@ -129,17 +136,12 @@ def _curves(stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str,
     return {spot: {curve: stress[name][:, place] for curve, name in names.items()} for place, spot in enumerate(spots)}
 
 
-def _worst(x: np.ndarray, stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str, Any] | None:
-    """Return where a sweep uses its hot spots most, of stresses (n, spots); None without a run that is known."""
-    used = stress["utilisation"]
-    measure = used if np.isfinite(used).any() else stress["stress_von_mises"]
-    if not np.isfinite(measure).any():
-        return None
-    at, spot = np.unravel_index(int(np.nanargmax(measure)), measure.shape)
-    return {
-        "at": float(x[at]), "spot": spots[int(spot)], "utilisation": float(used[at, spot]),
-        "stress": float(stress["stress_von_mises"][at, spot]),
-    }  # fmt: skip
+def _worst(sweep: Sweep) -> tuple[int, ...]:
+    """Return the place in its grid, and the hot spot, that a sweep uses most; zeros without a run that is known."""
+    measures = [sweep.stress[name] for name in ("utilisation", "stress_von_mises") if sweep.stress]
+    measures += [sweep.wear["wear_depth_rate"][..., None]] if sweep.wear else []
+    measure = next((each for each in measures if np.isfinite(each).any()), np.zeros((*sweep.shape, 1)))
+    return tuple(int(place) for place in np.unravel_index(int(np.nanargmax(measure)), measure.shape))
 
 
 def contacts_shown(file: str, wear: Sequence[Mapping[str, Any]], page: Page) -> dict[str, Any]:

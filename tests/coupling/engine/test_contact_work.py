@@ -1,11 +1,14 @@
 """Work of each contact against the energy balance of the whole, and against closed forms."""
 
+import math
+
 import numpy as np
 import pytest
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
 
 _BASE = {
     "structure": {"model": "rigid", "mass": 0.148, "stiffness": 3.4e7, "damping_ratio": 0.002},
@@ -57,6 +60,83 @@ def test_events_have_the_energies_of_impacts():
         ]
         assert contact.hits == len(speeds)
         assert contact.impacts == pytest.approx(np.sum((0.5 * mass * np.square(speeds)) ** 1.5), rel=1e-12)
+
+
+def _thrown_at_a_rod(count, law, body, **structure):
+    """A body of a hundredth of the mass of a clamped unit rod that hits a wall at its tip once, with 1 m/s."""
+    rate = (np.arange(1, count + 1) - 0.5) * np.pi
+    rod = ReducedModel.from_matrices(
+        np.eye(count), np.diag(rate**2), {"tip": np.full(count, math.sqrt(2))}, damping_ratio=0.01
+    )
+    cavity = {"name": "c", "gap": 2.0, "floor": "tip"} | ({"play": 0.1} if "shape" in body else {})
+    return simulate(Scene.of({
+        "structure": {"model": "rom", "file": rod} | structure,
+        "excitation": {"frequency": 0.3, "at": "tip", "force": 1e-12}, "gravity": {"acceleration": 0.0},
+        "cavity": [cavity], "damper": [{"cavity": "c", "mass": 0.01, "velocity": 1.0} | body], "contact": law,
+        "time": {"periods": 1, "transient": 0}, "wear": {},
+    }, "scene"))  # fmt: skip
+
+
+_SQUARE = {"shape": "block", "length": 0.1, "height": 0.1, "friction": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("modes", "stiffness", "body"),
+    [
+        (1, 0.1, {}),
+        (12, 0.1, {}),
+        (60, 0.1, {}),
+        (120, 0.1, {}),
+        (60, 0.1, {"restitution": 0.7}),
+        (60, 0.05, _SQUARE),
+        (12, 0.05, _SQUARE | {"restitution": 0.7}),
+        (60, 0.1, {"shape": "disc", "radius": 0.05, "friction": 0.0}),
+    ],
+)
+def test_an_impact_on_a_spring_has_the_bodys_energy_for_every_number_of_modes(modes, stiffness, body):
+    """The spring closes for longer than the modes but the first swing: that of the first mode gives way."""
+    response = _thrown_at_a_rod(modes, {"law": "compliant", "stiffness": stiffness}, body)
+    assert not response.event_list
+    hit = [contact for contact in response.contact_work if contact.hits]
+    assert {contact.side for contact in hit} == {"right"}
+    assert sum(contact.impacts for contact in hit) == pytest.approx(0.5 / (1 / 0.01 + 2), rel=0.02)
+
+
+def test_an_impact_on_a_boundary_without_mass_has_the_bodys_energy():
+    response = _thrown_at_a_rod(120, {"law": "massless"}, {"mass": 1e-4}, natural=True, modes=12)
+    energies = {contact.side: contact.impacts for contact in response.contact_work}
+    assert energies["right"] == pytest.approx(0.5 * 1e-4, rel=0.01)
+
+
+def test_neighbours_on_springs_collide_with_half_of_a_bodys_mass():
+    """Both walls and the other body are far away; the energy is that of the relative motion."""
+    still = {"cavity": "c", "mass": 0.01, "position": 0.5}
+    response = _run(
+        damper=[still | {"position": -0.5, "velocity": 1.0}, still], cavity=[{"name": "c", "gap": 4.0}],
+        excitation={"frequency": 0.6, "force": 1e-9}, gravity={"acceleration": 0.0},
+        contact={"law": "compliant", "stiffness": 10.0}, time={"periods": 1, "transient": 0},
+    )  # fmt: skip
+    assert {contact.side: contact.impacts for contact in response.contact_work if contact.hits} == pytest.approx(
+        {"body": 0.5 * 0.005}, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("body", [{}, {"shape": "block", "length": 4e-3, "height": 4e-3}], ids=["slider", "block"])
+def test_a_body_that_comes_to_rest_on_a_spring_has_spent_the_energy_of_its_fall(body):
+    """Its bounces are a geometric series. The last contact does not end: its impulse is that of the weight.
+
+    Dashpots give a corner the restitution, and a face that hits flat nearly.
+    """
+    mass, height, restitution = 0.003, 1e-3, 0.4
+    tables = {
+        "structure": {"model": "prescribed", "displacement_amplitude": 1e-21}, "excitation": {"frequency": 10.0},
+        "cavity": [{"name": "c", "gap": 2 * height} | ({"play": 1e-3} if body else {})],
+        "damper": [{"cavity": "c", "mass": mass, "friction": 0.0, "restitution": restitution} | body],
+        "gravity": {"orientation_deg": 90.0}, "contact": {"law": "compliant", "stiffness": 1e7},
+        "time": {"periods": 4, "transient": 0},
+    }  # fmt: skip
+    energy = sum(contact.impacts for contact in _run(**tables).contact_work)
+    assert energy == pytest.approx(mass * 9.81 * height / (1 - restitution**2), rel=0.05 if body else 0.01)
 
 
 def test_methods_with_time_steps_do_not_count_wear():

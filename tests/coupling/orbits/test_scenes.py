@@ -188,6 +188,10 @@ def test_dry_friction_that_sticks_has_a_zero_multiplier():
         ({"parameter": "structure"}, "orbit.parameter: structure: names no number"),
         ({"parameter": "time.periods"}, "orbit.parameter: time.periods is no number of the motion's equations"),
         ({"parameter": "damper.0.restitution", "from": 0.7, "to": 1.4}, "at damper.0.restitution = 1.4"),
+        (
+            {"parameter": "cavity.c1.gap", "track": {"parameter": "cavity.gap", "to": 1.0}},
+            "orbit.track.parameter: cavity.gap is orbit.parameter; take another number",
+        ),
         ({"from": None, "to": 102.0}, "orbit.to: 102 is where the branch begins"),
     ],
     ids=lambda value: value.get("parameter", "range") if isinstance(value, dict) else "",

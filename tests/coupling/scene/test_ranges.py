@@ -50,7 +50,8 @@ def test_lists_that_belong_there_stay_what_they_are(tmp_path):
 def test_replace_makes_and_unmakes_ranges(tmp_path):
     found = loaded(tmp_path).replace({"cavity.c1.gap": [1e-4, 3e-4]})
     assert found.ranges == {"cavity.0.gap": (1e-4, 3e-4)} and found.cavity[0].gap == pytest.approx(2e-4)
-    assert not found.replace({"cavity.0.gap": 1e-4}).ranges
+    assert not found.replace({"cavity.0.gap": 1e-4}).ranges and not found.replace({"cavity.gap": 1e-4}).ranges
+    assert found.replace({"cavity.gap": 1e-4}).cavity[0].gap == 1e-4
 
 
 @pytest.mark.parametrize("value", [[0.5, 0.2], [0.2, 0.2], [0.2, 0.3, 0.5], [0.2], [], ["a", 0.5], [True, 2.0]])
@@ -71,6 +72,15 @@ def test_a_list_that_is_no_range_is_one_line(tmp_path, value):
         ([("damper", 0, "friction", [0.0, 0.5])], {"ensemble": {"distribution": "log-uniform"}}, "above zero"),
         ([], {"ensemble": {"samples": 60}}, "ensemble: samples: expected a power of 2, such as 64, not 60"),
         ([("damper", 0, "friction", [0.1, 0.5])], {"sweep": {"damper.0.friction": [0.1, 0.2]}}, "is a range as well"),
+        ([("damper", 0, "friction", [0.1, 0.5])], {"sweep": {"damper.friction": [0.1, 0.2]}}, "is a range as well"),
+        ([("cavity", 0, "gap", [1e-4, 5e-4])], {"sweep": {"cavity.gap": [1e-4, 2e-4]}}, "(ranges.cavity.0.gap)"),
+        ([("cavity", 0, "gap", [1e-4, 5e-4])], {"sweep": {"cavity.c1.gap": [1e-4]}}, "sweep.cavity.c1.gap: is a range"),
+        (
+            [("cavity", 0, "gap", [1e-4, 5e-4])],
+            {"ranges": {"cavity.gap": [1e-4, 2e-4]}},
+            "ranges.cavity.0.gap: names the same number as cavity.gap",
+        ),
+        ([], {"sweep": {"cavity.gap": [1e-4], "cavity.c1.gap": [2e-4]}}, "names the same value as cavity.gap"),
         ([("time", None, "periods", [10, 20])], {}, "time.periods"),
     ],
 )

@@ -109,6 +109,62 @@ def test_dwell_weighs_the_points_of_the_band(found, monkeypatch):
     assert rates == pytest.approx([rates[1] / 2, GAP / HOURS / 2, rates[1], rates[1] / 4])
 
 
+def _of_curve(monkeypatch, curve, num, **table):
+    """The record of a life of an hour whose amplitude over the reference is a curve of the frequency, Hz."""
+    damper = Damper()
+
+    def simulated(scene):
+        response = damper(scene)
+        response.amplitude_mean_dynamic = case.reference * curve(scene.frequency)
+        return response
+
+    case = study(hours=1.0, band={"start": 2340.0, "stop": 2450.0, "num": num}, **table)
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    monkeypatch.setattr(fast, "simulate", simulated)
+    return life(case)
+
+
+@pytest.mark.parametrize("num", [12, 23, 45])
+@pytest.mark.parametrize("jumps", [False, True], ids=["smooth", "jump"])
+def test_the_worst_point_is_sought_between_those_of_the_band(monkeypatch, num, jumps):
+    """Whatever the spacing, the band of the reduction holds that of the curve: a resonance, or one that drops."""
+
+    def curve(frequency):
+        if jumps and frequency > 2391.7:
+            return 0.05
+        return 0.4 / np.hypot(1.0, (frequency - 2393.7) / 4.0)
+
+    worst = curve(2391.7 if jumps else 2393.7)
+    record = _of_curve(monkeypatch, curve, num)
+    off, told = 1.0 - worst - record.reduction[0], record.reduction_band[0]
+    assert abs(off) <= told < 0.05
+    assert record.amplitude.shape[1] == num
+    # the time spent at the band's points is as before
+    assert record.depth_rate[0, 1] == pytest.approx(GAP / HOURS / 2)
+
+
+def test_lists_of_frequencies_and_means_are_taken_as_they_are(monkeypatch, found):
+    record = _of_curve(monkeypatch, lambda frequency: 0.2 + 1e-3 * (frequency - 2340.0), 12, over_band="mean")
+    assert record.runs == 12 * (1 + 3 * (len(record.time) - 1))
+    listed = found(study(hours=1.0))[0]
+    assert listed.runs == 2 * (1 + 3 * (len(listed.time) - 1))
+
+
+def test_resumes_between_the_points_of_a_band(monkeypatch, tmp_path):
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    case, kept = study(hours=1.0, band={"start": 2400.0, "stop": 2420.0, "num": 3}), tmp_path / "life.h5.partial"
+    monkeypatch.setattr(fast, "simulate", whole := Damper())
+    runs = life(case).runs
+    assert runs == whole.calls > 3 * 4
+    for fail in (2, 5, 11):
+        monkeypatch.setattr(fast, "simulate", stopped := Damper(fail=fail))
+        with pytest.raises(KeyboardInterrupt):
+            life(case, checkpoint=kept)
+        monkeypatch.setattr(fast, "simulate", rest := Damper())
+        assert life(case, checkpoint=kept).runs == runs == stopped.calls - 1 + rest.calls
+        kept.unlink()
+
+
 def test_failed_runs_damp_nothing_and_are_reported(found):
     record, _ = found(study(hours=10.0), status=Status.DIVERGED)
     assert record.trouble == record.runs and record.reduction == pytest.approx(0.0)
@@ -186,6 +242,46 @@ def test_the_body_loses_its_share(found):
     assert record.lost[-1, 0] == pytest.approx(0.5 * volume.sum() / (0.01 * 0.005 * 0.005))
 
 
+SIZE = {"width": 0.01, "length": 0.005, "height": 0.005}
+VOLUME = 0.01 * 0.005 * 0.005
+
+
+def worn_on_the_floor(monkeypatch, rate, **table):
+    """The life of a body whose floor takes a volume per hour by its mass, m^3/h, and opens nothing."""
+    damper, data = Damper(), copy.deepcopy(SCENE)
+
+    def simulated(scene):
+        response = damper(scene)
+        for one in response.wear:
+            volume = rate(scene.damper[0].mass) if one.side == "floor" else 0.0
+            object.__setattr__(one, "volume_rate", volume)
+        return response
+
+    monkeypatch.setattr("vanedamp.studies.life.life.worst_start", lambda *_: {"starts": 1})
+    monkeypatch.setattr(fast, "simulate", simulated)
+    data["wear"] |= SIZE
+    data["life"] |= table
+    return life(LifeStudy.of(data))
+
+
+def test_the_loss_of_mass_is_controlled_as_gaps_are(monkeypatch):
+    """A body that wears in proportion to its mass: what is left falls exponentially."""
+    mass = SCENE["damper"][0]["mass"]
+    record = worn_on_the_floor(monkeypatch, lambda now: 2 * VOLUME / HOURS * now / mass, hours=HOURS, tolerance=0.01)
+    assert record.lost[:, 0] == pytest.approx(1 - np.exp(-record.time / HOURS), abs=2e-3)
+    assert record.time[-1] == pytest.approx(HOURS) and record.worn_away is None
+
+
+@pytest.mark.parametrize("steps", [None, 7])
+def test_a_body_that_is_worn_away_ends_the_life(monkeypatch, tmp_path, steps):
+    record = worn_on_the_floor(monkeypatch, lambda _: 2 * VOLUME / 300.0, hours=1000.0, steps=steps)
+    assert record.worn_away == pytest.approx(300.0, rel=1e-9)
+    assert record.sentence.startswith("Body 0 is worn away after 300 h: the reduction is 70% as new and 70% at")
+    assert record.time[-1] < 300.0 and record.lost[-1, 0] < 1.0
+    record.save(tmp_path / "life.h5")
+    assert LifeRecord.load(tmp_path / "life.h5").worn_away == record.worn_away == record.to_json()["worn_away"]
+
+
 @pytest.mark.parametrize(
     ("table", "change", "said"),
     [
@@ -207,6 +303,10 @@ def test_the_body_loses_its_share(found):
         ("life", {"band": None}, "life.band: missing"),
         ("structure", {"model": "prescribed"}, "structure"),
         ("solver", {"method": "moreau"}, "exact"),
+        ("wear", {"pair": [{"damper": 1, "rate": 1e-14}]}, "wear.pair[0].damper: there are only 1 bodies"),
+        ("wear", {"pair": [{"damper": 0, "side": "stop", "rate": 1e-14}]}, "there are only 0 stops"),
+        (None, {"sweep": {"damper.0.mass": [0.001]}}, "sweep: a life runs at the points of its band"),
+        (None, {"ensemble": {"samples": 8}}, "ensemble: samples ranges, of which a life has none"),
         (None, {"wear": None}, "wear: missing"),
         (None, {"life": None}, "life"),
     ],
