@@ -82,7 +82,9 @@ class Aggregation:
             alone = np.full(size, stiffness.diagonal().mean())
             alone[places] = 0.0
             stiffness = sparse.csr_array(spread @ stiffness @ spread.T + sparse.diags(alone))
-        self._kept = (stiffness.indptr, stiffness.indices, stiffness.data)  # PETSc reads them where they are
+        # PETSc reads them where they are
+        pattern = (indices.astype(PETSc.IntType, copy=False) for indices in (stiffness.indptr, stiffness.indices))
+        self._kept = (*pattern, stiffness.data)
         basis = np.linalg.qr(rigid_motions.T)[0].T.copy()
         with contextlib.ExitStack() as stack:
             vectors = [stack.enter_context(owned(_vector(row))) for row in basis]

@@ -303,9 +303,9 @@ def test_missing_packages(package, arguments, remedy, folder):
 @pytest.mark.parametrize(
     ("package", "raised", "arguments", "line"),
     [
-        ("petsc4py", "ImportError('libX.so: cannot open')", ["modal", "case.toml"],
+        ("ufl", "ImportError('libX.so: cannot open')", ["modal", "case.toml"],
          "a library is installed, but cannot be loaded (libX.so: cannot open)"),
-        ("petsc4py", "ImportError('libX.so: failed to map segment from shared object')", ["modal", "case.toml"],
+        ("mpi4py", "ImportError('libX.so: failed to map segment from shared object')", ["modal", "case.toml"],
          "not enough memory (libX.so: failed to map segment from shared object): free some, "),
         ("gmsh", "OSError('libX.so: cannot open')", ["mesh", "case.toml", "-o", "block.msh"],
          "case.toml: gmsh, which reads and makes meshes, cannot be loaded (libX.so: cannot open): apt install "),

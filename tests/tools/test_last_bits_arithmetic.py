@@ -88,7 +88,7 @@ for rows in (tall, random.standard_normal((300, 20))):
     assert np.array_equal(gram, gram.T)
 assert np.array_equal(np.abs(np.linalg.eigh(np.diag([3.0, 1.0, 1.0]))[1]).sum(axis=0), np.ones(3))
 assert other.exp(0.0) == 1.0 and other.log(1.0) == 0.0
-print([*algebra.ritz_values(mass, np.eye(20), tall), *algebra.orthogonal(tall, mass, [square]).ravel()])
+print(np.r_[algebra.ritz_values(mass, np.eye(20), tall), algebra.orthogonal(tall, mass, [square]).ravel()].tolist())
 """
 
 

@@ -40,7 +40,8 @@ def test_all_solvers_find_the_same_modes(folder):
 def test_table_and_figure(folder, capsys, tmp_path, pictures):
     with (folder / "bench_modal.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert [row["solver"] for row in rows][:2] == ["assembly", bench_modal.NAMES[OURS]]
+    solvers = [row["solver"] for row in rows]
+    assert solvers[0] == "assembly" and bench_modal.NAMES[OURS] in solvers
     result = json.loads((folder / "bench_modal.json").read_text())
     TINY.draw(result, tmp_path)
     for panel in pictures["bench_modal"]:

@@ -122,7 +122,8 @@ def check(system, rng):
         coordinates, displacement, force = by_flow(system, closed, flows, loads, q, qd, times)
         size = np.abs(np.hstack([expected_q, expected_qd])).max()
         # closed rows that are nearly parallel have large forces, whose round-off the exponential carries along
-        tolerance = 2e-13 * np.linalg.cond(system.delassus[np.ix_(closed, closed)]) if len(closed) else 2e-13
+        # scipy's has errors of its own: 1e-13 in 1.10, 4e-13 in 1.18
+        tolerance = 1e-12 * np.linalg.cond(system.delassus[np.ix_(closed, closed)]) if len(closed) else 1e-12
         assert np.abs(coordinates[:, :n] - expected_q[:, :n]).max() < tolerance * size
         assert np.abs(coordinates[:, n:] - expected_qd[:, :n]).max() < tolerance * size
         assert np.abs(displacement - (expected_q - q) @ jacobian.T).max() < tolerance * size
