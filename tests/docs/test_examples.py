@@ -125,7 +125,7 @@ def completed(tables: dict, folder: Path) -> dict:
         )
         base["excitation"]["at"] = base["cavity"][0]["floor"] = "tip"
     if "life" in tables:
-        base["wear"] = {"rate": 1e-14}
+        base = {name: table for name, table in base.items() if name != "sweep"} | {"wear": {"rate": 1e-14}}
     for name in ("material", "modes"):
         if name in base and name in tables:
             tables[name] = base[name] | tables[name]
