@@ -18,8 +18,6 @@ from vanedamp.modal.speed_range import SpeedRange
 
 # frequencies closer than this multiple of their error are one
 _SAME = 10.0
-# relative error of a frequency that a warning names
-_NOTABLE = 1e-3
 
 
 class CampbellError(VanedampError):
@@ -70,7 +68,6 @@ def campbell(
         warnings = list(tracks.notes)
         if errors.max() > tolerance:
             warnings.append(f"frequencies are estimated to be wrong by up to {errors.max():.2g} of their value")
-        warnings += linearisation_notes(source.linearisation())
         frequencies = np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi)
         for mode, curve in zip(tracks.kept, frequencies, strict=True):
             known = tracks.speeds[np.isfinite(curve)]
@@ -91,18 +88,8 @@ def campbell(
             approaches=tuple(approaches),
             gyroscopic=gyroscopic,
             warnings=tuple(warnings),
-            provenance=dict(rotating.standing.provenance) | {"linearisation": source.linearisation()},
+            provenance=rotating.standing.provenance,
         )
-
-
-def linearisation_notes(error: float) -> list[str]:
-    """Return the warning of a relative error of frequencies by a stiffness that is linear in the squared speed."""
-    if error <= _NOTABLE:
-        return []
-    return [
-        f"between standstill and the highest speed, frequencies are estimated to be wrong by up to {100.0 * error:.2g} "
-        "%: the stiffness there is linear in the squared speed; a lower highest speed makes it smaller"
-    ]
 
 
 def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.campbell import CampbellError, checked_speeds, linearisation_notes
+from vanedamp.modal.campbell import CampbellError, checked_speeds
 from vanedamp.modal.cyclic import CyclicSector, aliased
 from vanedamp.modal.cyclic_rotation import rotating_diameter
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
@@ -44,7 +44,7 @@ def ring_campbell(
         raise CampbellError("orders: expected whole engine orders of a ring")
     curves: list[_Curve] = []
     crossings: list[Crossing] = []
-    errors, solved, linearisation = [], set(), 0.0
+    errors, solved = [], set()
     for diameter in sector.diameters:
         if report is not None:
             report(diameter, len(sector.diameters))
@@ -62,11 +62,9 @@ def ring_campbell(
                 ]
                 curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
             errors.append(_errors(source, wanted))
-            linearisation = max(linearisation, source.linearisation())
             solved |= set(source.solved)
     worst = np.max(errors, axis=0)
     warnings = [] if worst.max() <= tolerance else [f"frequencies are estimated to be wrong by up to {worst.max():.2g}"]
-    warnings += linearisation_notes(linearisation)
     return Campbell(
         speeds=wanted,
         asked=np.ones(wanted.size, dtype=bool),
@@ -79,7 +77,7 @@ def ring_campbell(
         approaches=(),
         gyroscopic=gyroscopic,
         warnings=tuple(warnings),
-        provenance=dict(rotating.standing.provenance) | {"linearisation": linearisation},
+        provenance=rotating.standing.provenance,
         diameters=np.array([curve.diameter for curve in curves]),
         families=np.array([curve.family for curve in curves]),
     )

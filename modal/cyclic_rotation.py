@@ -32,8 +32,6 @@ def rotating_diameter(sector: CyclicSector, rotating: RotatingMatrices, diameter
         load=np.zeros(problem.matrices.size),
         axis=rotating.axis,
         point=rotating.point,
-        exact_at=rotating.exact_at,
-        second_order=None if rotating.second_order is None else problem.real_form(rotating.second_order),
     )
 
 

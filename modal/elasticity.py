@@ -16,7 +16,6 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
 from vanedamp.modal.algebra import cross_matrix, von_mises
 from vanedamp.modal.eigen import SolverError
-from vanedamp.modal.equilibrium import Deformation
 from vanedamp.modal.fenicsx import ufl
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product
@@ -26,8 +25,6 @@ from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
-# steps, even in the squared speed, by which a structure is followed that first order in it would have unstable
-_SPEEDS = 8
 _NO_CENTRIFUGAL_SOLUTION = (
     "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no static "
     "solution; clamp a group in [support], or give it springs"
@@ -156,22 +153,13 @@ class Solid:
         self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
         self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
-        growth = None
         if temperature is not None:
-            stretch = self._field(lambda material, values: 1.0 + material.expansion * (values - temperature.reference))
-            # moduli are those of the grown body: E d/dx and the volume give one factor of the stretch, of three
-            softening = self._field(lambda material, values: material.softening(values)) / stretch
+            softening = self._field(lambda material, values: material.softening(values))
             self._lame, self._shear = softening * self._lame, softening * self._shear
-            if any(material.expansion for material in self.materials.values()):
-                growth = 0.5 * (stretch**2 - 1.0)
-        self._deformation = Deformation(self.space, self._hooke, growth, degree)
-        self._expanded = np.zeros(3 * len(fenicsx.node_coordinates(self.space)))
 
     def stress(self, displacement: Any) -> Any:
         """Return the UFL stress tensor of a UFL displacement, Pa."""
-        return self._hooke(ufl.sym(ufl.grad(displacement)))
-
-    def _hooke(self, strain: Any) -> Any:
+        strain = ufl.sym(ufl.grad(displacement))
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(
@@ -180,9 +168,9 @@ class Solid:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
         Groups are of facets, or of edges and points, whose nodes have the weight one; one of both can be held, but is
-        no patch. Elastic supports are part of the stiffness, which is that about the equilibrium of a temperature: with
-        the stress that it leaves between the supports, and the growth, from static solutions of `statics` (default: the
-        body's own).
+        no patch. Elastic supports are
+        part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them,
+        from the static solution of `statics` (default: the body's own).
         Raises UnstableError for a temperature at which the structure has buckled.
         """
         # facets weigh their nodes by area, edges and points by one: both in one group have no common weights
@@ -214,49 +202,28 @@ class Solid:
         return self._heated(unheated, statics or Statics())
 
     def rotating(
-        self,
-        matrices: SystemMatrices,
-        axis: Sequence[float],
-        point: Sequence[float],
-        statics: Statics | None = None,
-        speed: float = 0.0,
+        self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float], statics: Statics | None = None
     ) -> RotatingMatrices:
         """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
 
-        The stiffness is that about the centrifugal equilibrium, which `statics` (default: the body's own) finds, at
-        `speed` (rad/s), and linear in the squared speed from standstill to there; at 0 it is the derivative at
-        standstill. Supports turn with the structure. Raises ElasticityError for a structure that is free to move,
-        MatricesError for an axis of length zero, UnstableError for a speed without an equilibrium.
+        The stress comes from the static solution of `statics` (default: the body's own) under the centrifugal load,
+        linear in the squared speed; supports turn with the structure. Raises ElasticityError for a structure that is
+        free to move, MatricesError for an axis of length zero.
         """
         direction, origin, statics = unit_direction(axis), np.array(point, dtype=float), statics or Statics()
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
-        bend = self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION)
-        self._static_stresses["rotation"] = self.stress(fenicsx.field(self.space, bend))
-        change = self._deformation.tangent_change(self._expanded, bend) - softening
-        slow = RotatingMatrices(
+        stress = self.stress(self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION))
+        self._static_stresses["rotation"] = stress
+        return RotatingMatrices(
             standing=matrices,
-            centrifugal_stiffness=sparse.csr_array(change),
+            centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
             gyroscopic=nodal_product(matrices.mass, 2.0 * cross_matrix(direction)),
             load=load,
             axis=direction,
             point=origin,
             statics=statics,
         )
-        if not speed:
-            return slow
-        before = self._deformation.tangent(self._expanded)
-        found = self._shape_at(speed, slow, softening, before, bend)
-        if found is None:
-            slow.at(speed)
-            raise UnstableError(
-                f"speed: at {speed:.6g} rad/s the structure has no equilibrium near its shape at standstill; stay below"
-            )
-        secant = (self._deformation.tangent(found) - before) / speed**2 - softening
-        return replace(
-            slow, centrifugal_stiffness=sparse.csr_array(secant), exact_at=speed,
-            second_order=sparse.csr_array(secant - change),
-        )  # fmt: skip
 
     def stiffness_parts(self) -> dict[str, sparse.csr_array]:
         """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
@@ -345,58 +312,28 @@ class Solid:
         return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
 
     def _heated(self, matrices: SystemMatrices, statics: Statics) -> SystemMatrices:
-        """Return the matrices about the thermal equilibrium."""
+        """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""
         if self.temperature is None or not any(material.expansion for material in self.materials.values()):
             return matrices
-        cold = self._deformation.material()
-        start = self._static(statics, matrices, -self._deformation.force(self._expanded), _NO_THERMAL_SOLUTION)
-        found = self._deformation.equilibrium(
-            lambda stiffness, force: statics.shape(replace(matrices, stiffness=stiffness), force),
-            sparse.csr_array(matrices.stiffness - cold), np.zeros(matrices.size), start,
-        )  # fmt: skip
-        self._expanded = start if found is None else found
-        self._static_stresses["temperature"] = self._deformation.stress(fenicsx.field(self.space, self._expanded))
-        added = sparse.csr_array(self._deformation.tangent(self._expanded) - cold)
+        reference = self.temperature.reference
+        strain = self._field(lambda material, values: material.expansion * (values - reference))
+        pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
+        load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
+        stress = self.stress(self._static(statics, matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
+        self._static_stresses["temperature"] = stress
+        added = self._geometric_stiffness(stress)
         share = statics.stable_share(matrices, added)
-        if share < 1.0 or found is None:
+        if share < 1.0:
             raise UnstableError(
                 f"temperature: the structure buckles at {share:.3g} of its thermal stress; give it less, or supports "
                 "that let it expand"
             )
         return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
 
-    def _shape_at(
-        self, speed: float, slow: RotatingMatrices, softening: sparse.csr_array, before: sparse.csr_array,
-        bend: np.ndarray,
-    ) -> np.ndarray | None:  # fmt: skip
-        """Return the displacements (N,) at a speed, to which the structure comes from standstill; None: nowhere stable.
-
-        slow, softening, before, bend: first order in the squared speed, mass across the axis, tangent at standstill,
-        displacements per squared speed.
-        """
-        standing, statics, here = slow.standing, slow.statics, self._expanded + speed**2 * bend
-        sure = statics.stable_share(standing, speed**2 * slow.centrifugal_stiffness) == 1.0
-        steps = 1 if sure else _SPEEDS
-        if not sure:  # beyond an instability another equilibrium may be found: go there along the stable ones
-            here = self._expanded
-        for square in speed**2 * np.arange(1, steps + 1) / steps:
-            found = self._deformation.equilibrium(
-                lambda stiffness, force: statics.shape(replace(standing, stiffness=stiffness), force),
-                standing.stiffness - before - square * softening, square * slow.load, here,
-            )  # fmt: skip
-            if found is None:
-                return None
-            here = found
-            if not sure:
-                added = self._deformation.tangent(here) - before - square * softening
-                if statics.stable_share(standing, sparse.csr_array(added)) < 1.0:
-                    return None
-        return here
-
-    def _static(self, statics: Statics, matrices: SystemMatrices, load: np.ndarray, without: str) -> np.ndarray:
-        """Return the displacements (N,) under a static load; without: the error where there are none."""
+    def _static(self, statics: Statics, matrices: SystemMatrices, load: np.ndarray, without: str) -> Any:
+        """Return the displacements under a static load as a function; without: the error where there are none."""
         try:
-            return statics.shape(matrices, load)
+            return fenicsx.field(self.space, statics.shape(matrices, load))
         except SolverError:
             raise ElasticityError(without) from None
 
@@ -408,6 +345,12 @@ class Solid:
 
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
         return fenicsx.matrix(ufl.inner(self.stress(self._trial), ufl.sym(ufl.grad(self._test))) * measure)
+
+    def _geometric_stiffness(self, stress: Any) -> sparse.csr_array:
+        """Return the matrix of the integral of sigma_jk u_i,j v_i,k: the stiffness of a stress at rest."""
+        # exact for straight tetrahedra; the degree that UFL estimates takes four times as many points in hexahedra
+        measure = ufl.dx(metadata={"quadrature_degree": 2 * self.degree + 1})
+        return fenicsx.matrix(ufl.inner(ufl.grad(self._trial) * stress, ufl.grad(self._test)) * measure)
 
     def _support_stiffness(self, name: str) -> sparse.csr_array:
         support, domain, trial = self.elastic[name], self.domain, self._trial

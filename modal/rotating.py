@@ -4,10 +4,9 @@ About its centrifugal equilibrium at a constant speed W (rad/s) the structure mo
 
     M q'' + W G q' + (K0 + W^2 K1) q = loads,
 
-K1 = geometric stiffness of the centrifugal stress and initial-displacement stiffness (modal.equilibrium), less the spin
-softening (the mass across the axis), and G the gyroscopic coupling, skew. The first two are not quite proportional to
-the squared speed: K1 is the secant from standstill to one speed. Lawrence et al. (1987), NASA TM 100187; Geradin and
-Rixen (2015), Mechanical Vibrations, section 1; Bathe (2014), Finite Element Procedures, section 6.3.
+K1 = geometric stiffness of the centrifugal stress at unit speed, less the spin softening (the mass across the axis),
+and G the gyroscopic coupling, skew. The stress comes from the linear static solution, so that K1 is one matrix.
+Lawrence et al. (1987), NASA TM 100187; Geradin and Rixen (2015), Mechanical Vibrations, section 1.
 """
 
 from __future__ import annotations
@@ -36,9 +35,6 @@ class RotatingMatrices:
     load                   (N,) kg m: centrifugal load per squared speed
     axis, point            (3,) unit vector, and (3,) m, a point of the axis
     statics                by which its stability is checked
-    exact_at               rad/s: besides standstill, the speed at which K1 holds the stiffness about the equilibrium
-                           exactly; 0: K1 is the derivative at standstill
-    second_order           (N, N) kg: K1 less that derivative; None where it is that, or not known
     """
 
     standing: SystemMatrices
@@ -48,8 +44,6 @@ class RotatingMatrices:
     axis: np.ndarray
     point: np.ndarray
     statics: Statics = field(default_factory=Statics)
-    exact_at: float = 0.0
-    second_order: sparse.csr_array | None = None
 
     def at(self, speed: float) -> SystemMatrices:
         """Return the matrices at a speed, rad/s, without the gyroscopic coupling.
@@ -66,18 +60,6 @@ class RotatingMatrices:
             )
         provenance = dict(self.standing.provenance) | {"speed": speed}
         return replace(self.standing, stiffness=self.standing.stiffness + added, provenance=provenance)
-
-    def linearisation_errors(self, speed: float, squares: np.ndarray, second_order: np.ndarray) -> np.ndarray:
-        """Return relative errors (m,) of frequencies at a speed (rad/s) by the stiffness that is linear in its square.
-
-        squares       (m,) squared frequencies, (rad/s)^2
-        second_order  (m,) x^H `second_order` x of the modes of unit modal mass
-
-        Up to third order in the squared speed the stiffness is K0 + W^2 (K1 - second_order (1 - W^2 / exact_at^2)): no
-        error at both ends, the largest at 0.71 of `exact_at`. Positive: the frequency is too high.
-        """
-        part = 1.0 - (speed / self.exact_at) ** 2 if self.exact_at else 0.0
-        return np.asarray(0.5 * speed**2 * part * second_order / squares)
 
 
 def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:

@@ -114,19 +114,6 @@ class SpeedRange:
             change = change + modes.frequencies * self._coupling(modes)
         return np.asarray(change / self._inertia(modes, speed))
 
-    def linearisation(self) -> float:
-        """Return the estimated relative error of a frequency for the stiffness that is linear in the squared speed.
-
-        The largest of the modes of interest, at the speed in the range where that error is largest.
-        """
-        given = self.rotating
-        if given.second_order is None:
-            return 0.0
-        modes = self.modes(float(np.clip(given.exact_at / np.sqrt(2.0), min(self.solved), max(self.solved))))
-        own = self.basis.T @ (given.standing.of_free(given.second_order) @ self.basis)
-        forms = np.einsum("im,im->m", modes.shapes.conj(), own @ modes.shapes).real
-        return float(np.abs(given.linearisation_errors(modes.speed, modes.frequencies**2, forms)).max())
-
     def meetings(self, order: float) -> np.ndarray:
         """Return the speeds, rad/s, at which a frequency equals an engine order's: `meetings`."""
         return meetings(self.small, order)

@@ -95,17 +95,6 @@ class SpeedBases:
             raise ReductionError(str(error)) from None
         return model
 
-    def linearisation(self, model: ReducedModel, speeds: Sequence[float], modes: int, count: int) -> float:
-        """Return the estimated relative error of the lowest frequencies for the stiffness that is linear in the squared
-        speed, where it is largest; model: `model` of the same speeds and modes."""
-        given, middle = self.rotating, self.rotating.exact_at / math.sqrt(2.0)
-        if given.second_order is None:
-            return 0.0
-        values, shapes = model.at_speed(middle).natural
-        fields = (self.interface.motions @ self._joined(speeds, modes).fields) @ shapes[:, :count]
-        forms = np.einsum("im,im->m", fields, given.second_order @ fields)
-        return float(np.abs(given.linearisation_errors(middle, values[:count], forms)).max())
-
     def _matrices(self, speed: float) -> SystemMatrices:
         standing = self.rotating.standing
         return replace(standing, stiffness=standing.stiffness + speed**2 * self.rotating.centrifugal_stiffness)
@@ -169,13 +158,9 @@ def reduce_rotating(
             break
         speeds = sorted([*speeds, worst])
     frequency, receptance = (max(values) for values in zip(*errors.values(), strict=True))
-    fastest = model.at_speed(greatest_speed)
-    count = max(1, int(np.count_nonzero(fastest.natural_frequencies_hz <= frequencies(fastest)[-1])))
-    linearisation = bases.linearisation(model, speeds, modes, count)
     estimate = {
         "greatest_speed": greatest_speed, "speeds": speeds, "checked": sorted(errors), "frequency": frequency,
-        "receptance": receptance, "met": met, "linearisation": linearisation,
-        "sentence": _sentence(speeds, sorted(errors), frequency, receptance, met, linearisation),
+        "receptance": receptance, "met": met, "sentence": _sentence(speeds, sorted(errors), frequency, receptance, met),
     }  # fmt: skip
     return replace(model, provenance=dict(model.provenance) | {"rotation": estimate})
 
@@ -192,20 +177,10 @@ def _errors(
     return float(natural.max()), float(frf_errors(model, richer, grid).max())
 
 
-def _sentence(
-    speeds: Sequence[float], checked: Sequence[float], frequency: float, receptance: float, met: bool,
-    linearisation: float,
-) -> str:  # fmt: skip
+def _sentence(speeds: Sequence[float], checked: Sequence[float], frequency: float, receptance: float, met: bool) -> str:
     joined, between = (", ".join(f"{speed:.4g}" for speed in values) for values in (speeds, checked))
     sentence = (
         f"basis of the speeds {joined} rad/s: estimated error at {between} rad/s {100 * frequency:.1g} % of natural "
         f"frequencies, {100 * receptance:.1g} % of the receptance"
     )
-    if not met:
-        sentence += "; beyond the tolerance, lower the greatest speed or keep more modes"
-    if not linearisation:
-        return sentence
-    return (
-        f"{sentence}; the stiffness, linear in the squared speed, is right at standstill and {speeds[-1]:.4g} rad/s "
-        f"and costs up to {100 * linearisation:.1g} % of natural frequencies between"
-    )
+    return sentence if met else sentence + "; beyond the tolerance, lower the greatest speed or keep more modes"

@@ -54,14 +54,13 @@ def ring_reduction(
     diameters done, and of all; basis: as of `rom.ring.reduction.reduce_ring`. Raises InputError without the table
     [ring] or interface coordinates, and what reduce_ring raises.
     """
-    case = structure.case
+    case, rotating = structure.case, structure.rotating
     if case.ring is None:
         raise InputError("ring: missing; give [ring] with sectors, low and high")
     if not case.interface:
         raise InputError("interface: missing; a reduced ring needs coordinates of a sector that loads can act on")
-    greatest = 0.0 if case.rotation is None else case.rotation.greatest
-    rotating = structure.rotating_to(greatest) if case.rotation is not None and structure.rotating else None
     standing = structure.matrices if rotating is None else rotating.standing
+    greatest = 0.0 if case.rotation is None else case.rotation.greatest
     if rotating is not None and greatest:
         rotating.at(greatest)
     return reduce_ring(

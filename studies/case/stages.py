@@ -96,10 +96,7 @@ def assemble(case: Case) -> Structure:
         _functional(case, matrices, label)
     if case.rotation is None:
         return Structure(case, solid, matrices)
-    speed = case.rotation.omega or max(
-        case.rotation.greatest, 0.0 if case.campbell is None else case.campbell.speeds[-1]
-    )
-    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics, float(speed))
+    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics)
     return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
 
 
@@ -479,9 +476,8 @@ def campbell_diagram(
     (files.checkpoint_file.clear). Of a ring, modes of every nodal diameter. Raises the errors of
     `modal.campbell.campbell`.
     """
-    table, rotation = structure.case.campbell, structure.case.rotation
-    assert table is not None and rotation is not None
-    rotating = structure.rotating_to(float(table.speeds[-1]))
+    table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
+    assert table is not None and rotation is not None and rotating is not None
     most = rotating.standing.free.size
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
@@ -516,10 +512,7 @@ def reduction(
     number of modes suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the
     tolerance, and InputError for a structure that rotates with another basis, or up to no speed.
     """
-    greatest = _greatest_speed(structure, basis)
-    rotating = structure.rotating_to(greatest) if greatest else None
-    if rotating is not None:
-        rotating.at(greatest)
+    rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
     levelled = structure.case.response_label is not None and bool(structure.case.fatigue_strength)
     recovery = keep_recovery or bool(spots) or levelled
     found = basis_named(basis)
@@ -593,8 +586,8 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
 
     Raises InputError for none, or a basis that does not hold over speeds, and UnstableError beyond the stable ones.
     """
-    table = structure.case.rotation
-    if table is None or structure.rotating is None:
+    table, rotating = structure.case.rotation, structure.rotating
+    if table is None or rotating is None:
         return 0.0
     if basis_named(basis).speeds is None:
         raise InputError(
@@ -605,6 +598,7 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
         raise InputError(
             "rotation: a reduced model is for speeds up to a greatest one; give max_speed (rad/s), max_rpm or a speed"
         )
+    rotating.at(table.greatest)
     return table.greatest
 
 

@@ -15,22 +15,13 @@ from vanedamp.studies.case.tables import Case
 class Structure:
     """A case with its finite elements: the solid on its mesh, and the matrices.
 
-    rotating: matrices of a case that rotates, exact at its speed, at which `matrices` holds; of one at standstill exact
-    at the highest speed that it names.
+    rotating: matrices of a case that rotates; `matrices` holds at its speed.
     """
 
     case: Case
     solid: Solid
     matrices: SystemMatrices
     rotating: RotatingMatrices | None = None
-
-    def rotating_to(self, speed: float) -> RotatingMatrices:
-        """Return the matrices of a case that rotates for speeds up to one (rad/s), exact at standstill and there."""
-        given = self.rotating
-        assert given is not None
-        if speed == given.exact_at:
-            return given
-        return self.solid.rotating(given.standing, given.axis.tolist(), given.point.tolist(), given.statics, speed)
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
         """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
