@@ -125,7 +125,7 @@ def test_phases_of_a_displacement(tmp_path, unit, turned, conjugate):
         ({"forced": FORCED.replace("amplitude_m", "acc [g]")}, "acceleration gives the displacement of a sine only"),
         ({"forced": FORCED.partition("\n")[2]}, "forced.csv: names no columns; expected the header frequency_hz, ampl"),
         ({"forced": PHASES}, "looks like exp(-iwt): the phase rises through the resonance; give conjugate = true"),
-        ({"forced": PHASES.replace("phase_deg", "phase_rad")}, "rad is more than two turns; write phase_deg for degr"),
+        ({"forced": PHASES.replace("[deg]", "[rad]")}, "rad is more than two turns; write phase_deg for degr"),
         ({"forced": FORCED.replace("2e-3", "-2e-3")}, "forced.csv: line 4: amplitude_m: expected a positive number"),
         ({"forced": FORCED.replace("2e-3", "x")}, "line 4: amplitude_m: expected a finite number"),
         ({"decay": DECAY.replace("0.06", "0.02")}, "decay.csv: line 3: time_s: expected times from 0 that rise"),
