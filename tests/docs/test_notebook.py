@@ -36,7 +36,8 @@ def test_records_print_in_a_few_lines(scene):
     assert "Damper(cavity=c, mass=0.02, friction=0.1, restitution=0.5)" in repr(scene)
     assert f"amplitude_mean: {response.amplitude_mean:.6g} m\n" in text
     swept = vd.sweep(scene.replace({"sweep": {"excitation.frequency": [0.155, 0.16, 0.165]}}))
-    assert "excitation.frequency: [0.155, 0.16 , 0.165]" in repr(swept)
+    # without blanks: other packages set numpy's options of printing
+    assert "excitation.frequency:[0.155,0.16,0.165]" in "".join(repr(swept).split())
     assert len(repr(swept).splitlines()) < 25
 
 

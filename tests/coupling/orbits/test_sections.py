@@ -35,13 +35,13 @@ def test_a_body_that_rests_at_a_wall_as_the_period_begins():
         turned = vd.sensitivity(other, ["excitation.force", "cavity.c.gap"])
         assert turned.status == "ok"
         found.append((other.multipliers, turned.derivatives["amplitude_max"]))
-        assert turned.derivatives["amplitude_max"] @ [20.0, 1e-3] == pytest.approx(other.amplitude_max, rel=1e-9)
+        assert turned.derivatives["amplitude_max"] @ [20.0, 1e-3] == pytest.approx(other.amplitude_max, rel=1e-7)
         assert turned.derivatives["energy.impact"] @ [20.0, 1e-3] == pytest.approx(
-            2.0 * turned.values["energy.impact"], rel=1e-8
+            2.0 * turned.values["energy.impact"], rel=1e-6
         )
     for multipliers, slopes in found[1:]:
-        assert np.abs(multipliers) == pytest.approx(np.abs(found[0][0]), abs=1e-9)
-        assert slopes == pytest.approx(found[0][1], rel=1e-8)
+        assert np.abs(multipliers) == pytest.approx(np.abs(found[0][0]), abs=1e-7)
+        assert slopes == pytest.approx(found[0][1], rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
