@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -649,6 +650,13 @@ def test_another_model_than_that_of_the_run(results, tmp_path, monkeypatch, caps
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert main(arguments) == BAD_INPUT
     assert "is not the mesh of" in capsys.readouterr().err
+
+
+def test_attributes_that_nest_without_end_stay_text(results, tmp_path):
+    shutil.copy(results / "sweep.h5", tmp_path / "deep.h5")
+    with h5py.File(tmp_path / "deep.h5", "r+") as file:
+        file.attrs["provenance"] = "[" * 30_000
+    assert main(["export", str(tmp_path / "deep.h5"), "-o", str(tmp_path / "deep.csv")]) == 0
 
 
 def test_names_of_any_language(tmp_path):

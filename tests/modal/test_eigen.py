@@ -8,6 +8,7 @@ from scipy.sparse.linalg import eigsh, spsolve
 
 from tests.tools.small_structures import truss
 from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal import petsc
 from vanedamp.modal.eigen import SolverError, count_below, factorize, solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import SystemMatrices
@@ -185,6 +186,13 @@ def test_a_body_on_rollers_keeps_three_rigid_modes(tmp_path):
 def test_refuses_counts(beam, count):
     with pytest.raises(SolverError, match="count: expected 1 to"):
         solve_modes(beam, count)
+
+
+def test_matrices_beyond_the_arithmetic_are_refused(monkeypatch, beam):
+    """As of a disk with a thickness of 1e-11 m: round-off decides the signs that the factors count."""
+    monkeypatch.setattr(petsc, "negative_eigenvalues", lambda matrix: 0)
+    with pytest.raises(SolverError, match="modes found where the factors count 0: round-off"):
+        solve_modes(beam, 2)
 
 
 def test_a_single_mass(tmp_path):
