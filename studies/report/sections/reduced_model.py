@@ -44,6 +44,7 @@ def _reduction(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
         ],
         "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
+        "covered_hz": model.provenance.get("estimate", {}).get("frequencies_hz", [0.0, float("inf")])[1],
         "greatest_speed": model.greatest_speed,
         "fastest": model.at_speed(model.greatest_speed).natural_frequencies_hz,
         "rotation": model.provenance.get("rotation", {}).get("sentence"),
