@@ -191,7 +191,10 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's inputs and the options, without strengths, which a model has with its hot spots only."""
+        """Return the case's inputs and the options, without those of the fatigue level, which sweeps take elsewhere.
+
+        Strengths are in a model with its hot spots only.
+        """
         return _without_level(super().inputs(), self.table.hot_spots > 0) | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
@@ -200,7 +203,9 @@ class Reduce(CaseStage):
 
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
-        model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
+        model = reduction(
+            structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots, level=False
+        )
         model.save(self.outputs[0])
         tools.warn(reduction_warnings(structure, model))
         return str(model.provenance["estimate"]["sentence"])
