@@ -90,7 +90,7 @@ def _ring_summary(ring: RingModel | SectorRing) -> Iterator[str]:
     """Yield sizes, the estimates of errors, and natural frequencies by nodal diameter."""
     estimate = ring.provenance["estimate"]
     yield f"{ring.sectors} sectors, {ring.size} coordinates; interface of each: {', '.join(ring.interface)}"
-    yield f"{estimate['sentence']}, {_band(estimate)}"
+    yield f"{estimate['sentence']}, {_band(ring.frequencies_hz, estimate)}"
     if isinstance(ring, SectorRing):
         yield "frequencies, Hz: " + _listed(ring.frequencies_hz[:_LISTED], estimate)
         return
@@ -106,7 +106,7 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     kind = "natural" if model.free_modes else "fixed-interface"
     yield f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}"
-    yield f"{estimate['sentence']}, {_band(estimate)}"
+    yield f"{estimate['sentence']}, {_band(model.natural_frequencies_hz, estimate)}"
     if rotation is not None:
         yield rotation["sentence"]
     yield "frequencies, Hz: " + _listed(model.natural_frequencies_hz[:_LISTED], estimate)
@@ -120,8 +120,10 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
         yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest.natural_frequencies_hz[:_LISTED], estimate)
 
 
-def _band(estimate: Mapping[str, Any]) -> str:
-    return f"up to {estimate['frequencies_hz'][1]:.4g} Hz; frequencies in brackets lie beyond and may be far too high"
+def _band(frequencies_hz: np.ndarray, estimate: Mapping[str, Any]) -> str:
+    top = estimate["frequencies_hz"][1]
+    beyond = "; frequencies in brackets lie beyond and may be far too high" if frequencies_hz.max() > top else ""
+    return f"up to {top:.4g} Hz{beyond}"
 
 
 def _listed(frequencies_hz: np.ndarray, estimate: Mapping[str, Any]) -> str:

@@ -1,0 +1,92 @@
+"""Files as commands of version 0.2.0 wrote them: today's records read them, and write the same names, units and values.
+
+`written` has one small file of every kind of result, with the command's JSON (`--json`) and its table (`export`) where
+there are some. The names in them are an interface.
+"""
+
+import json
+import math
+import pkgutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vanedamp.files.store import finite, json_text, load_any
+from vanedamp.rom.ring.sector_ring import load_ring
+from vanedamp.studies.cli import main
+from vanedamp.studies.file_kinds import RESULT_KINDS
+
+WRITTEN = Path(__file__).parent / "written"
+FILES = sorted(path.stem for path in WRITTEN.glob("*.h5"))
+
+
+def kind(name):
+    return load_any(WRITTEN / f"{name}.h5")[0]
+
+
+def read(name):
+    """The record in a file, by the class of its kind; None where there is no way to read it."""
+    if kind(name) in ("ring-model", "ring-sectors"):
+        return load_ring(WRITTEN / f"{name}.h5")
+    known = RESULT_KINDS.get(kind(name))
+    load = known and getattr(pkgutil.resolve_name(known.record), "load", None)
+    return load and load(WRITTEN / f"{name}.h5")
+
+
+def same(one, other, where=""):
+    """Assert that plain data are equal, to the last digits of numbers."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys(), where
+        for key in one:
+            same(one[key], other[key], f"{where}.{key}")
+    elif isinstance(one, list | tuple):
+        assert len(one) == len(other), where
+        for index, pair in enumerate(zip(one, other, strict=True)):
+            same(*pair, f"{where}[{index}]")
+    elif isinstance(one, float) and not isinstance(other, str | None):
+        assert math.isclose(one, other, rel_tol=1e-12) or math.isnan(one), where
+    else:
+        assert one == other or (one is None and math.isnan(other)), where
+
+
+def test_every_kind_is_here():
+    assert {kind(name) for name in FILES} >= set(RESULT_KINDS)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_is_read_is_written_again(name, tmp_path):
+    record = read(name)
+    if record is None or not hasattr(record, "save"):
+        pytest.skip("no class reads and writes it")
+    record.save(tmp_path / "again.h5")
+    (_, variables, attributes), (_, again, named) = load_any(WRITTEN / f"{name}.h5"), load_any(tmp_path / "again.h5")
+    assert again.keys() <= variables.keys()
+    for key, made in again.items():
+        assert (tuple(made.dims), made.units) == (tuple(variables[key].dims), variables[key].units), key
+        np.testing.assert_array_equal(made.values, variables[key].values, key)
+    same(named, {key: attributes[key] for key in named})
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if (WRITTEN / f"{name}.json").exists()])
+def test_json_has_the_names_of_before(name):
+    record, before = read(name), json.loads((WRITTEN / f"{name}.json").read_text())
+    if record is None or not hasattr(record, "to_json"):
+        pytest.skip("no class reads it and gives JSON")
+    now = json.loads(json_text(finite(record.to_json())))
+    both = now.keys() & before.keys()
+    assert both
+    same({key: before[key] for key in both}, {key: now[key] for key in both})
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_file_is_described(name, capsys):
+    assert main(["info", str(WRITTEN / f"{name}.h5"), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["kind"] == kind(name)
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if (WRITTEN / f"{name}.csv").exists()])
+def test_tables_are_those_of_before(name, tmp_path):
+    assert main(["export", str(WRITTEN / f"{name}.h5"), "-o", str(tmp_path / "now.csv")]) == 0
+    now, before = (path.read_text().splitlines() for path in (tmp_path / "now.csv", WRITTEN / f"{name}.csv"))
+    assert now[0] == before[0] and len(now) == len(before)
