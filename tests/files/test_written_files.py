@@ -85,8 +85,11 @@ def test_every_file_is_described(name, capsys):
     assert json.loads(capsys.readouterr().out)["kind"] == kind(name)
 
 
-@pytest.mark.parametrize("name", [name for name in FILES if (WRITTEN / f"{name}.csv").exists()])
-def test_tables_are_those_of_before(name, tmp_path):
+@pytest.mark.parametrize("name", FILES)
+def test_every_file_goes_to_a_table(name, tmp_path):
     assert main(["export", str(WRITTEN / f"{name}.h5"), "-o", str(tmp_path / "now.csv")]) == 0
-    now, before = (path.read_text().splitlines() for path in (tmp_path / "now.csv", WRITTEN / f"{name}.csv"))
-    assert now[0] == before[0] and len(now) == len(before)
+    now = (tmp_path / "now.csv").read_text().splitlines()
+    assert len(now) > 1
+    if (WRITTEN / f"{name}.csv").exists():
+        before = (WRITTEN / f"{name}.csv").read_text().splitlines()
+        assert now[0] == before[0] and len(now) == len(before)
