@@ -7,15 +7,17 @@ there are some. The names in them are an interface.
 import json
 import math
 import pkgutil
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import vanedamp as vd
 from vanedamp.files.store import finite, json_text, load_any
 from vanedamp.rom.ring.sector_ring import load_ring
+from vanedamp.studies import kinds
 from vanedamp.studies.cli import main
-from vanedamp.studies.file_kinds import RESULT_KINDS
 
 WRITTEN = Path(__file__).parent / "written"
 FILES = sorted(path.stem for path in WRITTEN.glob("*.h5"))
@@ -29,8 +31,8 @@ def read(name):
     """The record in a file, by the class of its kind; None where there is no way to read it."""
     if kind(name) in ("ring-model", "ring-sectors"):
         return load_ring(WRITTEN / f"{name}.h5")
-    known = RESULT_KINDS.get(kind(name))
-    load = known and getattr(pkgutil.resolve_name(known.record), "load", None)
+    known = kinds.kind(kind(name))
+    load = known and getattr(pkgutil.resolve_name(known.RECORD), "load", None)
     return load and load(WRITTEN / f"{name}.h5")
 
 
@@ -51,7 +53,7 @@ def same(one, other, where=""):
 
 
 def test_every_kind_is_here():
-    assert {kind(name) for name in FILES} >= set(RESULT_KINDS)
+    assert {kind(name) for name in FILES} >= set(kinds.names())
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -93,3 +95,21 @@ def test_every_file_goes_to_a_table(name, tmp_path):
     if (WRITTEN / f"{name}.csv").exists():
         before = (WRITTEN / f"{name}.csv").read_text().splitlines()
         assert now[0] == before[0] and len(now) == len(before)
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name not in ("sweep-checkpoint", "response-of-ring")])
+def test_every_file_has_a_figure_with_named_axes(name):
+    drawn = vd.plot(WRITTEN / f"{name}.h5").to_plotly_json()
+    layout = drawn["layout"]
+    places = [layout[place] for place in layout if place.startswith("scene")] or [layout]
+    titles = [place[axis]["title"].get("text") for place in places for axis in place if re.match("[xy]axis", axis)
+              and "title" in place[axis]]  # fmt: skip
+    assert drawn["data"] and (any(titles) or kind(name) == "modes")
+
+
+def test_every_kind_is_on_a_page(tmp_path):
+    shown = [str(WRITTEN / f"{name}.h5") for name in FILES if name != "sweep-checkpoint"]
+    assert main(["report", *shown, "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for path in map(Path, shown):
+        assert f">{path.name}<" in page, path.name
