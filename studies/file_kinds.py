@@ -70,7 +70,9 @@ class ResultKind(NamedTuple):
 RESULT_KINDS = {
     "modes": ResultKind("a modal analysis", ("modal",), "vanedamp.Modes"),
     "calibration": ResultKind(
-        "a case calibrated with measurements", ("calibrate",), "vanedamp.studies.case.calibration.Calibration"
+        "a case calibrated with measurements",
+        ("calibrate",),
+        "vanedamp.studies.case.calibration_record.CalibrationRecord",
     ),
     "campbell": ResultKind("a Campbell diagram", ("campbell",), "vanedamp.Campbell"),
     "ring-modes": ResultKind("the modes of a ring", ("ring",), "vanedamp.Interference"),

@@ -6,6 +6,7 @@ import json
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +25,7 @@ from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.sector_ring import load_ring
 from vanedamp.rom.ring.study import MistuningStudy
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.commands.support.facts import Fact, fact_lines
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.file_kinds import RESULT_KINDS, ResultKind
@@ -134,18 +136,16 @@ def _level(level: Mapping[str, Any] | None) -> Iterator[Fact]:
 
 
 def _calibration(record: _Record) -> Iterator[Fact]:
-    attributes, variables = record.attributes, record.variables
-    yield Fact("rigid", attributes["rigid"], "", "rigid model, SI units")
-    if "factor" in variables:
-        names, factors = (variables[name].values.tolist() for name in ("part", "factor"))
-        yield Fact("factor", dict(zip(names, factors, strict=True)), "", "on stiffness")
-        for name in ("target_frequency", "frequency_after"):
-            yield Fact(name, variables[name].values.tolist(), "Hz")
-    yield Fact("damping", attributes["damping"])
-    level = attributes.get("excitation")
-    yield from _level(level)
-    if level:
-        yield Fact("force", level["force"], "N", "at resonance, gives this amplitude")
+    found = CalibrationRecord.load(record.path)
+    yield Fact("rigid", asdict(found.rigid), "", "rigid model, SI units")
+    if found.part:
+        yield Fact("factor", dict(zip(found.part, found.factor.tolist(), strict=True)), "", "on stiffness")
+        yield Fact("target_frequency", found.target_hz.tolist(), "Hz")
+        yield Fact("frequency_after", found.after_hz.tolist(), "Hz")
+    yield Fact("damping", found.damping)
+    yield from _level(found.excitation)
+    if found.excitation:
+        yield Fact("force", found.excitation["force"], "N", "at resonance, gives this amplitude")
 
 
 def _campbell(record: _Record) -> Iterator[Fact]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from functools import singledispatch
 from pathlib import Path
@@ -19,11 +18,11 @@ from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.frf import UNITS
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.rom.ring.study import MistuningStudy
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.bifurcation_chart import bifurcation_figure, diagram_axis
@@ -119,7 +118,7 @@ def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
 
 def _of_file(found: Results, file: str, entry: Result) -> go.Figure:
     if file in found.kinds["calibration"]:
-        return _of_calibration(file, *entry.record)
+        return _of_calibration(file, entry.record)
     if file in found.kinds["ring-modes"]:
         return plot(entry.record[0])
     if file not in found.kinds["modes"]:
@@ -131,10 +130,9 @@ def _of_file(found: Results, file: str, entry: Result) -> go.Figure:
     return mode_figure(values, surface, int(attributes.get("first_bending", 0)))
 
 
-def _of_calibration(file: str, values: dict[str, Any], attributes: dict[str, Any]) -> go.Figure:
-    if "line" in values:
-        damping = json.loads(attributes["damping"])
-        return response_figure(values, damping, UNITS[damping["quantity"]])
-    if "target_frequency" in values:
-        return frequencies_figure(values)
+def _of_calibration(file: str, record: CalibrationRecord) -> go.Figure:
+    if record.label:
+        return response_figure(record)
+    if record.part:
+        return frequencies_figure(record)
     raise InputError(f"{file}: there is no figure of a calibration without measurements")

@@ -22,6 +22,7 @@ FILES = sorted(path.stem for path in WRITTEN.glob("*.h5"))
 #: what commands add to a record's JSON, and to its file; anywhere, and by the kind of the file
 TIMES = {"wall_time_s", "points_per_second", "points_resumed", "resonance"}
 OF_COMMANDS = {
+    "calibration": {"status", "tuning"},
     "modes": {
         "cavity", "effective_mass", "fatigue", "first_bending", "first_bending_number", "movable_mass", "rigid",
         "solver", "warnings",
