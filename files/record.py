@@ -113,8 +113,7 @@ class Record(Displayed):
             value = getattr(self, name)
             if isinstance(layout, Array) and not layout.attribute and not _missing(value, name in optional):
                 stored = np.asarray(value, np.int8 if layout.dtype is bool else layout.dtype)
-                parts = {"_real": stored.real, "_imaginary": stored.imag} if layout.dtype is complex else {"": stored}
-                for part, values in parts.items():
+                for part, values in _parts(stored).items():
                     found[(layout.name or name) + part] = store.Variable(values, layout.dims, layout.unit)
             elif isinstance(layout, Rows):
                 found |= row_variables(value, get_args(kind)[0], layout.dim)
@@ -134,11 +133,14 @@ class Record(Displayed):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the file: numbers and texts as they are, None left out, other data as JSON."""
-        found = {name: value for name, value in self.plain().items() if value is not None}
-        for name, (_, layout) in declared(type(self)).items():
-            if isinstance(layout, Array) and layout.attribute:
-                found[layout.name or name] = getattr(self, name)
-        return {name: json.dumps(value) if isinstance(value, list) else value for name, value in found.items()}
+        plain = {name: value for name, value in self.plain().items() if value is not None}
+        found = {name: json.dumps(value) if isinstance(value, list) else value for name, value in plain.items()}
+        optional = _optional(type(self))
+        for name, (kind, layout) in declared(type(self)).items():
+            value = getattr(self, name)
+            if isinstance(layout, Array) and layout.attribute and not _missing(value, name in optional):
+                found[layout.name or name] = list(value) if _is_tuple(kind) else value
+        return found
 
     def to_json(self) -> dict[str, Any]:
         """Return the record as plain data, arrays as nested lists."""
@@ -147,7 +149,8 @@ class Record(Displayed):
         for name, (_, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if isinstance(layout, Array) and value is not None:
-                found[layout.json or layout.name or name] = np.asarray(value).tolist()
+                for part, values in _parts(np.asarray(value)).items():
+                    found[(layout.json or layout.name or name) + part] = values.tolist()
             elif isinstance(layout, Rows):
                 found[name] = [dataclasses.asdict(row) for row in value]
         return found | self.derived()
@@ -180,10 +183,12 @@ class Record(Displayed):
         for field, (kind, layout) in declared(cls).items():
             if isinstance(layout, Array):
                 name, held = layout.name or field, attributes if layout.attribute else values
+                if field in optional and name not in held and f"{name}_real" not in held:
+                    continue
                 if layout.dtype is complex:
-                    given[field] = values[f"{name}_real"] + 1j * values[f"{name}_imaginary"]
-                elif name in held or field not in optional:
-                    given[field] = tuple(held[name].tolist()) if _is_tuple(kind) else held[name]
+                    given[field] = held[f"{name}_real"] + 1j * held[f"{name}_imaginary"]
+                else:
+                    given[field] = tuple(np.asarray(held[name]).tolist()) if _is_tuple(kind) else held[name]
             elif isinstance(layout, Rows):
                 given[field] = rows_of(values, get_args(kind)[0], layout.dim)
             elif field in attributes or field not in optional:
@@ -208,6 +213,11 @@ def _declared(cls: type) -> dict[str, tuple[Any, Array | Rows | Coded | None]]:
         layout = next((note for note in notes if isinstance(note, Array | Rows | Coded)), None)
         found[item.name] = (kind, layout)
     return found
+
+
+def _parts(values: np.ndarray) -> dict[str, np.ndarray]:
+    """Return an array by the endings of its names: a complex one as a pair."""
+    return {"_real": values.real, "_imaginary": values.imag} if np.iscomplexobj(values) else {"": values}
 
 
 def _missing(value: Any, optional: bool) -> bool:

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.facts import Fact, Found, level_fact
 
 NAME = "calibration"
 ABOUT = "a case calibrated with measurements"
 COMMANDS = ("calibrate",)
-RECORD = "vanedamp.studies.case.calibration.Calibration"
+RECORD = "vanedamp.studies.case.calibration_record.CalibrationRecord"
 
 
 def facts(record: Found) -> Iterator[Fact]:
     """Yield its figures."""
-    attributes, variables = record.attributes, record.variables
-    yield Fact("rigid", attributes["rigid"], "", "rigid model, SI units")
-    if "factor" in variables:
-        names, factors = (variables[name].values.tolist() for name in ("part", "factor"))
-        yield Fact("factor", dict(zip(names, factors, strict=True)), "", "on stiffness")
-        for name in ("target_frequency", "frequency_after"):
-            yield Fact(name, variables[name].values.tolist(), "Hz")
-    yield Fact("damping", attributes["damping"])
-    level = attributes.get("excitation")
-    yield from level_fact(level)
-    if level:
-        yield Fact("force", level["force"], "N", "at resonance, gives this amplitude")
+    found = CalibrationRecord.load(record.path)
+    yield Fact("rigid", asdict(found.rigid), "", "rigid model, SI units")
+    if found.part:
+        yield Fact("factor", dict(zip(found.part, found.factor.tolist(), strict=True)), "", "on stiffness")
+        yield Fact("target_frequency", found.target_hz.tolist(), "Hz")
+        yield Fact("frequency_after", found.after_hz.tolist(), "Hz")
+    yield Fact("damping", found.damping)
+    yield from level_fact(found.excitation)
+    if found.excitation:
+        yield Fact("force", found.excitation["force"], "N", "at resonance, gives this amplitude")

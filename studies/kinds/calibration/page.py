@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.files.store import load as load_record
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.frf import UNITS
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.kinds.calibration import NAME
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
@@ -32,9 +30,8 @@ _MOST = 4
 
 def load(path: Path) -> Result:
     """Read what `vanedamp calibrate` wrote."""
-    values, attributes = load_record(path, KIND)
-    provenance = {"matrices": json.loads(attributes["provenance"]), "versions": json.loads(attributes["versions"])}
-    return Result((values, attributes), provenance)
+    record = CalibrationRecord.load(path)
+    return Result(record, {"matrices": record.provenance, "versions": record.versions})
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
@@ -42,56 +39,48 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
     return [_calibration(file, result.record, page) for file, result in results.items()]
 
 
-def figure(record: tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
+def figure(record: CalibrationRecord) -> go.Figure:
     """Draw the measured response with its fit, or else the tuned frequencies. Raises InputError without either."""
-    values, attributes = record
-    if "line" in values:
-        damping = json.loads(attributes["damping"])
-        return response_figure(values, damping, UNITS[damping["quantity"]])
-    if "target_frequency" in values:
-        return frequencies_figure(values)
+    if record.label:
+        return response_figure(record)
+    if record.part:
+        return frequencies_figure(record)
     raise InputError("plot: there is no figure of a calibration without measurements")
 
 
-def _calibration(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Page) -> dict[str, Any]:
-    values, attributes = record
-    known = ("rigid", "damping", "excitation", "cavity")
-    rigid, damping, excitation, cavities = (json.loads(attributes.get(name, "null")) for name in known)
+def _calibration(file: str, record: CalibrationRecord, page: Page) -> dict[str, Any]:
     targets: list[dict[str, Any]] = []
-    parts: list[tuple[Any, ...]] = []
     chart, response = None, None
-    if "target_frequency" in values:
-        rows, errors = _frequency_rows(values), zip(*_frequency_errors(values), strict=True)
+    if record.part:
+        rows, errors = _frequency_rows(record), zip(*record.errors, strict=True)
         targets = [
             {"row": row, "errors": both, "sensitivity": sensitivity}
-            for row, both, sensitivity in zip(rows, errors, values["sensitivity"], strict=True)
+            for row, both, sensitivity in zip(rows, errors, record.sensitivity, strict=True)
         ]
-        parts = list(zip(values["part"], values["factor"], values["factor_deviation"], strict=True))
-        chart = page.chart("calibration", frequencies_figure(values), _FREQUENCIES, rows, [file])
-    if "line" in values:
-        unit = UNITS[damping["quantity"]]
-        figure = response_figure(values, damping, unit)
-        response = page.chart("response", figure, *_response_table(values, unit), [file])
+        chart = page.chart("calibration", frequencies_figure(record), _FREQUENCIES, rows, [file])
+    if record.label:
+        response = page.chart("response", response_figure(record), *_response_table(record), [file])
+    excitation = record.excitation
     level = None if excitation is None else excitation | excitation["hot_spot"]
     return {
         "doubts": list(level_warnings(level)),
         "file": file,
         "targets": targets,
         "chart": chart,
-        "parts": parts,
+        "parts": list(zip(record.part, record.factor, record.factor_deviation, strict=True)),
         "response": response,
-        "rigid": rigid,
-        "damping": damping,
+        "rigid": record.rigid,
+        "damping": record.damping,
         "excitation": excitation,
-        "cavities": cavities or {},
-        "warnings": attributes.get("warnings", []),
+        "cavities": record.plain()["cavity"],
+        "warnings": record.warnings,
     }
 
 
-def frequencies_figure(record: Mapping[str, Any]) -> go.Figure:
+def frequencies_figure(record: CalibrationRecord) -> go.Figure:
     """Draw the error of every target's frequency before and after tuning, %."""
-    targets = [f"{value:.6g} Hz" for value in record["target_frequency"]]
-    before, after = _frequency_errors(record)
+    targets = [f"{value:.6g} Hz" for value in record.target_hz]
+    before, after = record.errors
     figure = go.Figure()
     for target, old, new in zip(targets, before, after, strict=True):
         figure.add_scatter(
@@ -112,32 +101,26 @@ def frequencies_figure(record: Mapping[str, Any]) -> go.Figure:
     return figure.update_layout(hovermode="closest")
 
 
-def _frequency_errors(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the errors (n,) of the computed frequencies before and after tuning, %."""
-    target = record["target_frequency"]
-    return 100.0 * (record["frequency_before"] / target - 1.0), 100.0 * (record["frequency_after"] / target - 1.0)
-
-
-def _frequency_rows(record: Mapping[str, Any]) -> list[list[float]]:
+def _frequency_rows(record: CalibrationRecord) -> list[list[float]]:
     """Return a row per measured frequency."""
-    names = ("target_frequency", "frequency_before", "frequency_after", "mac_before", "mac_after")
-    rows: list[list[float]] = np.column_stack([record[name] for name in names]).tolist()
+    columns = (record.target_hz, record.before_hz, record.after_hz, record.mac_before, record.mac_after)
+    rows: list[list[float]] = np.column_stack(columns).tolist()
     return rows
 
 
-def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit: str) -> go.Figure:
+def response_figure(record: CalibrationRecord) -> go.Figure:
     """Draw magnitude and phase of a measured response and of its fit, with the band and the mode."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06, row_heights=[0.62, 0.38])
-    line, labels = record["line"], record["label"]
+    line, labels, damping, unit = record.line, record.label, record.damping, record.unit
     for place, label in enumerate(labels[:_MOST]):
         shown = "" if len(labels) == 1 else f" {label}"
-        measured, fitted = (_complex(record, name)[place] for name in ("response", "fitted"))
-        for values, name, look in (
-            (measured, f"measured{shown}", {"mode": "markers", "marker": {"size": 4, "color": _MEASURED}}),
-            (fitted, f"fitted{shown}", {"mode": "lines", "line": {"color": _AFTER, "width": 2.2}}),
+        for values, of, look in (
+            (record.response, "measured", {"mode": "markers", "marker": {"size": 4, "color": _MEASURED}}),
+            (record.fitted, "fitted", {"mode": "lines", "line": {"color": _AFTER, "width": 2.2}}),
         ):
+            name = f"{of}{shown}"
             group = {"name": name, "legendgroup": name, "opacity": 1.0 - 0.2 * place}
-            magnitude, phase = np.abs(values), np.degrees(np.angle(values))
+            magnitude, phase = np.abs(values[place]), np.degrees(np.angle(values[place]))
             figure.add_scatter(
                 x=line, y=magnitude, row=1, col=1, **group, **look,
                 hovertemplate=f"{name}<br>%{{x:.6g}} Hz<br>%{{y:.4g}} {unit}<extra></extra>",
@@ -150,24 +133,18 @@ def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit:
     low, high = damping["band"]
     figure.add_vrect(low, high, fillcolor="#94a3b8", opacity=0.12, line_width=0)
     figure.add_vline(damping["frequency_hz"], line={"color": "#334155", "width": 1, "dash": "dash"})
-    title = f"{damping.get('quantity', 'response')}, {unit}"
+    title = f"{damping['quantity']}, {unit}"
     figure.update_yaxes(title_text=title, type="log", dtick="D2", exponentformat="power", row=1, col=1)
     figure.update_yaxes(title_text="phase, degrees", tickvals=[-180, -90, 0, 90, 180], row=2, col=1)
     figure.update_xaxes(title_text="frequency, Hz", row=2, col=1)
     return figure.update_layout(hovermode="closest")
 
 
-def _response_table(record: Mapping[str, Any], unit: str) -> Table:
+def _response_table(record: CalibrationRecord) -> Table:
     """Return a row per frequency line; nan where not fitted."""
-    parts = {
-        "response_real": "measured real", "response_imaginary": "measured imaginary",
-        "fitted_real": "fitted real", "fitted_imaginary": "fitted imaginary",
-    }  # fmt: skip
-    labels = list(enumerate(record["label"]))
-    header = ["frequency, Hz", *(f"{label} {part}, {unit}" for _, label in labels for part in parts.values())]
-    columns = [record[name][index] for index, _ in labels for name in parts]
-    return header, np.column_stack([record["line"], *columns]).tolist()
-
-
-def _complex(record: Mapping[str, Any], name: str) -> np.ndarray:
-    return np.asarray(record[f"{name}_real"] + 1j * record[f"{name}_imaginary"])
+    header, columns = ["frequency, Hz"], [record.line]
+    for label, measured, fitted in zip(record.label, record.response, record.fitted, strict=True):
+        for name, values in (("measured", measured), ("fitted", fitted)):
+            header += [f"{label} {name} {part}, {record.unit}" for part in ("real", "imaginary")]
+            columns += [values.real, values.imag]
+    return header, np.column_stack(columns).tolist()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import plotly.graph_objects as go
 
-from vanedamp.files.store import load as load_record
 from vanedamp.rom.ring.identification import Identified
 from vanedamp.studies.kinds.deviations import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
@@ -22,9 +20,7 @@ KIND = NAME
 
 def load(path: Path) -> Result:
     """Read what `vanedamp identify` wrote of a ring."""
-    values, attributes = load_record(path, KIND)
-    found = Identified(values["deviation"], values["error"], float(attributes["misfit"]))
-    return Result(found, json.loads(attributes["provenance"]))
+    return Result.of(Identified.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
