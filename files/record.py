@@ -67,6 +67,10 @@ class Rows(NamedTuple):
     dim: str
 
 
+class Own(NamedTuple):
+    """A field that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`."""
+
+
 class Unit(NamedTuple):
     """The unit of a number."""
 
@@ -89,6 +93,8 @@ class Record(Displayed):
     """Base of results in files: a frozen dataclass; see the module."""
 
     KIND: ClassVar[str]
+    #: fields that JSON has; None: all
+    IN_JSON: ClassVar[tuple[str, ...] | None] = None
 
     def __post_init__(self) -> None:
         for name, (kind, layout) in declared(type(self)).items():
@@ -128,14 +134,20 @@ class Record(Displayed):
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
-            if not isinstance(layout, Array | Rows)
+            if not isinstance(layout, Array | Rows | Own)
         }
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes of the file: numbers and texts as they are, None left out, other data as JSON."""
-        plain = {name: value for name, value in self.plain().items() if value is not None}
-        found = {name: json.dumps(value) if isinstance(value, list) else value for name, value in plain.items()}
+        """Return the attributes of the file: numbers and texts as they are, other data as JSON.
+
+        None and optional tables without an entry are left out.
+        """
         optional = _optional(type(self))
+        found = {
+            name: json.dumps(value) if isinstance(value, list) else value
+            for name, value in self.plain().items()
+            if value is not None and (value != {} or name not in optional)
+        }
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if isinstance(layout, Array) and layout.attribute and not _missing(value, name in optional):
@@ -153,7 +165,7 @@ class Record(Displayed):
                     found[(layout.json or layout.name or name) + part] = values.tolist()
             elif isinstance(layout, Rows):
                 found[name] = [dataclasses.asdict(row) for row in value]
-        return found | self.derived()
+        return {name: found[name] for name in self.IN_JSON or found} | self.derived()
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as."""
@@ -178,6 +190,11 @@ class Record(Displayed):
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Self:
         """Return the record in the variables and attributes of a file."""
+        return cls(**cls.given(values, attributes, path))
+
+    @classmethod
+    def given(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+        """Return the fields in a file by name, but those of its Own."""
         given: dict[str, Any] = {}
         optional = _optional(cls)
         for field, (kind, layout) in declared(cls).items():
@@ -191,26 +208,26 @@ class Record(Displayed):
                     given[field] = tuple(np.asarray(held[name]).tolist()) if _is_tuple(kind) else held[name]
             elif isinstance(layout, Rows):
                 given[field] = rows_of(values, get_args(kind)[0], layout.dim)
-            elif field in attributes or field not in optional:
+            elif not isinstance(layout, Own) and (field in attributes or field not in optional):
                 value = attributes[field]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
                 coded = layout if isinstance(layout, Coded) else None
                 given[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
-        return cls(**given)
+        return given
 
 
-def declared(cls: Any) -> Mapping[str, tuple[Any, Array | Rows | Coded | None]]:
+def declared(cls: Any) -> Mapping[str, tuple[Any, Array | Rows | Own | Coded | None]]:
     """Return type and layout of every field of a record; None: plain data."""
     return _declared(cls)
 
 
 @cache
-def _declared(cls: type) -> dict[str, tuple[Any, Array | Rows | Coded | None]]:
-    found: dict[str, tuple[Any, Array | Rows | Coded | None]] = {}
+def _declared(cls: type) -> dict[str, tuple[Any, Array | Rows | Own | Coded | None]]:
+    found: dict[str, tuple[Any, Array | Rows | Own | Coded | None]] = {}
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, Array | Rows | Coded)), None)
+        layout = next((note for note in notes if isinstance(note, Array | Rows | Own | Coded)), None)
         found[item.name] = (kind, layout)
     return found
 
