@@ -118,7 +118,8 @@ class RingDown(Record, Plotted):
         hertz = {"frequency": "frequency_hz", "fixed_frequency": "fixed_frequency_hz"}
         linear = {hertz.get(name, name): value for name, value in asdict(self.linear).items()}
         data: dict[str, Any] = {
-            "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time, "energies_j": {name: self.energies[name] for name in PARTS if name in self.energies},
+            "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time,
+            "energies_j": {name: self.energies[name] for name in PARTS if name in self.energies},
             "turning_points": {
                 "time_s": self.time.tolist(), "displacement_m": self.displacement.tolist(),
                 "energy_j": self.energy.tolist(),
