@@ -52,7 +52,7 @@ def simulate(
     took = time.perf_counter() - started
     return replace(
         response, estimate=chosen.estimate, advice=chosen.advice,
-        warnings=chosen.warnings + notes + doubt, wall_time_s=took, moved_start=other,
+        warnings=chosen.warnings + notes + doubt, wall_time_s=took, moved_start=other, scene=scene,
     )  # fmt: skip
 
 

@@ -100,7 +100,8 @@ class Record(Displayed):
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if isinstance(layout, Array) and value is not None and not _is_tuple(kind):
-                object.__setattr__(self, name, store.frozen(value, layout.dtype))
+                if not _is_frozen(value, layout.dtype):
+                    object.__setattr__(self, name, store.frozen(value, layout.dtype))
             elif isinstance(value, np.generic):
                 object.__setattr__(self, name, value.item())
 
@@ -209,7 +210,7 @@ class Record(Displayed):
             elif isinstance(layout, Rows):
                 given[field] = rows_of(values, get_args(kind)[0], layout.dim)
             elif not isinstance(layout, Own) and (field in attributes or field not in optional):
-                value = attributes[field]
+                value = attributes.get(field) if type(None) in get_args(kind) else attributes[field]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
                 coded = layout if isinstance(layout, Coded) else None
                 given[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
@@ -235,6 +236,12 @@ def _declared(cls: type) -> dict[str, tuple[Any, Array | Rows | Own | Coded | No
 def _parts(values: np.ndarray) -> dict[str, np.ndarray]:
     """Return an array by the endings of its names: a complex one as a pair."""
     return {"_real": values.real, "_imaginary": values.imag} if np.iscomplexobj(values) else {"": values}
+
+
+def _is_frozen(value: Any, dtype: Any) -> bool:
+    """Whether a value is what `store.frozen` returns, so that records that are made of others need no copies."""
+    own = isinstance(value, np.ndarray) and value.base is None and not value.flags.writeable
+    return own and value.dtype == dtype and value.flags.c_contiguous
 
 
 def _missing(value: Any, optional: bool) -> bool:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,14 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.response.spot_stress import variables as stress_variables
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
-from vanedamp.files.store import Variable, dataset, save
+from vanedamp.files.record import Array, Own, Record
+from vanedamp.files.store import Variable
+from vanedamp.files.toml_input import validate
 
+#: attributes of a file that are tables
+_NESTED = ("wear", "contact_strength", "stress", "strength", "sectors")
 #: results of each planar body
 _OF_BODIES = ("tilt_max", "lift_share", "linearisation", "wall_impacts")
 
@@ -124,6 +129,16 @@ class PlanarSamples(NamedTuple):
         variables["contact_corner"] = Variable(np.array(corners), ("contact",))
         return variables
 
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> PlanarSamples | None:
+        """Return the samples in the variables of a file; None for one of sliders, or of a version that kept none."""
+        if "contact_gap" not in values:
+            return None
+        arrays = {name: np.asarray(values[name], float) for name in cls._fields if name in values}
+        arrays["contact_closed"] = values["contact_closed"].astype(bool)
+        places = (values[f"contact_{name}"].tolist() for name in ("damper", "side", "corner"))
+        return cls(**arrays, contacts=tuple(zip(*places, strict=True)))
+
 
 #: units of the results of a response that have one
 UNITS = {
@@ -133,10 +148,17 @@ UNITS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, repr=False)
-class Response(Plotted):
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Record, Plotted):
     """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods."""
 
+    KIND: ClassVar[str] = "response"
+    IN_JSON = (
+        "status", "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "static_deflection",
+        "amplitude_max_dynamic", "amplitude_mean_dynamic", "amplitude_rms", "amplitude_harmonic", "phase",
+        "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
+        "wall_time_s", "periods", "transient", "counters", "penetration", "warnings",
+    )  # fmt: skip
     status: Status
     """how the run ended"""
     frequency: float
@@ -183,61 +205,69 @@ class Response(Plotted):
     """periods of these that are left out"""
     counters: dict[str, int]
     """counts of what the method did, by name"""
-    peak: np.ndarray
+    peak: Annotated[np.ndarray, Array(("full_period",), "m")]
     """(periods,) largest displacement of each period [m]"""
-    section: np.ndarray
+    section: Annotated[np.ndarray, Array(("period", "state"), "m, m/s")]
     """(periods + 1, 2) displacement and velocity at the start of each period [m, m/s]"""
-    slip: np.ndarray
+    slip: Annotated[np.ndarray, Array(("period", "damper"), "m")]
     """(periods + 1, bodies) displacements of the bodies relative to their cavities at the start of each period [m]"""
-    slip_velocity: np.ndarray
+    slip_velocity: Annotated[np.ndarray, Array(("period", "damper"), "m/s")]
     """(periods + 1, bodies) velocities of the bodies relative to their cavities [m/s]"""
-    event_list: Sequence[Event]
+    event_list: Annotated[Sequence[Event], Own()]
     """events, empty if they were not asked for"""
-    time: np.ndarray
+    time: Annotated[np.ndarray, Own()]
     """(n,) times of the samples, empty if none were asked for [s]"""
-    displacement: np.ndarray
+    displacement: Annotated[np.ndarray, Own()]
     """(n,) displacement at `excitation.at` [m]"""
-    body_displacement: np.ndarray
+    body_displacement: Annotated[np.ndarray, Own()]
     """(n, bodies) displacements of the bodies relative to their cavities [m]"""
     penetration: float = 0.0
     """deepest overlap of bodies and rigid walls, relative to the free travel; 0 for the exact engine [-]"""
     estimate: dict[str, Any] | None = None
     """estimate of the error of a reduced model whose number of modes was chosen automatically"""
-    final: RestartState | None = None
+    final: Annotated[RestartState | None, Own()] = None
     """the state at the end, with which another run can begin; None for a run that ended within a period, or whose
     method leaves none"""
-    warnings: tuple[str, ...] = ()
+    warnings: Annotated[tuple[str, ...], Array(("warning",), dtype=object, attribute=True)] = ()
     """to be read before the figures are used"""
     moved_start: dict[str, Any] | None = None
     """of a second run, whose bodies begin about 1e-9 of their gap aside: status, mean amplitude and its confidence, as
     `amplitude_mean_dynamic`, and whether it `agrees`; None if it was not asked for, and without impacts of bodies"""
-    tilt_max: tuple[float | None, ...] | None = None
+    tilt_max: Annotated[tuple[float | None, ...] | None, Own()] = None
     """largest tilt of each body in its cavity; None for sliders, and without bodies in the plane [rad]"""
-    lift_share: tuple[float | None, ...] | None = None
+    lift_share: Annotated[tuple[float | None, ...] | None, Own()] = None
     """fraction of the time that each body is off its floor [-]"""
-    linearisation: tuple[float | None, ...] | None = None
+    linearisation: Annotated[tuple[float | None, ...] | None, Own()] = None
     """what small tilts neglect over the smallest play, for each body [-]"""
-    wall_impacts: tuple[float, ...] | None = None
+    wall_impacts: Annotated[tuple[float, ...] | None, Own()] = None
     """mean number of impacts on its walls in a period, for each body of a scene in the plane; the others hit floors,
     ceilings and each other [-]"""
-    in_plane: PlanarSamples | None = None
+    in_plane: Annotated[PlanarSamples | None, Own()] = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
     """advice on the bodies whose shape was chosen automatically"""
-    coordinates: np.ndarray | None = None
+    coordinates: Annotated[np.ndarray | None, Array(("time", "mode"), "kg^0.5 m")] = None
     """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
-    contact_work: tuple[ContactWork, ...] | None = None
+    contact_work: Annotated[tuple[ContactWork, ...] | None, Own()] = None
     """work of friction and impacts of each contact; None without [wear]"""
-    wear: tuple[ContactWear, ...] | None = None
+    wear: Annotated[tuple[ContactWear, ...] | None, Own()] = None
     """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
-    stress: tuple[SpotStress, ...] | None = None
+    stress: Annotated[tuple[SpotStress, ...] | None, Own()] = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
-    sectors: SectorResponse | None = None
+    sectors: Annotated[SectorResponse | None, Own()] = None
     """response of each sector of a ring; None for other structures"""
-    contacts: tuple[ContactStrength, ...] | None = None
+    contacts: Annotated[tuple[ContactStrength, ...] | None, Own()] = None
     """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
+    scene: Annotated[Scene | None, Own()] = None
+    """that was run, as given; None: not known"""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """versions and further data of the caller (JSON-able)"""
+
+    def shown(self) -> dict[str, Any]:
+        """Return the values that are printed, by name."""
+        return {name: value for name, value in super().shown().items() if name not in ("scene", "provenance")}
 
     def printed_units(self) -> dict[str, str]:
         """Return the units of the results that have one, by name."""
@@ -245,24 +275,17 @@ class Response(Plotted):
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
-        names = (
-            "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence",
-            "static_deflection", "amplitude_max_dynamic", "amplitude_mean_dynamic", "amplitude_rms",
-            "amplitude_harmonic", "phase",
-            "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
-            "wall_time_s", "periods", "transient", "counters", "penetration",
-        )  # fmt: skip
-        data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
-        data["warnings"] = list(self.warnings)
-        for name in _OF_BODIES:
-            if (values := getattr(self, name)) is not None:
-                data[name] = list(values)
-        if self.moved_start is not None:
-            data["moved_start"] = self.moved_start
-        if self.estimate is not None:
-            data["estimate"] = self.estimate
-        if self.advice is not None:
-            data["advice"] = self.advice
+        if not events:
+            return super().to_json()
+        fields = self._event_fields()
+        listed = [{name: getattr(event, name) for name in fields} for event in self.event_list]
+        return super().to_json() | {"event_list": listed}
+
+    def derived(self) -> dict[str, Any]:
+        """Return what only some runs have."""
+        names = (*_OF_BODIES, "moved_start", "estimate", "advice")
+        data: dict[str, Any] = {name: value for name in names if (value := getattr(self, name)) is not None}
+        data |= {name: list(data[name]) for name in _OF_BODIES if name in data}
         if self.wear is not None:
             data["wear"] = [contact.to_json() for contact in self.wear]
         if self.stress is not None:
@@ -272,50 +295,63 @@ class Response(Plotted):
             data["contact_strength"] = [contact.to_json() for contact in self.contacts]
         if self.sectors is not None:
             data["sectors"] = self.sectors.to_json()
-        if self.lyapunov is not None:
-            data["lyapunov"] = self.lyapunov
-        if events:
-            fields = self._event_fields()
-            data["event_list"] = [{name: getattr(event, name) for name in fields} for event in self.event_list]
-        return data
+        return data | ({} if self.lyapunov is None else {"lyapunov": self.lyapunov})
 
-    def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
-        """Write HDF5 that xarray opens: per-period series, samples and events."""
-        variables, attributes = self._record()
-        save(path, "response", variables, attributes | {"provenance": provenance or {}})
+    def save(self, path: str | os.PathLike[str], provenance: Mapping[str, Any] | None = None) -> None:  # type: ignore[override]
+        """Write HDF5 that xarray opens: per-period series, samples and events, with the scene. Raises StoreError."""
+        super().save(path, attributes={"provenance": self._made() | dict(provenance or {})})
 
-    def to_xarray(self) -> Any:
-        """Return the xarray.Dataset of the file that `save` writes."""
-        return dataset(*self._record())
+    def _made(self) -> dict[str, Any]:
+        return ({} if self.scene is None else {"scene": self.scene.to_dict()}) | dict(self.provenance)
 
-    def _record(self) -> tuple[dict[str, Variable], dict[str, Any]]:
-        variables = {
-            "period": Variable(np.arange(len(self.section)), ("period",)),
-            "section": Variable(self.section, ("period", "state"), "m, m/s"),
-            "slip": Variable(self.slip, ("period", "damper"), "m"),
-            "slip_velocity": Variable(self.slip_velocity, ("period", "damper"), "m/s"),
-            "peak": Variable(self.peak, ("full_period",), "m"),
-        }
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file."""
+        found = super().variables() | {"period": Variable(np.arange(len(self.section)), ("period",))}
         if len(self.time):
-            variables["time"] = Variable(self.time, ("time",), "s")
-            variables["displacement"] = Variable(self.displacement, ("time",), "m")
-            variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
-        if self.coordinates is not None:
-            variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
+            found["time"] = Variable(self.time, ("time",), "s")
+            found["displacement"] = Variable(self.displacement, ("time",), "m")
+            found["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
         if self.in_plane is not None:
-            variables |= self.in_plane.variables()
+            found |= self.in_plane.variables()
         if self.stress:
-            variables |= stress_variables(self.stress)
+            found |= stress_variables(self.stress)
         if self.sectors is not None:
-            variables |= self.sectors.variables()
-        if self.event_list:
-            variables |= self._event_variables()
-        attributes = {k: v for k, v in self.to_json().items() if v is not None}
-        for name in attributes.keys() & {"wear", "contact_strength"}:
-            attributes[name] = json.dumps(attributes[name])
-        for name in attributes.keys() & _OF_BODIES:
-            attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
-        return variables, attributes
+            found |= self.sectors.variables()
+        return found | (self._event_variables() if self.event_list else {})
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        own = self.derived()
+        for name in own.keys() & {"wear", "contact_strength"}:
+            own[name] = json.dumps(own[name])
+        for name in own.keys() & _OF_BODIES:
+            own[name] = np.array(own[name], float)  # None, of sliders, is nan
+        return super().attributes() | own | {"provenance": self._made(), "warnings": list(self.warnings)}
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Response:
+        """Return the response in a file: all but `final` and `contact_work`."""
+        given = cls.given(values, attributes, path)
+        scene = given["provenance"].pop("scene", None)
+        kept = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
+        for name in attributes.keys() & set(_OF_BODIES):
+            numbers = np.asarray(attributes[name], float).tolist()
+            given[name] = tuple(None if np.isnan(number) else number for number in numbers)
+        of_events = {name.removeprefix("event_"): values[name] for name in values if name.startswith("event_")}
+        columns = zip(*(column.tolist() for column in of_events.values()), strict=True)
+        unknown = {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}  # of earlier files
+        return cls(
+            event_list=[Event(**dict(zip(of_events, row, strict=True)), **unknown) for row in columns],
+            time=values.get("time", np.zeros(0)), displacement=values.get("displacement", np.zeros(0)),
+            body_displacement=values.get("body_displacement", np.zeros((0, 0))), in_plane=PlanarSamples.of(values),
+            wear=tuple(ContactWear(**one) for one in kept["wear"]) if "wear" in kept else None,
+            contacts=tuple(ContactStrength(**one) for one in kept["contact_strength"])
+            if "contact_strength" in kept else None,
+            stress=tuple(SpotStress.of(name, facts, kept.get("strength", {}).get(name, {}))
+                         for name, facts in kept["stress"].items()) if "stress" in kept else None,
+            sectors=SectorResponse.of(values, kept["sectors"]) if "sectors" in kept else None,
+            scene=None if scene is None else validate(Scene, scene, path), **given,
+        )  # fmt: skip
 
     def _event_variables(self) -> dict[str, Variable]:
         units = {

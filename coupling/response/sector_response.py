@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +48,12 @@ class SectorResponse:
     def __post_init__(self) -> None:
         for name in BY_SECTOR:
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], data: Mapping[str, Any]) -> SectorResponse:
+        """Return the record in the variables of a file, and in what `to_json` gives."""
+        arrays = {name: values[f"sector_{name}"] for name in BY_SECTOR}
+        return cls(**arrays, sampling_error=data.get("sampling_error", 0.0), tuned=data["tuned"])
 
     @property
     def largest(self) -> int:

@@ -62,6 +62,16 @@ class SpotStress:
     sampling_error: float = 0.0
     mesh_error: float | None = None
 
+    @classmethod
+    def of(cls, name: str, data: Mapping[str, Any], strength: Mapping[str, Any]) -> SpotStress:
+        """Return the record of `to_json`, with the strength beside it."""
+        given = {key: value for key, value in data.items() if key != "strength_fraction"}
+        for key in ("amplitude", "amplitude_max", "mean", "static"):  # a file has the components by their names' order
+            given[key] = given[key] and {component: given[key][component] for component in COMPONENTS}
+        for key in ("mean", "static"):
+            given[key] = given[key] and np.array(list(given[key].values()))
+        return cls(name=name, strength=strength, **given)
+
     @property
     def strength_fraction(self) -> float | None:
         """Amplitude of von Mises stress over the fatigue strength; None without a strength."""

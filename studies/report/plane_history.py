@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.response.response import Event, PlanarSamples, Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 
@@ -50,28 +49,25 @@ class ImpactsAtPlace:
         return f"{surface}<br>{corners.get(self.corner, words) if self.four else words}".removesuffix("<br>")
 
 
-def impacts_by_place(values: Mapping[str, Any], begin: float, scene: Scene | None = None) -> list[ImpactsAtPlace]:
-    """Return the impacts from a time (s) on, by contact; empty for a file without events of bodies in the plane.
+def impacts_by_place(response: Response, scene: Scene | None = None) -> list[ImpactsAtPlace]:
+    """Return the impacts of the evaluated periods, by contact; empty for a run without events of bodies in the plane.
 
     scene: of the run; without one bodies count as blocks.
     """
-    if "event_corner" not in values:
+    if response.tilt_max is None:
         return []
-    counted = (np.asarray(values["event_kind"]) == "impact") & (values["event_time"] >= begin)
-    names = np.asarray(values["event_damper"]), np.asarray(values["event_side"]), np.asarray(values["event_corner"])
-    places = set(zip(*(name[counted].tolist() for name in names), strict=True))
-    found = []
-    for body, side, corner in sorted(places, key=lambda place: (place[0], *_walk(place[1], place[2]))):
-        here = counted & (names[0] == body) & (names[1] == side) & (names[2] == corner)
-        found.append(
-            ImpactsAtPlace(
-                body, side, corner, _four(scene, body), int(here.sum()),
-                normal_impulse=float(values["event_impulse"][here].sum()),
-                tangential_impulse=float(np.abs(values["event_tangential_impulse"][here]).sum()),
-                loss=float(values["event_loss"][here].sum()) if "event_loss" in values else np.nan,
-            )
-        )  # fmt: skip
-    return found
+    begin, found = response.transient / response.frequency, dict[tuple[int, str, int], list[Event]]()
+    for event in response.event_list:
+        if event.kind == "impact" and event.time >= begin:
+            found.setdefault((event.damper, event.side, event.corner), []).append(event)
+    return [
+        ImpactsAtPlace(
+            *place, _four(scene, place[0]), len(met), normal_impulse=sum(event.impulse for event in met),
+            tangential_impulse=sum(abs(event.tangential_impulse) for event in met),
+            loss=sum(event.loss for event in met),
+        )
+        for place, met in sorted(found.items(), key=lambda item: (item[0][0], *_walk(item[0][1], item[0][2])))
+    ]  # fmt: skip
 
 
 def _four(scene: Scene | None, body: int) -> bool:
@@ -90,29 +86,6 @@ def _walk(side: str, corner: int) -> tuple[int, int]:
 def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
     """Return the places of impacts, in the order of a counterclockwise walk through the cavity."""
     return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
-
-
-def hits_in(values: Mapping[str, Any]) -> list[tuple[float, tuple[int, str, int]]]:
-    """Return time (s) and place, as of an event, of all impacts; sliders have no corner (-1)."""
-    if "event_kind" not in values:
-        return []
-    columns = [values[f"event_{name}"] for name in ("kind", "time", "damper", "side")]
-    columns.append(values.get("event_corner", np.full(len(columns[0]), -1)))
-    entries = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
-    return [(time, (body, side, corner)) for kind, time, body, side, corner in entries if kind == "impact"]
-
-
-def samples_in_plane(values: Mapping[str, Any]) -> PlanarSamples | None:
-    """Return the samples in the plane; None for a file of sliders, or of a version that kept none."""
-    if "contact_gap" not in values:
-        return None
-    arrays = {name: np.asarray(values[name], float) for name in PlanarSamples._fields if name in values}
-    arrays["contact_closed"] = values["contact_closed"].astype(bool)
-    places = zip(
-        values["contact_damper"].tolist(), values["contact_side"].tolist(), values["contact_corner"].tolist(),
-        strict=True,
-    )  # fmt: skip
-    return PlanarSamples(**arrays, contacts=tuple(places))
 
 
 def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) -> PlanarSamples:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,22 +16,17 @@ from vanedamp.coupling.scene.registration import meets_body
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.store import frozen, load, reader
-from vanedamp.files.toml_input import validate
+from vanedamp.files.store import frozen
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 from vanedamp.studies.report.motion import Motion, motion_of
 from vanedamp.studies.report.plane_history import (
     ImpactsAtPlace,
-    hits_in,
     impacts_by_place,
-    samples_in_plane,
     slider_samples,
 )
 
 _MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
-#: results of a run that are nested data
-_NESTED = ("stress", "strength", "wear", "sectors")
 #: distance of lines of impacts below the displacement, over its range
 _TICKS = 0.07
 
@@ -61,41 +55,25 @@ class History:
     scene: Scene | None
 
     @classmethod
-    @reader
     def load(cls, path: str | Path) -> History:
         """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, "response")
-        provenance = json.loads(attributes.pop("provenance", "{}"))
-        energy = json.loads(attributes.pop("energy", "{}"))
-        strength = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
-        begin = attributes.get("transient", 0) / attributes["frequency"]
-        scene = _scene(provenance["scene"], path) if "scene" in provenance else None
-        return cls(
-            time=frozen(values.get("time", [])),
-            displacement=frozen(values.get("displacement", [])),
-            bodies=frozen(values.get("body_displacement", np.zeros((0, 0)))),
-            plane=samples_in_plane(values),
-            hits=hits_in(values),
-            by_place=impacts_by_place(values, begin, scene),
-            measures=attributes | strength | {"energy": energy},
-            provenance=provenance,
-            scene=scene,
-        )
+        return cls.of(Response.load(path))
 
     @classmethod
     def of(cls, response: Response, scene: Scene | None = None) -> History:
-        """Return the history of a run that kept samples and events."""
+        """Return the history of a run; scene: that of a response that does not say."""
         impacts = (event for event in response.event_list if event.kind == "impact")
+        whole = _unrolled(response.scene or scene)
         return cls(
             time=frozen(response.time),
             displacement=frozen(response.displacement),
             bodies=frozen(response.body_displacement),
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
-            by_place=[],
+            by_place=impacts_by_place(response, whole),
             measures=response.to_json(),
-            provenance={},
-            scene=scene and unrolled(scene),
+            provenance=response.provenance,
+            scene=whole,
         )
 
     @property
@@ -148,10 +126,10 @@ class History:
         return motion_of(self.scene, self.time, self.displacement, self.bodies, plane, self.hits)
 
 
-def _scene(data: Mapping[str, Any], path: str | Path) -> Scene | None:
-    scene = validate(Scene, data, str(path))
+def _unrolled(scene: Scene | None) -> Scene | None:
+    """Return a scene with the bodies of every sector written out; None where its ring is gone."""
     try:
-        return unrolled(scene)
+        return scene and unrolled(scene)
     except (VanedampError, OSError):
         return None
 

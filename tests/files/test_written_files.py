@@ -30,6 +30,7 @@ OF_COMMANDS = {
         "solver", "warnings",
     },
     "ring-modes": {"mistuning", "warnings"},
+    "response": {"event_list"},
     "sweep": {"designs", "headlines"},
 }  # fmt: skip
 IN_FILES = {

@@ -30,8 +30,8 @@ HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_
 
 def load(path: Path) -> Result:
     """Read what `vanedamp run` wrote."""
-    history = History.load(path)
-    return Result.of(history, history.provenance.get("scene"))
+    response = Response.load(path)
+    return Result.of(History.of(response), None if response.scene is None else response.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
@@ -81,7 +81,7 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
     return [
         {"number": number, "tilt": tilt, "lift": lift, "neglected": neglected}
         for number, (tilt, lift, neglected) in enumerate(zip(*figures, strict=True), start=1)
-        if np.isfinite(tilt)
+        if tilt is not None
     ]
 
 
