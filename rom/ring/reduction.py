@@ -30,7 +30,7 @@ def reduce_ring(
     families: int = 3,
     max_frequency: float | None = None,
     part: Part | None = None,
-    centrifugal: sparse.csr_array | None = None,
+    centrifugal: Sequence[sparse.csr_array] | None = None,
     greatest_speed: float = 0.0,
     factorize: Factorize = superlu,
     report: Callable[[int, int], None] | None = None,
@@ -42,7 +42,8 @@ def reduce_ring(
     interface      of one sector, of kinds "average" and "node"
     families       modes of every diameter; or all up to max_frequency, Hz
     part           what deviates (default: the whole sector)
-    centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, with the greatest_speed, rad/s
+    centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, and N/m, what the fourth, sixth, ...
+                   power of a speed over the greatest_speed, rad/s, adds
     report         called with the number of diameters done, and of all
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
@@ -86,7 +87,7 @@ def reduce_ring(
 
 def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
-    centrifugal: sparse.csr_array | None, greatest_speed: float, provenance: dict[str, Any],
+    centrifugal: Sequence[sparse.csr_array] | None, greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
     """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
     fields = np.vstack([one.real_fields for one in waves])
@@ -95,10 +96,10 @@ def _model(
                                                                   for one in waves])  # fmt: skip
     lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
     order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
-    spinning = None
-    if centrifugal is not None:
-        blocks = [_hermitian(one.factor * one.fields.conj() @ (centrifugal @ one.fields.T), one) for one in waves]
-        spinning = linalg.block_diag(*blocks)[np.ix_(order, order)]
+    spinning = []
+    for matrix in centrifugal or ():
+        blocks = [_hermitian(one.factor * one.fields.conj() @ (matrix @ one.fields.T), one) for one in waves]
+        spinning.append(linalg.block_diag(*blocks)[np.ix_(order, order)])
     fields, matrices = fields[order], sector.matrices
     translations = matrices.rigid_translations()
     ring = RingModel(
@@ -108,7 +109,9 @@ def _model(
         directions=interface.directions, normals=interface.normals, positions=interface.positions, arms=interface.arms,
         base_load=fields @ (matrices.mass @ translations), part_load=fields @ (part.mass @ translations),
         stiffness=fields @ (part.stiffness @ fields.T), mass=fields @ (part.mass @ fields.T),
-        damping_ratio=matrices.damping_ratio, centrifugal_stiffness=spinning, greatest_speed=greatest_speed,
+        damping_ratio=matrices.damping_ratio, greatest_speed=greatest_speed,
+        centrifugal_stiffness=spinning[0] if spinning else None,
+        higher_stiffness=np.array(spinning[1:]) if spinning[1:] else None,
         provenance=provenance,
     )  # fmt: skip
     return ring, fields

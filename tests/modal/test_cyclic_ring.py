@@ -63,7 +63,7 @@ def rotating(solids, standing):
     """Their matrices with rotation about the axis of the ring."""
     statics = (RingStatics(of_ring), None)
     both = zip(solids, standing, statics, strict=True)
-    return [solid.rotating(matrices, Z, ORIGIN, given) for solid, matrices, given in both]
+    return [solid.rotating(matrices, Z, ORIGIN, given, SPEED) for solid, matrices, given in both]
 
 
 def test_frequencies_are_those_of_the_whole_mesh(standing):
