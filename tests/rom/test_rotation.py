@@ -25,13 +25,13 @@ from vanedamp.studies.case.stages import assemble, interface, reduction, with_ho
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import main
 
-#: times the angular frequency of the first mode at standstill
-FAST = 0.5
+#: times the angular frequency of the first mode at standstill: it rises by half, and others turn into each other
+FAST = 3.0
 
 
 @pytest.fixture(scope="module")
 def rotating(tmp_path_factory):
-    """A clamped plate whose axis lies across it, oblique to its plane, up to FAST."""
+    """A clamped plate whose axis lies across it, oblique to its plane."""
     block = Block(0.2, 0.05, 0.006, divisions=(8, 2, 1), hexahedra=True)
     solid = Solid(
         build(block, tmp_path_factory.mktemp("plate") / "plate.msh"), {"default": Material(2e11, 0.3, 8000.0)}
@@ -93,20 +93,19 @@ def test_receptance_between_the_speeds_of_the_basis(rotating, bases, model, grea
 
 def test_the_estimate_is_the_error_between_the_speeds(rotating, model):
     estimate = model.provenance["rotation"]
-    (speed,) = estimate["checked"]
-    full = solve_modes(rotating.at(speed), 1).frequencies_hz
-    error = frequency_errors(model.at_speed(speed), full)[0]
+    fulls = [(speed, solve_modes(rotating.at(speed), 1).frequencies_hz) for speed in estimate["checked"]]
+    error = max(frequency_errors(model.at_speed(speed), full)[0] for speed, full in fulls)
     assert 0.5 * error < estimate["frequency"] < 2.0 * error
     assert estimate["met"] and estimate["sentence"].startswith("basis of the speeds 0, ")
 
 
 def test_speeds_are_added_where_the_estimate_asks(rotating, greatest):
-    """A basis of few modes at two speeds misses a tight tolerance; more speeds lower the error."""
-    bases = SpeedBases(rotating, tip(rotating.standing), 2, factorize, quasi_static=0)
+    """A basis of few modes at few speeds misses a tight tolerance; more speeds lower the error."""
+    bases = SpeedBases(rotating, tip(rotating.standing), 2, factorize, quasi_static=1)
     loose = reduce_rotating(bases, greatest, tolerance=0.9).provenance["rotation"]
-    tight = reduce_rotating(bases, greatest, tolerance=0.3 * loose["receptance"]).provenance["rotation"]
+    tight = reduce_rotating(bases, greatest, tolerance=0.2 * loose["receptance"]).provenance["rotation"]
     assert len(tight["speeds"]) > len(loose["speeds"])
-    assert tight["receptance"] < 0.3 * loose["receptance"] and tight["met"]
+    assert tight["receptance"] < 0.2 * loose["receptance"] and tight["met"]
     assert all(
         low < middle < high for (low, high), middle in zip(pairwise(tight["speeds"]), tight["checked"], strict=True)
     )
@@ -121,7 +120,7 @@ def test_smaller_models_keep_what_the_speed_changes(rotating, model, greatest):
     for share in (0.0, 0.5, 1.0):
         full = solve_modes(rotating.at(share * greatest), 3).frequencies_hz
         # at speed the bent plate's bending stretches it, of which the modes that are dropped have a part
-        assert frequency_errors(fewer.at_speed(share * greatest), full).max() < (4e-3 if share else 1e-3)
+        assert frequency_errors(fewer.at_speed(share * greatest), full).max() < (5e-3 if share else 1e-3)
 
 
 def test_natural_modes_are_taken_at_the_speed(model, greatest):
@@ -143,8 +142,9 @@ def test_the_record_keeps_the_rotation(model, greatest, tmp_path):
     again = ReducedModel.load(tmp_path / "rom.h5")
     assert again.greatest_speed == greatest
     assert np.array_equal(again.centrifugal_stiffness, model.centrifugal_stiffness)
+    assert np.array_equal(again.higher_stiffness, model.higher_stiffness) and len(again.higher_stiffness) == 3
     assert np.array_equal(again.rotation_axis, [0.0, 0.6, 0.8]) and again.rotation_point[0] == -0.1
-    assert again.provenance["rotation"]["speeds"] == [0.0, greatest]
+    assert again.provenance["rotation"]["speeds"] == pytest.approx([0.0, np.sqrt(0.5) * greatest, greatest])
 
 
 def test_what_cannot_be_reduced_over_speeds(rotating, bases):
@@ -152,7 +152,7 @@ def test_what_cannot_be_reduced_over_speeds(rotating, bases):
         reduce_rotating(bases, 0.0)
 
 
-def turning_block(folder, text="max_rpm = 20_000.0"):
+def turning_block(folder, text="max_rpm = 60_000.0"):
     """A case of the damped block about an axis along y."""
     path = folder / "case.toml"
     path.write_text(DAMPED_BLOCK + f"[rotation]\naxis = [0, 1, 0]\npoint = [-0.05, 0.0, 0.0]\n{text}\n")
@@ -165,12 +165,12 @@ def test_a_case_is_reduced_for_all_of_its_speeds(tmp_path, capsys):
     command = ["reduce", str(path), "-o", str(tmp_path / "rom.h5"), "--modes", "auto", "--hot-spots", "1"]
     assert main(command) == 0
     said = capsys.readouterr().out
-    assert "basis of the speeds 0, 2094 rad/s: estimated error at 1481 rad/s" in said and "\nat 2094.4 rad/s: " in said
+    assert "basis of the speeds 0, 4443, 6283 rad/s: estimated error at 3142, 5441" in said and "\nat 6283.19 rad/s: " in said
     model = ReducedModel.load(tmp_path / "rom.h5")
     estimate = model.provenance["estimate"]
     assert estimate["met"] and model.modes == estimate["modes"] and "hot1.xx" in model.outputs
     matrices = assemble(Case.load(path)).rotating
-    for speed in (0.0, 1400.0, model.greatest_speed):
+    for speed in (0.0, 4000.0, model.greatest_speed):
         full = solve_modes(matrices.at(speed), 1).frequencies_hz  # one lies below 1.5 times the first
         assert frequency_errors(model.at_speed(speed), full).max() < 1e-4
 
@@ -248,7 +248,7 @@ def test_the_report_shows_the_speeds_of_a_model(tmp_path, capsys):
     assert main(["report", str(tmp_path / "rom.h5"), "-o", str(tmp_path / "report.html")]) == 0
     text = (tmp_path / "report.html").read_text()
     fastest = ReducedModel.load(tmp_path / "rom.h5")
-    assert "It holds up to\n2094.4 rad/s (basis of the speeds 0, 2094 rad/s: " in text
+    assert "It holds up to\n6283.19 rad/s (basis of the speeds 0, 4443, 6283 rad/s: " in text
     assert f"<td>{fastest.at_speed(fastest.greatest_speed).natural_frequencies_hz[0]:.2f}</td>" in text
 
 
