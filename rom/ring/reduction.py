@@ -30,11 +30,12 @@ def reduce_ring(
     families: int = 3,
     max_frequency: float | None = None,
     part: Part | None = None,
-    centrifugal: Sequence[sparse.csr_array] | None = None,
+    centrifugal: sparse.csr_array | None = None,
     greatest_speed: float = 0.0,
     factorize: Factorize = superlu,
     report: Callable[[int, int], None] | None = None,
     basis: str = "modes",
+    higher: Sequence[sparse.csr_array] = (),
 ) -> RingModel | SectorRing:
     """Reduce a ring to its modes of every nodal diameter and the interface of every sector.
 
@@ -42,11 +43,11 @@ def reduce_ring(
     interface      of one sector, of kinds "average" and "node"
     families       modes of every diameter; or all up to max_frequency, Hz
     part           what deviates (default: the whole sector)
-    centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, and N/m, what the fourth, sixth, ...
-                   power of a speed over the greatest_speed, rad/s, adds
+    centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, with the greatest_speed, rad/s
     report         called with the number of diameters done, and of all
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
+    higher         (n, n) N/m each, what the 4th, 6th, ... power of a speed over the greatest adds
 
     The estimate of the error is `estimate` of the provenance: `receptance` of the interface, up to 1.5 times the first
     family's frequencies or the last family's lowest; `deviation`, of squared frequencies per squared deviation;
@@ -60,9 +61,10 @@ def reduce_ring(
         interface = Interface.on_patches(sector.matrices, interface)
     if any(item.kind not in ("average", "node") for item in interface.coordinates):
         raise RingError('interface: patches of a ring are of kind "average" or "node"')
+    by_speed = () if centrifugal is None else (centrifugal, *higher)
     part = part or Part(sector.matrices.stiffness, sector.matrices.mass)
     waves, estimate = ring_waves(
-        sector, interface.vectors.T, families, max_frequency, part, centrifugal, greatest_speed, factorize, report
+        sector, interface.vectors.T, families, max_frequency, part, by_speed, greatest_speed, factorize, report
     )
     provenance = {
         "matrices": dict(sector.matrices.provenance), "basis": basis, "estimate": estimate,
@@ -71,7 +73,7 @@ def reduce_ring(
     made: tuple[RingModel | SectorRing, np.ndarray] = (
         sector_ring(sector, interface, part, waves, factorize, provenance)
         if basis == "sectors"
-        else _model(sector, interface, part, waves, centrifugal, greatest_speed, provenance)
+        else _model(sector, interface, part, waves, by_speed, greatest_speed, provenance)
     )
     ring, fields = made
     errors = deviation_errors(ring, sector, fields, part, factorize)
@@ -87,7 +89,7 @@ def reduce_ring(
 
 def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
-    centrifugal: Sequence[sparse.csr_array] | None, greatest_speed: float, provenance: dict[str, Any],
+    by_speed: Sequence[sparse.csr_array], greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
     """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
     fields = np.vstack([one.real_fields for one in waves])
@@ -97,7 +99,7 @@ def _model(
     lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
     order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
     spinning = []
-    for matrix in centrifugal or ():
+    for matrix in by_speed:
         blocks = [_hermitian(one.factor * one.fields.conj() @ (matrix @ one.fields.T), one) for one in waves]
         spinning.append(linalg.block_diag(*blocks)[np.ix_(order, order)])
     fields, matrices = fields[order], sector.matrices

@@ -65,6 +65,6 @@ def ring_reduction(
     return reduce_ring(
         case.ring.sector(standing, case.rotation), interface(case, standing), families, max_frequency,
         Part(*structure.solid.part(case.ring.deviating)) if case.ring.deviating else None,
-        None if rotating is None else rotating.by_speed, greatest, factorize, report,
-        basis,
+        None if rotating is None else rotating.centrifugal_stiffness, greatest, factorize, report, basis,
+        () if rotating is None else rotating.higher,
     )  # fmt: skip

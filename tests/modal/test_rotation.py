@@ -189,13 +189,13 @@ def test_gyroscopic_modes_against_the_dense_problem(tmp_path):
 
 def test_missed_modes_are_counted(beam, monkeypatch):
     """A result without the lowest mode does not pass, whichever way the modes are counted."""
-    speed = 0.1 * FLAP[0] * UNIT
-    rotating = beam.rotating(beam.assemble({"root": "xyz"}, 0.0), [1, 0, 0], [0.0, 0.0, 0.5 * SIDE], speed=speed)
+    slow = 0.1 * FLAP[0] * UNIT
+    rotating = beam.rotating(beam.assemble({"root": "xyz"}, 0.0), [1, 0, 0], [0.0, 0.0, 0.5 * SIDE], speed=slow)
     complete = gyroscopic._converged
     assert gyroscopic_modes(foucault(3.0, 100.0, 160.0), 90.0, 1).frequencies_hz > 0.0
     monkeypatch.setattr(gyroscopic, "_converged", lambda *given: tuple(np.delete(a, 0, -1) for a in complete(*given)))
     # the beam's first modes leave a gap of more than 2 W, those of the mass do not
-    for structure, speed, count in ((rotating, speed, 2), (foucault(3.0, 100.0, 160.0), 90.0, 1)):
+    for structure, speed, count in ((rotating, slow, 2), (foucault(3.0, 100.0, 160.0), 90.0, 1)):
         with pytest.raises(SolverError, match=r"modes found below .* Hz at"):
             gyroscopic_modes(structure, speed, count)
 

@@ -165,7 +165,10 @@ def test_a_case_is_reduced_for_all_of_its_speeds(tmp_path, capsys):
     command = ["reduce", str(path), "-o", str(tmp_path / "rom.h5"), "--modes", "auto", "--hot-spots", "1"]
     assert main(command) == 0
     said = capsys.readouterr().out
-    assert "basis of the speeds 0, 4443, 6283 rad/s: estimated error at 3142, 5441" in said and "\nat 6283.19 rad/s: " in said
+    assert (
+        "basis of the speeds 0, 4443, 6283 rad/s: estimated error at 3142, 5441" in said
+        and "\nat 6283.19 rad/s: " in said
+    )
     model = ReducedModel.load(tmp_path / "rom.h5")
     estimate = model.provenance["estimate"]
     assert estimate["met"] and model.modes == estimate["modes"] and "hot1.xx" in model.outputs
