@@ -92,7 +92,8 @@ def campbell(
             approaches=tuple(approaches),
             gyroscopic=gyroscopic,
             warnings=tuple(warnings),
-            provenance=dict(rotating.standing.provenance) | {"neglected": neglected},
+            provenance=rotating.standing.provenance,
+            neglected=neglected,
         )
 
 
@@ -101,8 +102,8 @@ def neglected_notes(error: float) -> list[str]:
     if error <= _NOTABLE:
         return []
     return [
-        f"between the speeds of the centrifugal equilibria, frequencies are estimated to be wrong by up to "
-        f"{100.0 * error:.2g} %: the structure bends much; a lower highest speed makes it smaller"
+        f"between standstill and the highest speed, frequencies are estimated to be wrong by up to {100.0 * error:.2g} "
+        "%, since the structure bends much; a lower highest speed makes it smaller"
     ]
 
 

@@ -79,7 +79,8 @@ def ring_campbell(
         approaches=(),
         gyroscopic=gyroscopic,
         warnings=tuple(warnings),
-        provenance=dict(rotating.standing.provenance) | {"neglected": neglected},
+        provenance=rotating.standing.provenance,
+        neglected=neglected,
         diameters=np.array([curve.diameter for curve in curves]),
         families=np.array([curve.family for curve in curves]),
     )

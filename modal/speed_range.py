@@ -238,6 +238,7 @@ class SpeedRange:
         return SpeedModes(speed, frequencies[: self.count], vectors[:, : self.count])
 
     def _coupling(self, modes: SpeedModes) -> np.ndarray:
+        assert self.small.coupling is not None
         return np.asarray((1j * _form(self.small.coupling, modes.shapes)).real)
 
     def _inertia(self, modes: SpeedModes, speed: float) -> np.ndarray:

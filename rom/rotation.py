@@ -208,6 +208,6 @@ def _sentence(
     if not neglected:
         return sentence
     return (
-        f"{sentence}; between the speeds of the centrifugal equilibria {100 * neglected:.1g} % of natural frequencies "
-        "for the shape there"
+        f"{sentence}; {100 * neglected:.1g} % of natural frequencies for the shape between standstill and "
+        f"{speeds[-1]:.4g} rad/s"
     )

@@ -90,6 +90,8 @@ class Campbell(Plotted):
     warnings        where modes could not be followed, or are not among those computed
     diameters       of a ring, (m,) nodal diameters of the modes, -h of the wave that runs with the turn; else empty
     families        of a ring, (m,) order within the diameter, from 0, in which curves of a diameter do not cross
+    neglected       largest estimated relative error of a frequency, for the shape of the structure between the speeds
+                    of its equilibria
     """
 
     speeds: np.ndarray
@@ -107,6 +109,7 @@ class Campbell(Plotted):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     diameters: np.ndarray = field(default_factory=lambda: np.empty(0))
     families: np.ndarray = field(default_factory=lambda: np.empty(0))
+    neglected: float = 0.0
 
     def __post_init__(self) -> None:
         for name, (_, _, _, dtype) in (_ARRAYS | _OF_RING).items():
@@ -152,6 +155,7 @@ class Campbell(Plotted):
             "operating": self.operating,
             "approaches": [asdict(approach) | {"rpm": approach.rpm} for approach in self.approaches],
             "error": self.error,
+            "neglected": self.neglected,
             "solved": self.solved.tolist(),
             "gyroscopic": self.gyroscopic,
             "warnings": list(self.warnings),
@@ -170,7 +174,8 @@ class Campbell(Plotted):
                 values = np.array([getattr(row, name) for row in rows], dtype=dtype)
                 variables[f"{kind}_{name}"] = store.Variable(values, (kind,), units)
         attributes = {
-            "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance)
+            "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance),
+            "neglected": self.neglected,
         }  # fmt: skip
         if self.operating is not None:
             attributes["operating"] = list(self.operating)
@@ -198,6 +203,7 @@ class Campbell(Plotted):
             operating=tuple(attributes["operating"]) if "operating" in attributes else None,
             warnings=tuple(json.loads(attributes["warnings"])),
             provenance=json.loads(attributes["provenance"]),
+            neglected=float(attributes.get("neglected", 0.0)),
         )
 
 

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import eigsh, spsolve
 from skfem.quadrature import get_quadrature_tet
 
 _EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-_NEWTON_STEPS = 5
+_NEWTON_STEPS = 8
 
 
 def frequencies(solid, fixed, material, axis, point, speed, count):
