@@ -34,7 +34,8 @@ class ExtensionPoint(NamedTuple):
     A part is a module, or any object with the attributes.
 
     kind        in words, for messages
-    package     each module of which is a part; folders: each package of which is one; or a module with PARTS by name
+    package     each module of which is a part; folders: each package of which is one, or its module `inside`; or a
+                module with PARTS by name
     group       of entry points, named like the parts
     attributes  that a part must have; it may have a NAME other than its file's, and an ORDER among the others
     """
@@ -44,6 +45,7 @@ class ExtensionPoint(NamedTuple):
     group: str
     attributes: tuple[str, ...]
     folders: bool = False
+    inside: str = ""
 
     def own(self) -> dict[str, Any]:
         """Return the parts of our own folder by name, in their order."""
@@ -53,7 +55,7 @@ class ExtensionPoint(NamedTuple):
         parts = {}
         for _, name, is_folder in pkgutil.iter_modules(import_module(self.package).__path__):
             if is_folder is self.folders:
-                part = import_module(f"{self.package}.{name}")
+                part = import_module(f"{self.package}.{name}{self.inside}")
                 parts[getattr(part, "NAME", name)] = part
         return _in_order(parts)
 

@@ -93,7 +93,7 @@ def campbell(
             gyroscopic=gyroscopic,
             warnings=tuple(warnings),
             provenance=rotating.standing.provenance,
-            neglected=neglected,
+            neglected=neglected or None,
         )
 
 

@@ -80,7 +80,7 @@ def ring_campbell(
         gyroscopic=gyroscopic,
         warnings=tuple(warnings),
         provenance=rotating.standing.provenance,
-        neglected=neglected,
+        neglected=neglected or None,
         diameters=np.array([curve.diameter for curve in curves]),
         families=np.array([curve.family for curve in curves]),
     )

@@ -167,8 +167,8 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
     expected = pencil.below(ceiling)
     if expected < last:
         raise SolverError(
-            f"{last} modes found where the factors count {expected}: round-off is as large as stiffnesses; look at units "
-            "and at dimensions of very different size"
+            f"{last} modes found where the factors count {expected}: round-off is as large as stiffnesses; "
+            "look at units and at dimensions of very different size"
         )
     if expected != last:
         # copies of a multiple eigenvalue that the Krylov space of a narrow block does not hold

@@ -1,10 +1,10 @@
-"""The kinds of input files by name, as `vanedamp schema`, `new` and `check` know them, and those of result files."""
+"""The kinds of input files by name, as `vanedamp schema`, `new` and `check` know them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing
@@ -56,44 +56,6 @@ _MESH = "a mesh, which a case names in [mesh] file"
 _OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a page"} | dict.fromkeys(
     (".msh", ".inp", ".bdf", ".nas", ".unv"), _MESH
 )
-
-
-class ResultKind(NamedTuple):
-    """A kind of result files: in words, the commands that write them, and the class of their content in Python."""
-
-    about: str
-    commands: tuple[str, ...]
-    record: str | None
-
-
-#: by the attribute `kind` of the file
-RESULT_KINDS = {
-    "modes": ResultKind("a modal analysis", ("modal",), "vanedamp.Modes"),
-    "calibration": ResultKind(
-        "a case calibrated with measurements", ("calibrate",), "vanedamp.studies.case.calibration.Calibration"
-    ),
-    "campbell": ResultKind("a Campbell diagram", ("campbell",), "vanedamp.Campbell"),
-    "ring-modes": ResultKind("the modes of a ring", ("ring",), "vanedamp.Interference"),
-    "reduced-model": ResultKind("the reduced model of a structure", ("reduce", "import"), "vanedamp.ReducedModel"),
-    "ring-model": ResultKind("the reduced model of a ring", ("reduce",), "vanedamp.RingModel"),
-    "ring-sectors": ResultKind(
-        "the reduced model of a ring, by sectors", ("reduce",), "vanedamp.rom.ring.sector_ring.SectorRing"
-    ),
-    "mistuning": ResultKind("amplification of a mistuned ring", ("ring",), "vanedamp.MistuningStudy"),
-    "response": ResultKind("the response of a scene", ("run",), "vanedamp.Response"),
-    "sweep": ResultKind("responses of a scene over a grid", ("sweep",), "vanedamp.Sweep"),
-    "ensemble": ResultKind("responses of a scene over samples of its ranges", ("run", "sweep"), "vanedamp.Ensemble"),
-    "orbits": ResultKind("branches of periodic orbits", ("orbits",), "vanedamp.Branches"),
-    "ramp": ResultKind("run-ups and run-downs", ("ramp",), "vanedamp.Ramp"),
-    "ring_down": ResultKind("a ring-down", ("ringdown",), "vanedamp.RingDown"),
-    "optimisation": ResultKind("an optimisation", ("optimise",), "vanedamp.studies.optimisation.record.Optimisation"),
-    "life": ResultKind("the life of a damper", ("life",), "vanedamp.LifeRecord"),
-    "identification": ResultKind("parameters of a scene from measurements", ("identify",), "vanedamp.Identification"),
-    "deviations": ResultKind(
-        "deviations of a ring's sectors from measurements", ("identify",), "vanedamp.rom.ring.identification.Identified"
-    ),
-    "system-matrices": ResultKind("matrices of finite elements", (), "vanedamp.SystemMatrices"),
-}
 
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:

@@ -99,7 +99,7 @@ from vanedamp.studies.life.study import LifeStudy as LifeStudy
 
 # Output: pipelines from a case to a report, charts, files of other programs
 from vanedamp.studies.pipeline.pipeline import pipeline as pipeline
-from vanedamp.studies.report.plot import plot as plot
+from vanedamp.studies.kinds.plot import plot as plot
 from vanedamp.studies.export.export import export as export
 
 # Errors: bad input and failures

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
-from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.further import STRESSES, WEARS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import MEASURES
 from vanedamp.files.display import Plotted
+from vanedamp.files.record import Own, Record
 from vanedamp.files.store import Variable, frozen
 
 #: of models with hot spots, of their worst one, and of scenes with [wear], and their units
@@ -37,7 +38,7 @@ COMPLETE, _MOST_SAMPLES = 0.9, 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(SceneRecord, Plotted):
+class Ensemble(Record, Plotted):
     """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers.
 
     scene     the scene with its ranges
@@ -57,13 +58,14 @@ class Ensemble(SceneRecord, Plotted):
     """
 
     KIND: ClassVar[str] = "ensemble"
-    scene: Scene
-    axes: Mapping[str, np.ndarray]
-    samples: Mapping[str, np.ndarray]
-    members: Mapping[str, np.ndarray]
-    status: np.ndarray
-    quantile: Mapping[str, np.ndarray]
-    indices: Mapping[str, np.ndarray]
+    IN_JSON = ()
+    scene: SceneField
+    axes: Annotated[Mapping[str, np.ndarray], Own()]
+    samples: Annotated[Mapping[str, np.ndarray], Own()]
+    members: Annotated[Mapping[str, np.ndarray], Own()]
+    status: Annotated[np.ndarray, Own()]
+    quantile: Annotated[Mapping[str, np.ndarray], Own()]
+    indices: Annotated[Mapping[str, np.ndarray], Own()]
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -119,8 +121,8 @@ class Ensemble(SceneRecord, Plotted):
         share = float(np.isin(top, (self.axes[swept].min(), self.axes[swept].max())).mean())
         return f"; in {share:.0%} of the samples the peak lies at an edge of the range" if share else ""
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data: axes, ranges, quantiles and indices; the file has all members."""
+    def derived(self) -> dict[str, Any]:
+        """Return axes, ranges, quantiles and indices; the file has all members."""
         own = {path: values.tolist() for path, values in self.axes.items()}
         units = {path: unit_of(path) for path in (*self.axes, *self.samples)} | AT_POINTS | OF_CURVES
         return {
@@ -161,12 +163,12 @@ class Ensemble(SceneRecord, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        return {"axes": list(self.axes), "scene": self.scene.to_dict(), "provenance": dict(self.provenance)}
+        return super().attributes() | {"axes": list(self.axes)}
 
     @classmethod
-    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ensemble:
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
         """Return the record in the variables and attributes of a file."""
-        given = cls.common(attributes, path)
+        given = cls.given(values, attributes, path)
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
         own = (*AT_POINTS, *OF_CURVES)
         return cls(

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.orbits.border import Border, borders_of
 from vanedamp.coupling.orbits.border import variables as border_variables
 from vanedamp.coupling.orbits.newton import MEASURES, Orbit
-from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import stress_axes
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
+from vanedamp.files.record import Array, Own, Record
 from vanedamp.files.store import Variable, frozen
 
 FLAGS = ("stable", "symmetric", "undetermined")
@@ -127,7 +127,7 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches(SceneRecord, Plotted):
+class Branches(Record, Plotted):
     """Branches of periodic orbits of a scene over one of its numbers.
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
@@ -138,15 +138,16 @@ class Branches(SceneRecord, Plotted):
     """
 
     KIND: ClassVar[str] = "orbits"
-    scene: Scene
-    names: tuple[str, ...]
-    scale: np.ndarray
-    branches: tuple[Branch, ...]
+    IN_JSON = ("iterations", "warnings")
+    scene: SceneField
+    names: Annotated[tuple[str, ...], Array(("coordinate",), dtype=object, name="coordinate", json="names")]
+    scale: Annotated[np.ndarray, Array(("coordinate",))]
+    branches: Annotated[tuple[Branch, ...], Own()]
     iterations: int
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    borders: tuple[Border, ...] = ()
-    stress: np.ndarray | None = None
+    borders: Annotated[tuple[Border, ...], Own()] = ()
+    stress: Annotated[np.ndarray | None, Array(("point", "hot_spot", "stress_measure"), "Pa")] = None
 
     @property
     def second(self) -> str:
@@ -160,8 +161,8 @@ class Branches(SceneRecord, Plotted):
         assert self.scene.orbit is not None
         return self.scene.orbit.parameter
 
-    def to_json(self) -> dict[str, Any]:
-        """Return a summary as plain data: branches and special points."""
+    def derived(self) -> dict[str, Any]:
+        """Return a summary of branches, special points and borders."""
         special = [
             {
                 "branch": number, "index": point.index, "parameter": point.parameter, "kind": point.kind,
@@ -173,7 +174,6 @@ class Branches(SceneRecord, Plotted):
         return {
             "parameter": self.parameter, "unit": unit_of(self.parameter),
             "branches": [branch.to_json() for branch in self.branches], "special_points": special,
-            "iterations": self.iterations, "warnings": list(self.warnings),
             "second": self.second, "borders": [border.to_json() for border in self.borders],
         }  # fmt: skip
 
@@ -199,9 +199,7 @@ class Branches(SceneRecord, Plotted):
             "source_special": np.array([source[1] for source in sources], int),
         }
         states = np.reshape([point.state for _, point in special], (len(special), len(self.names)))
-        return {
-            "coordinate": Variable(np.array(self.names, object), ("coordinate",)),
-            "scale": Variable(self.scale, ("coordinate",)),
+        return super().variables() | {
             "state": Variable(state, ("point", "coordinate")),
             "multiplier_real": Variable(multipliers.real, ("point", "multiplier")),
             "multiplier_imag": Variable(multipliers.imag, ("point", "multiplier")),
@@ -210,24 +208,18 @@ class Branches(SceneRecord, Plotted):
             "special_state": Variable(states, ("special", "coordinate")),
             **{name: Variable(values, ("special",)) for name, values in of_special.items()},
             **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
-            **self._stress_variables(),
+            **({} if self.stress is None else stress_axes(list(self.provenance["hot_spots"]))),
             **border_variables(self.borders, (unit, unit_of(self.second)), len(self.names)),
         }
 
-    def _stress_variables(self) -> dict[str, Variable]:
-        if self.stress is None:
-            return {}
-        dims = ("point", "hot_spot", "stress_measure")
-        return stress_axes(list(self.provenance["hot_spots"])) | {"stress": Variable(self.stress, dims, "Pa")}
-
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        return super().attributes() | {"parameter_path": self.parameter, "iterations": self.iterations}
+        return super().attributes() | {"parameter_path": self.parameter}
 
     @classmethod
-    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Branches:
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Branches:
         """Return the record in the variables and attributes of a file."""
-        values["multipliers"] = values["multiplier_real"] + 1j * values["multiplier_imag"]
+        values = dict(values) | {"multipliers": values["multiplier_real"] + 1j * values["multiplier_imag"]}
         branches = []
         for number, periods in enumerate(values["periods"]):
             own = values["branch_of_point"] == number
@@ -247,7 +239,5 @@ class Branches(SceneRecord, Plotted):
                 )
             )  # fmt: skip
         return cls(
-            names=tuple(values["coordinate"]), scale=frozen(values["scale"]), branches=tuple(branches),
-            iterations=int(attributes["iterations"]), borders=borders_of(values),
-            stress=frozen(values["stress"]) if "stress" in values else None, **cls.common(attributes, path),
+            branches=tuple(branches), borders=borders_of(values), **cls.given(values, attributes, path),
         )  # fmt: skip

@@ -5,18 +5,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, SECTORS, STRESSES, WEARS, WORDS
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Plotted, html_table
+from vanedamp.files.record import Own, Record
 from vanedamp.files.store import Variable, frozen
 from vanedamp.rom.recovery import COMPONENTS
 
@@ -34,8 +34,12 @@ _SHOWN = (
 _MOST_ROWS = 20
 
 
+_Own = Annotated[np.ndarray, Own()]
+_Owned = Annotated[Mapping[str, np.ndarray], Own()]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(SceneRecord, Plotted):
+class Sweep(Record, Plotted):
     """Responses over the product of the axes; every array has the shape of the grid, in the axes' order.
 
     scene                 the scene of the sweep, with its [sweep] table
@@ -76,31 +80,32 @@ class Sweep(SceneRecord, Plotted):
     """
 
     KIND: ClassVar[str] = "sweep"
-    scene: Scene
-    axes: Mapping[str, np.ndarray]
-    amplitude_max: np.ndarray
-    amplitude_mean: np.ndarray
-    amplitude_mean_confidence: np.ndarray
-    amplitude_max_dynamic: np.ndarray
-    amplitude_mean_dynamic: np.ndarray
-    amplitude_rms: np.ndarray
-    amplitude_harmonic: np.ndarray
-    amplitude_undamped: np.ndarray
-    amplitude_fixed: np.ndarray
-    impacts_per_period: np.ndarray
-    attached_mass_fraction: np.ndarray
-    energy_share: np.ndarray
-    energy_residual: np.ndarray
-    penetration: np.ndarray
-    status: np.ndarray
-    classification: np.ndarray
-    in_plane: Mapping[str, np.ndarray] = field(default_factory=dict)
-    exponents: Mapping[str, np.ndarray] = field(default_factory=dict)
-    sections: Mapping[str, np.ndarray] = field(default_factory=dict)
-    stress: Mapping[str, np.ndarray] = field(default_factory=dict)
-    wear: Mapping[str, np.ndarray] = field(default_factory=dict)
-    sectors: Mapping[str, np.ndarray] = field(default_factory=dict)
-    peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
+    IN_JSON = ()
+    scene: SceneField
+    axes: _Owned
+    amplitude_max: _Own
+    amplitude_mean: _Own
+    amplitude_mean_confidence: _Own
+    amplitude_max_dynamic: _Own
+    amplitude_mean_dynamic: _Own
+    amplitude_rms: _Own
+    amplitude_harmonic: _Own
+    amplitude_undamped: _Own
+    amplitude_fixed: _Own
+    impacts_per_period: _Own
+    attached_mass_fraction: _Own
+    energy_share: _Own
+    energy_residual: _Own
+    penetration: _Own
+    status: _Own
+    classification: _Own
+    in_plane: _Owned = field(default_factory=dict)
+    exponents: _Owned = field(default_factory=dict)
+    sections: _Owned = field(default_factory=dict)
+    stress: _Owned = field(default_factory=dict)
+    wear: _Owned = field(default_factory=dict)
+    sectors: _Owned = field(default_factory=dict)
+    peaks: _Owned = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -116,7 +121,7 @@ class Sweep(SceneRecord, Plotted):
         return usual[0] if usual else max(lengths, key=lengths.__getitem__)
 
     @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]  # others have it as a field
+    def warnings(self) -> tuple[str, ...]:
         """To be read before results are used."""
         return tuple(self.provenance.get("warnings", ()))
 
@@ -148,8 +153,8 @@ class Sweep(SceneRecord, Plotted):
         """Return the unit of every axis by its path."""
         return {path: unit_of(path) for path in self.axes}
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""
+    def derived(self) -> dict[str, Any]:
+        """Return axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
         notes = {"warnings": list(self.warnings)}
         kept = ("estimate", "advice", "moved_starts")
@@ -196,16 +201,15 @@ class Sweep(SceneRecord, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        return {"axes": list(self.axes), "scene": self.scene.to_dict(), "provenance": dict(self.provenance)}
+        return super().attributes() | {"axes": list(self.axes)}
 
     @classmethod
-    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Sweep:
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Sweep:
         """Return the record in the variables and attributes of a file."""
-        for name in ("amplitude_max", "amplitude_mean"):  # all that earlier files have
-            values.setdefault(f"{name}_dynamic", values[name])
-        values.setdefault("penetration", np.full(np.shape(values["status"]), np.nan))
+        earlier = {f"{name}_dynamic": values[name] for name in ("amplitude_max", "amplitude_mean")}
+        values = earlier | {"penetration": np.full(np.shape(values["status"]), np.nan)} | dict(values)
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
-        given = cls.common(attributes, path)
+        given = cls.given(values, attributes, path)
         given |= {name: frozen(values[name]) for name in (*MEASURES, "energy_share")}
         given |= {name: frozen(values[name], object) for name in ("status", "classification")}
         return cls(

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
+from vanedamp.files.record import Own, Record
 from vanedamp.files.store import Variable, frozen
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class RampRun:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ramp(SceneRecord, Plotted):
+class Ramp(Record, Plotted):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
@@ -101,9 +101,10 @@ class Ramp(SceneRecord, Plotted):
     """
 
     KIND: ClassVar[str] = "ramp"
-    scene: Scene
-    runs: tuple[RampRun, ...]
-    curves: Mapping[str, np.ndarray]
+    IN_JSON = ("warnings",)
+    scene: SceneField
+    runs: Annotated[tuple[RampRun, ...], Own()]
+    curves: Annotated[Mapping[str, np.ndarray], Own()]
     tops: Mapping[str, float]
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -127,7 +128,7 @@ class Ramp(SceneRecord, Plotted):
         width, leaving = self.tops["half_power_width"], self.tops["detuning_rate"]
         return 2 * abs(run.rate) * leaving / (np.pi * width**2) if width > 0.0 else np.nan
 
-    def to_json(self) -> dict[str, Any]:
+    def derived(self) -> dict[str, Any]:
         """Return peaks, energies and status of each run as plain data (nan where there is none)."""
         runs = [
             {
@@ -142,7 +143,6 @@ class Ramp(SceneRecord, Plotted):
         ]  # fmt: skip
         return {
             "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
-            "warnings": list(self.warnings),
         }  # fmt: skip
 
     def tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
@@ -201,13 +201,13 @@ class Ramp(SceneRecord, Plotted):
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
         strength = {str(number): run.strength for number, run in enumerate(self.runs) if run.strength}
-        return super().attributes() | {"tops": dict(self.tops)} | ({"strength": strength} if strength else {})
+        return super().attributes() | ({"strength": strength} if strength else {})
 
     @classmethod
-    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> Ramp:
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ramp:
         """Return the record in the variables and attributes of a file."""
-        given = cls.common(attributes, path)
-        values.setdefault("amplitude_dynamic", values["amplitude"])  # all that earlier files have
+        given = cls.given(values, attributes, path)
+        values = {"amplitude_dynamic": values["amplitude"]} | dict(values)  # all that earlier files have
         runs, strength = [], json.loads(attributes.get("strength", "{}"))
         for number, rate in enumerate(values["rate"]):
             inside, starts = values["run_of_period"] == number, values["run_of_start"] == number
@@ -225,7 +225,7 @@ class Ramp(SceneRecord, Plotted):
             )  # fmt: skip
         return cls(
             runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
-            tops=json.loads(attributes["tops"]), **given,
+            **given,
         )  # fmt: skip
 
     def to_xarray(self) -> xarray.Dataset:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.scene_record import SceneRecord
+from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.record import Array, Record
+from vanedamp.files.store import Variable
 
 #: energies of a ring-down: at its start, lost, and at its end
 PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
@@ -38,47 +37,50 @@ class LinearMode:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingDown(SceneRecord, Plotted):
-    """The free motion of one natural mode, by its k turning points.
-
-    scene: with its [ring_down] table; linear: the mode without bodies
-    duration            s, of the free motion
-    time                (k,) s of the turning points, from the start of the free motion
-    displacement        (k,) m there, the mode's contribution at excitation.at
-    energy              (k,) J there, of structure, bodies and springs
-    structure_energy    (k,) J there, of all modes of the structure
-    impacts             (k - 1,) in each half cycle
-    rest_time           s, at which the mode comes to rest; None if it moves to the end
-    energies            J over the free motion: initial, viscous, friction, impact, contact and left
-    energy_residual     imbalance of the energies, relative to its largest term
-    drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
-    stress              (p, s, 8) Pa, amplitudes of stress in each of p periods of `duration` at s hot spots, by
-                        response.spot_stress.MEASURES; None without any
-    strength            utilisation and damage of the motion, by hot spot (strength.assessment)
-    estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
-    """
+class RingDown(Record, Plotted):
+    """The free motion of one natural mode, by its k turning points; in JSON, names have units."""
 
     KIND: ClassVar[str] = "ring_down"
-    scene: Scene
+    IN_JSON = ("status", "energy_residual", "drive", "wall_time_s", "warnings")
+    scene: SceneField
+    """with its [ring_down] table"""
     status: Status
     linear: LinearMode
+    """the mode without bodies"""
     duration: float
-    time: np.ndarray
-    displacement: np.ndarray
-    energy: np.ndarray
-    structure_energy: np.ndarray
-    impacts: np.ndarray
-    rest_time: float | None
+    """of the free motion [s]"""
+    time: Annotated[np.ndarray, Array(("turning_point",), "s")]
+    """of the turning points, from the start of the free motion"""
+    displacement: Annotated[np.ndarray, Array(("turning_point",), "m")]
+    """there, the mode's contribution at excitation.at"""
+    energy: Annotated[np.ndarray, Array(("turning_point",), "J")]
+    """there, of structure, bodies and springs"""
+    structure_energy: Annotated[np.ndarray, Array(("turning_point",), "J")]
+    """there, of all modes of the structure"""
+    impacts: Annotated[np.ndarray, Array(("half_cycle",), dtype=int)]
+    """in each half cycle"""
     energies: dict[str, float]
+    """over the free motion: initial, viscous, friction, impact, contact and left [J]"""
     energy_residual: float
-    drive: dict[str, Any] | None
+    """imbalance of the energies, relative to its largest term"""
     wall_time_s: float
+    rest_time: float | None = None
+    """at which the mode comes to rest; None if it moves to the end [s]"""
+    drive: dict[str, Any] | None = None
+    """of the steady response before: status, frequency_hz, amplitude_mean_m, classification"""
     estimate: dict[str, Any] | None = None
+    """as in Response"""
     advice: dict[str, Any] | None = None
+    """as in Response"""
     warnings: tuple[str, ...] = ()
+    """to be read before results are used"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    stress: np.ndarray | None = None
+    """versions and further data of the caller (JSON-able)"""
+    stress: Annotated[np.ndarray | None, Array(("period", "hot_spot", "stress_measure"), "Pa")] = None
+    """amplitudes of stress in each of the periods of `duration` at the hot spots, by response.spot_stress.MEASURES;
+    None without any"""
     strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """utilisation and damage of the motion, by hot spot (strength.assessment)"""
 
     @property
     def table(self) -> RingDownTable:
@@ -110,15 +112,14 @@ class RingDown(SceneRecord, Plotted):
             "damping_ratio_energy": bins(whole.amplitude, whole.damping_ratio_energy, edges, stride),
         }
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the result as plain data, with units in the names."""
+    def derived(self) -> dict[str, Any]:
+        """Return turning points, half cycles, cycles and bins, and further numbers by names with units."""
         half, whole = self.half_cycles, self.cycles
         hertz = {"frequency": "frequency_hz", "fixed_frequency": "fixed_frequency_hz"}
         linear = {hertz.get(name, name): value for name, value in asdict(self.linear).items()}
         data: dict[str, Any] = {
-            "status": self.status.value, "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time,
-            "energies_j": self.energies, "energy_residual": self.energy_residual,
-            "drive": self.drive, "wall_time_s": self.wall_time_s, "warnings": list(self.warnings),
+            "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time,
+            "energies_j": {name: self.energies[name] for name in PARTS if name in self.energies},
             "turning_points": {
                 "time_s": self.time.tolist(), "displacement_m": self.displacement.tolist(),
                 "energy_j": self.energy.tolist(),
@@ -150,15 +151,10 @@ class RingDown(SceneRecord, Plotted):
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: turning points, half cycles, windows of cycles, and bins if there are any."""
         half, whole = self.half_cycles, self.cycles
-        found = {
-            "time": Variable(self.time, ("turning_point",), "s"),
-            "displacement": Variable(self.displacement, ("turning_point",), "m"),
-            "energy": Variable(self.energy, ("turning_point",), "J"),
-            "structure_energy": Variable(self.structure_energy, ("turning_point",), "J"),
+        found = super().variables() | {
             "half_cycle_time": Variable(half.time, ("half_cycle",), "s"),
             "half_cycle_amplitude": Variable(half.amplitude, ("half_cycle",), "m"),
             "frequency": Variable(half.frequency, ("half_cycle",), "Hz"),
-            "impacts": Variable(self.impacts, ("half_cycle",)),
             "cycle_time": Variable(whole.time, ("cycle",), "s"),
             "cycle_amplitude": Variable(whole.amplitude, ("cycle",), "m"),
             "damping_ratio": Variable(whole.damping_ratio, ("cycle",)),
@@ -166,8 +162,7 @@ class RingDown(SceneRecord, Plotted):
             "energy_loss": Variable(whole.loss, ("cycle",), "J"),
         }
         if self.stress is not None:
-            dims = ("period", "hot_spot", "stress_measure")
-            found |= stress_axes(list(self.provenance["hot_spots"])) | {"stress": Variable(self.stress, dims, "Pa")}
+            found |= stress_axes(list(self.provenance["hot_spots"]))
             found["period_time"] = Variable(np.arange(len(self.stress)) / self.scene.frequency, ("period",), "s")
         if self.table.bins:
             for name, each in self.bins.items():
@@ -176,34 +171,6 @@ class RingDown(SceneRecord, Plotted):
                     unit = units.get(part, "Hz" if name == "frequency" else "1")
                     found[f"{name}_{part}"] = Variable(values, ("bin",), unit)
         return found
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        attributes = super().attributes() | {
-            "status": self.status.value, "linear": asdict(self.linear), "duration": self.duration,
-            "energies": self.energies, "energy_residual": self.energy_residual, "wall_time_s": self.wall_time_s,
-        }  # fmt: skip
-        open_ = {name: getattr(self, name) for name in ("rest_time", "drive", "estimate", "advice")}
-        attributes |= {"strength": dict(self.strength)} if self.strength else {}
-        return attributes | {name: value for name, value in open_.items() if value is not None}
-
-    @classmethod
-    def of(cls, values: dict[str, Any], attributes: Mapping[str, Any], path: str) -> RingDown:
-        """Return the record in the variables and attributes of a file."""
-        given = cls.common(attributes, path)
-        given |= {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
-        given |= {name: float(attributes[name]) for name in ("duration", "energy_residual", "wall_time_s")}
-        given |= {name: json.loads(attributes.get(name, "null")) for name in ("drive", "estimate", "advice")}
-        given["strength"] = json.loads(attributes.get("strength", "{}"))
-        linear, energies = (json.loads(attributes[name]) for name in ("linear", "energies"))
-        return cls(
-            status=Status(attributes["status"]), linear=LinearMode(**linear), impacts=frozen(values["impacts"], int),
-            stress=frozen(values["stress"]) if "stress" in values else None,
-            rest_time=float(attributes["rest_time"]) if "rest_time" in attributes else None,
-            # a file has them in the order of their names
-            energies={name: energies[name] for name in PARTS if name in energies},
-            **given,
-        )  # fmt: skip
 
 
 def _of_bins(found: Bins) -> dict[str, list[float]]:

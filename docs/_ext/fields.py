@@ -14,7 +14,7 @@ from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
 from vanedamp.files.reference import unit_in
-from vanedamp.studies.file_kinds import RESULT_KINDS
+from vanedamp.studies import kinds
 
 
 class Fields(Directive):
@@ -48,16 +48,16 @@ class ResultKinds(Directive):
 
     def run(self) -> list[nodes.Node]:
         rows = []
-        for name, kind in RESULT_KINDS.items():
+        for kind in filter(None, map(kinds.kind, kinds.names())):
             # by address: labels of a page that Markdown nests are not known to other pages
-            commands = [nodes.reference("", each, refuri=f"commands.html#command-{each}") for each in kind.commands]
+            commands = [nodes.reference("", each, refuri=f"commands.html#command-{each}") for each in kind.COMMANDS]
             joined = [part for each in commands for part in (nodes.Text(", "), each)][1:]
-            short = str(kind.record).rpartition(".")[2]
+            short = kind.RECORD.rpartition(".")[2]
             record = pending_xref(
-                "", nodes.literal(short, short), refdomain="py", reftype="obj", reftarget=kind.record,
+                "", nodes.literal(short, short), refdomain="py", reftype="obj", reftarget=kind.RECORD,
                 refexplicit=True, refwarn=True,
             )  # fmt: skip
-            rows.append([_code(name), [nodes.Text(kind.about)], joined, [record]])
+            rows.append([_code(kind.NAME), [nodes.Text(kind.ABOUT)], joined, [record]])
         return [table_node(("Kind", "Content", "Written by", "In Python"), rows, (15, 40, 15, 30))]
 
 

@@ -22,8 +22,8 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import stringify_signature
 
 import vanedamp
-from vanedamp.coupling.response.scene_record import SceneRecord
 from vanedamp.files.key_tables import KeyedDocstring
+from vanedamp.files.record import Record
 
 FOLDER = Path(__file__).parent.parent / "reference" / "api"
 
@@ -131,10 +131,10 @@ def _toctree(names: Iterable[str]) -> str:
 
 
 def _entry(name: str, value: Any) -> str:
-    """Return the directive of a public name; records of scenes share how they are saved, loaded and converted."""
+    """Return the directive of a public name; records share how they are saved, loaded and converted."""
     if not inspect.isclass(value):
         return f".. autofunction:: vanedamp.{name}\n\n"
-    inherited = "   :inherited-members:\n" if issubclass(value, SceneRecord) else ""
+    inherited = "   :inherited-members:\n" if issubclass(value, Record) else ""
     return f".. autoclass:: vanedamp.{name}\n   :members:\n{inherited}\n"
 
 

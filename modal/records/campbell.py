@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.files import store
 from vanedamp.files.display import Plotted
+from vanedamp.files.record import Array, Record, Rows, Unit, empty
 
 #: 1/min per rad/s
 RPM = 30.0 / np.pi
-_KIND = "campbell"
 
 
 @dataclass(frozen=True)
 class Crossing:
     """A natural frequency met by an engine order.
 
-    mode          counted from 0
-    order         periods per revolution
-    speed         rad/s
-    frequency_hz  of both
+    mode: counted from 0; order: periods per revolution; frequency_hz: of both.
     """
 
     mode: int
     order: float
-    speed: float
-    frequency_hz: float
+    speed: Annotated[float, Unit("rad/s")]
+    frequency_hz: Annotated[float, Unit("Hz")]
 
     @property
     def rpm(self) -> float:
@@ -50,7 +44,6 @@ class Approach:
 
     kind             "veering" or "crossing"
     first, second    modes: of lower and higher frequency before it
-    speed            rad/s
     frequency_hz     middle of the two
     gap_hz           their distance; zero at a crossing
     exchange         MAC of the first one after a veering with the second one before it, the largest over the range: 1
@@ -60,9 +53,9 @@ class Approach:
     kind: str
     first: int
     second: int
-    speed: float
-    frequency_hz: float
-    gap_hz: float
+    speed: Annotated[float, Unit("rad/s")]
+    frequency_hz: Annotated[float, Unit("Hz")]
+    gap_hz: Annotated[float, Unit("Hz")]
     exchange: float
 
     @property
@@ -72,49 +65,43 @@ class Approach:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Campbell(Plotted):
-    """Natural frequencies over the speed.
+class Campbell(Record, Plotted):
+    """Natural frequencies over the speed."""
 
-    speeds          (s,) rad/s, ascending: those asked for and those that following the modes took
-    asked           (s,) whether a speed was asked for
-    modes           (m,) numbers of the modes, counted from 0: their places at the lowest speed; those that are not
-                    among the modes computed there have the next numbers
-    frequencies_hz  (m, s) of every mode as its shape is followed; nan where it is not among those computed
-    errors          (s,) largest estimated relative error of the frequencies at a speed, for not solving the full
-                    structure there; errors of the mesh and of the full solutions are not in it
-    solved          (k,) rad/s, speeds at which the full structure was solved
-    crossings       with the engine orders, by speed
-    approaches      of two modes: veerings and crossings
-    gyroscopic      whether the modes have the gyroscopic coupling
-    operating       lowest and highest speed of operation, rad/s, to which crossings have a margin; None: not known
-    warnings        where modes could not be followed, or are not among those computed
-    diameters       of a ring, (m,) nodal diameters of the modes, -h of the wave that runs with the turn; else empty
-    families        of a ring, (m,) order within the diameter, from 0, in which curves of a diameter do not cross
-    neglected       largest estimated relative error of a frequency, for the shape of the structure between the speeds
-                    of its equilibria
-    """
-
-    speeds: np.ndarray
-    asked: np.ndarray
-    modes: np.ndarray
-    frequencies_hz: np.ndarray
-    errors: np.ndarray
-    solved: np.ndarray
-    orders: tuple[float, ...]
-    crossings: tuple[Crossing, ...]
-    approaches: tuple[Approach, ...]
+    KIND: ClassVar[str] = "campbell"
+    speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")]
+    """ascending: those asked for and those that following the modes took"""
+    asked: Annotated[np.ndarray, Array(("speed",), dtype=bool)]
+    """whether a speed was asked for"""
+    modes: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="mode")]
+    """numbers of the modes, counted from 0: their places at the lowest speed; those that are not among the modes
+    computed there have the next numbers"""
+    frequencies_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency", json="frequency_hz")]
+    """of every mode as its shape is followed; nan where it is not among those computed"""
+    errors: Annotated[np.ndarray, Array(("speed",), name="error")]
+    """largest estimated relative error of the frequencies at a speed, for not solving the full structure there; those
+    of the mesh and of the full solutions are not in it"""
+    solved: Annotated[np.ndarray, Array(("solution",), "rad/s", name="solved_speed", json="solved")]
+    """speeds at which the full structure was solved"""
+    orders: Annotated[tuple[float, ...], Array(("engine_order",), name="engine_order", json="orders")]
+    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")]
+    """with the engine orders, by speed"""
+    approaches: Annotated[tuple[Approach, ...], Rows("approach")]
+    """of two modes: veerings and crossings"""
     gyroscopic: bool = False
+    """whether the modes have the gyroscopic coupling"""
     operating: tuple[float, float] | None = None
+    """lowest and highest speed of operation, to which crossings have a margin; None: not known [rad/s]"""
     warnings: tuple[str, ...] = ()
+    """where modes could not be followed, or are not among those computed"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    diameters: np.ndarray = field(default_factory=lambda: np.empty(0))
-    families: np.ndarray = field(default_factory=lambda: np.empty(0))
-    neglected: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, (_, _, _, dtype) in (_ARRAYS | _OF_RING).items():
-            object.__setattr__(self, name, store.frozen(getattr(self, name), dtype))
-        object.__setattr__(self, "provenance", dict(self.provenance))
+    diameters: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="diameter")] = field(default_factory=empty)
+    """of a ring, nodal diameters of the modes, -h of the wave that runs with the turn; else empty"""
+    families: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="family")] = field(default_factory=empty)
+    """of a ring, order within the diameter, from 0, in which curves of a diameter do not cross"""
+    neglected: float | None = None
+    """largest estimated relative error of a frequency, for the shape of the structure between the speeds of its
+    equilibria; None: it has none between"""
 
     def label(self, mode: int) -> str:
         """Return the name of a mode: its number from 1, or of a ring its family from 1 and its signed diameter."""
@@ -137,99 +124,13 @@ class Campbell(Plotted):
         """Largest estimated relative error of a frequency."""
         return float(self.errors.max())
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the result as plain data."""
+    def derived(self) -> dict[str, Any]:
+        """Return speeds in 1/min, margins of crossings to the operation, and the largest error."""
         return {
-            "speed": self.speeds.tolist(),
-            "rpm": self.rpm.tolist(),
-            "asked": self.asked.tolist(),
-            "mode": self.modes.tolist(),
-            "diameter": self.diameters.tolist(),
-            "family": self.families.tolist(),
-            "frequency_hz": self.frequencies_hz.tolist(),
-            "orders": list(self.orders),
+            "rpm": self.rpm.tolist(), "error": self.error,
             "crossings": [
                 asdict(crossing) | {"rpm": crossing.rpm, "margin": self.operating and crossing.margin(self.operating)}
                 for crossing in self.crossings
             ],
-            "operating": self.operating,
             "approaches": [asdict(approach) | {"rpm": approach.rpm} for approach in self.approaches],
-            "error": self.error,
-            "neglected": self.neglected,
-            "solved": self.solved.tolist(),
-            "gyroscopic": self.gyroscopic,
-            "warnings": list(self.warnings),
-        }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record."""
-        variables = {
-            name: store.Variable(getattr(self, own).astype(np.int8 if dtype is bool else dtype), dims, units)
-            for own, (name, dims, units, dtype) in (_ARRAYS | (_OF_RING if self.diameters.size else {})).items()
-        }
-        variables["engine_order"] = store.Variable(np.array(self.orders, dtype=float), ("engine_order",))
-        for kind, (_, columns) in _TABLES.items():
-            rows = self.crossings if kind == "crossing" else self.approaches
-            for name, (dtype, units) in columns.items():
-                values = np.array([getattr(row, name) for row in rows], dtype=dtype)
-                variables[f"{kind}_{name}"] = store.Variable(values, (kind,), units)
-        attributes = {
-            "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance),
-            "neglected": self.neglected,
         }  # fmt: skip
-        if self.operating is not None:
-            attributes["operating"] = list(self.operating)
-        store.save(path, _KIND, variables, attributes)
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> Campbell:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
-        crossings, approaches = (
-            tuple(made(*row) for row in zip(*(values[f"{kind}_{name}"].tolist() for name in columns), strict=True))
-            for kind, (made, columns) in _TABLES.items()
-        )
-        return cls(
-            **{
-                own: values[name]
-                for own, (name, *_) in (_ARRAYS | _OF_RING).items()
-                if name in values or own in _ARRAYS
-            },
-            orders=tuple(values["engine_order"].tolist()),
-            crossings=crossings,
-            approaches=approaches,
-            gyroscopic=bool(attributes["gyroscopic"]),
-            operating=tuple(attributes["operating"]) if "operating" in attributes else None,
-            warnings=tuple(json.loads(attributes["warnings"])),
-            provenance=json.loads(attributes["provenance"]),
-            neglected=float(attributes.get("neglected", 0.0)),
-        )
-
-
-#: arrays by their fields: name, dimensions and unit in the record, and type
-_ARRAYS: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
-    "speeds": ("speed", ("speed",), "rad/s", float),
-    "asked": ("asked", ("speed",), "1", bool),
-    "modes": ("mode", ("mode",), "1", np.int64),
-    "frequencies_hz": ("frequency", ("mode", "speed"), "Hz", float),
-    "errors": ("error", ("speed",), "1", float),
-    "solved": ("solved_speed", ("solution",), "rad/s", float),
-}
-#: the same of a ring
-_OF_RING: dict[str, tuple[str, tuple[str, ...], str, Any]] = {
-    "diameters": ("diameter", ("mode",), "1", np.int64),
-    "families": ("family", ("mode",), "1", np.int64),
-}
-#: columns of crossings by their fields, in order, with type and unit
-CROSSINGS: dict[str, tuple[Any, str]] = {
-    "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
-}  # fmt: skip
-#: the same of crossings and approaches
-_TABLES: dict[str, tuple[Callable[..., Any], dict[str, tuple[Any, str]]]] = {
-    "crossing": (Crossing, CROSSINGS),
-    "approach": (Approach, {
-        "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
-        "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),
-    }),
-}  # fmt: skip

@@ -18,8 +18,9 @@ import numpy as np
 
 from vanedamp.files import store
 from vanedamp.files.display import Plotted
+from vanedamp.files.record import row_variables, rows_of
 from vanedamp.modal.cyclic import aliased
-from vanedamp.modal.records.campbell import CROSSINGS, RPM, Crossing
+from vanedamp.modal.records.campbell import RPM, Crossing
 from vanedamp.modal.records.ring_modes import RingModes
 
 
@@ -156,9 +157,7 @@ class Interference(Plotted):
                 "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
                 "frequency_over_speed": store.Variable(self.over_speed_hz, ("mode", "speed"), "Hz"),
             }
-            for name, (dtype, units) in CROSSINGS.items():
-                values = np.array([getattr(each, name) for each in self.crossings], dtype=dtype)
-                variables[f"crossing_{name}"] = store.Variable(values, ("crossing",), units)
+            variables |= row_variables(self.crossings, Crossing, "crossing")
         given = {"at_speed": self.speed, "operating": self.operating and list(self.operating)}
         return variables, {name: value for name, value in given.items() if value is not None}
 
@@ -175,7 +174,5 @@ class Interference(Plotted):
             operating=tuple(attributes["operating"]) if "operating" in attributes else None,
             speeds=values.get("speed", np.zeros(0)),
             over_speed_hz=values.get("frequency_over_speed", np.zeros((0, 0))),
-            crossings=tuple(map(Crossing, *(values[f"crossing_{name}"].tolist() for name in CROSSINGS)))
-            if "speed" in values
-            else (),
+            crossings=rows_of(values, Crossing, "crossing") if "speed" in values else (),
         )

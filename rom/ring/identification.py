@@ -11,11 +11,14 @@ sector gives the N waves of one family; the other waves follow from deviations f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.files import store
+from vanedamp.files.record import Array, Coded, Record
+from vanedamp.files.store import Variable
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.forced import load_of, place_of
 from vanedamp.rom.ring.ring_model import RingModel
@@ -26,24 +29,31 @@ _CONVERGED = 1e-10
 _UNSEEN = 1e-8
 
 
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """Deviations of a ring's stiffness from measurements.
+def _encode_force(force: complex) -> list[float] | None:
+    return [force.real, force.imag] if force else None
 
-    stiffness  (N,) relative deviations of the part that deviates
-    errors     (N,) their standard deviations, from the misfit; nan without more equations than deviations
-    misfit     root mean square of what the equations leave, relative to omega^2 beta
-    force      N per unit of the responses' load as given, complex; 0 for natural modes
-    """
 
-    stiffness: np.ndarray
-    errors: np.ndarray
+_Force = Annotated[complex, Coded(_encode_force, lambda parts, _: complex(*parts))]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identified(Record):
+    """Deviations of the stiffness of a ring's sectors from measurements."""
+
+    KIND: ClassVar[str] = "deviations"
+    stiffness: Annotated[np.ndarray, Array(("sector",), name="deviation")]
+    """relative deviations of the part that deviates"""
+    errors: Annotated[np.ndarray, Array(("sector",), name="error")]
+    """their standard deviations, from the misfit; nan without more equations than deviations"""
     misfit: float
-    force: complex = 0j
+    """root mean square of what the equations leave, relative to omega^2 beta"""
+    force: _Force = 0j
+    """per unit of the responses' load as given, complex; 0 for natural modes [N]"""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        for name in ("stiffness", "errors"):
-            object.__setattr__(self, name, store.frozen(getattr(self, name)))
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of the file, with the numbers of the sectors."""
+        return super().variables() | {"sector": Variable(np.arange(len(self.stiffness)), ("sector",))}
 
     @property
     def deviations(self) -> Deviations:

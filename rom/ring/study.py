@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, cast
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, cast
 
 import numpy as np
 
 from vanedamp.files import store
-from vanedamp.files.display import Displayed
+from vanedamp.files.record import Array, Record
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
 from vanedamp.rom.ring.families import Families
@@ -20,29 +18,10 @@ from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.rom.ring.whitehead import whitehead_bound
 
-_KIND = "mistuning"
 #: probabilities of the quantiles of a study
 PROBABILITIES = (0.5, 0.95, 0.99)
 # relative margins of the band about the frequencies of a family
 _MARGIN = 0.05
-_ARRAYS = {
-    "orders": (("order",), "1"),
-    "seeds": (("seed",), "1"),
-    "band_hz": (("edge",), "Hz"),
-    "tuned_amplitude": (("order",), "m/N"),
-    "tuned_frequency_hz": (("order",), "Hz"),
-    "amplification": (("order", "seed"), "1"),
-    "peak_frequency_hz": (("order", "seed"), "Hz"),
-    "worst_sector": (("order", "seed"), "1"),
-    "participation": (("order", "seed"), "1"),
-    "frequencies_hz": (("frequency",), "Hz"),
-    "amplitude": (("order", "frequency", "sector"), "m/N"),
-    "amplitude_tuned": (("order", "frequency"), "m/N"),
-    "stiffness": (("sector",), "1"),
-    "mass": (("sector",), "1"),
-    "damping": (("sector",), "1"),
-}
-_WHOLE = ("orders", "seeds", "worst_sector")
 
 
 class Amplification(NamedTuple):
@@ -73,44 +52,48 @@ class Table(Protocol):
         """Return deviations of so many sectors."""
 
 
+_OverOrders = ("order",)
+_OverDraws = ("order", "seed")
+_OfDraw = Annotated[np.ndarray, Array(("sector",))]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class MistuningStudy(Displayed):
-    """Amplification of a ring under engine orders, over draws of its deviations.
+class MistuningStudy(Record):
+    """Amplification of a ring under engine orders, over draws of its deviations."""
 
-    sectors, label                 N; interface label where forces act and responses are taken
-    orders, seeds                  (o,) engine orders; (s,) seeds of the draws
-    band_hz                        (2,) frequencies between which peaks count: of all draws
-    tuned_amplitude                (o,) m/N, largest of the tuned ring; tuned_frequency_hz (o,): where
-    amplification                  (o, s) largest amplitude of a sector over that
-    peak_frequency_hz              (o, s), worst_sector (o, s): where it is
-    participation                  (o, s) sectors that take part in the response there: 1 to N
-    frequencies_hz                 (f,) of the responses that follow
-    amplitude, amplitude_tuned     (o, f, N) m/N of the first draw, and (o, f) of the tuned ring
-    stiffness, mass, damping       (N,) deviations of the first draw
-    """
-
+    KIND: ClassVar[str] = "mistuning"
     sectors: int
     label: str
-    orders: np.ndarray
-    seeds: np.ndarray
-    band_hz: np.ndarray
-    tuned_amplitude: np.ndarray
-    tuned_frequency_hz: np.ndarray
-    amplification: np.ndarray
-    peak_frequency_hz: np.ndarray
-    worst_sector: np.ndarray
-    participation: np.ndarray
-    frequencies_hz: np.ndarray
-    amplitude: np.ndarray
-    amplitude_tuned: np.ndarray
-    stiffness: np.ndarray
-    mass: np.ndarray
-    damping: np.ndarray
+    """interface label where forces act and responses are taken"""
+    orders: Annotated[np.ndarray, Array(_OverOrders, dtype=np.int64)]
+    """engine orders"""
+    seeds: Annotated[np.ndarray, Array(("seed",), dtype=np.int64)]
+    """of the draws"""
+    band_hz: Annotated[np.ndarray, Array(("edge",), "Hz")]
+    """between which peaks count: of all draws"""
+    tuned_amplitude: Annotated[np.ndarray, Array(_OverOrders, "m/N")]
+    """largest of the tuned ring"""
+    tuned_frequency_hz: Annotated[np.ndarray, Array(_OverOrders, "Hz")]
+    """where it is"""
+    amplification: Annotated[np.ndarray, Array(_OverDraws)]
+    """largest amplitude of a sector over the tuned one"""
+    peak_frequency_hz: Annotated[np.ndarray, Array(_OverDraws, "Hz")]
+    """where it is"""
+    worst_sector: Annotated[np.ndarray, Array(_OverDraws, dtype=np.int64)]
+    """where it is"""
+    participation: Annotated[np.ndarray, Array(_OverDraws)]
+    """sectors that take part in the response there: 1 to N"""
+    frequencies_hz: Annotated[np.ndarray, Array(("frequency",), "Hz")]
+    """of the responses that follow"""
+    amplitude: Annotated[np.ndarray, Array(("order", "frequency", "sector"), "m/N")]
+    """of the first draw"""
+    amplitude_tuned: Annotated[np.ndarray, Array(("order", "frequency"), "m/N")]
+    """of the tuned ring"""
+    stiffness: _OfDraw
+    """deviations of the first draw"""
+    mass: _OfDraw
+    damping: _OfDraw
     provenance: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in _ARRAYS:
-            object.__setattr__(self, name, store.frozen(getattr(self, name), np.int64 if name in _WHOLE else None))
 
     @property
     def bound(self) -> float:
@@ -154,22 +137,6 @@ class MistuningStudy(Displayed):
             "whitehead_bound": self.bound, "orders": rows,
         }  # fmt: skip
         return cast("dict[str, Any]", store.finite(data))
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record that xarray opens."""
-        variables = {name: store.Variable(getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
-        attributes = {"sectors": self.sectors, "label": self.label, "provenance": dict(self.provenance)}
-        store.save(path, _KIND, variables, attributes)
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> MistuningStudy:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
-        return cls(
-            sectors=int(attributes["sectors"]), label=str(attributes["label"]),
-            **{name: values[name] for name in _ARRAYS}, provenance=json.loads(attributes["provenance"]),
-        )  # fmt: skip
 
 
 def amplification(

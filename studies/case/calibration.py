@@ -12,13 +12,13 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError, nearest
-from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify, is_in_decibels
+from vanedamp.modal.frf import Frf, FrfError, Poles, identify, is_in_decibels
 from vanedamp.modal.kept_solutions import Keep
 from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
 from vanedamp.studies.case.checkpoint import CaseCheckpoint
 from vanedamp.studies.case.stages import ModalAnalysis, assemble, base_inertia, modal_analysis
@@ -70,20 +70,13 @@ class MeasuredDamping:
         """Measured frequency of the mode."""
         return float(self.poles.frequencies_hz[self.pole])
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the measured response and its fit, which is nan outside the band."""
-        measured = self.response
-        (low, high), lines = self.band, measured.frequencies_hz
-        inside = (lines >= low) & (lines <= high) & (lines > 0.0)
-        fitted = np.full(measured.values.shape, np.nan + 0j)
-        fitted[:, inside] = self.poles.fitted
-        unit, made = UNITS[measured.quantity], {"response": measured.values, "fitted": fitted}
-        return {
-            "line": Variable(measured.frequencies_hz, ("line",), "Hz"),
-            "label": Variable(np.array(measured.labels, dtype=object), ("label",)),
-            **{f"{name}_real": Variable(values.real, ("label", "line"), unit) for name, values in made.items()},
-            **{f"{name}_imaginary": Variable(values.imag, ("label", "line"), unit) for name, values in made.items()},
-        }
+    @property
+    def fitted(self) -> np.ndarray:
+        """The fit (k, n) of the response, complex; nan outside the band."""
+        (low, high), lines = self.band, self.response.frequencies_hz
+        fitted = np.full(self.response.values.shape, np.nan + 0j)
+        fitted[:, (lines >= low) & (lines <= high) & (lines > 0.0)] = self.poles.fitted
+        return fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,47 +104,43 @@ class Calibration:
         fatigue = self.analysis.fatigue
         return None if fatigue is None else self.rigid.resonance_force(fatigue.amplitude)
 
+    @property
+    def record(self) -> CalibrationRecord:
+        """What the file of the calibration has."""
+        bending = self.analysis.first_bending
+        assert bending is not None
+        arrays: dict[str, Any] = {}
+        if (tuning := self.tuning) is not None:
+            arrays |= {
+                "part": tuning.names, "factor": tuning.factors, "factor_deviation": tuning.deviations,
+                "target_hz": tuning.target_hz, "before_hz": tuning.before_hz, "after_hz": tuning.after_hz,
+                "mac_before": tuning.mac_before, "mac_after": tuning.mac_after, "sensitivity": tuning.sensitivities,
+            }  # fmt: skip
+        if (measured := self.damping) is not None:
+            response = measured.response
+            arrays |= {
+                "label": response.labels, "line": response.frequencies_hz, "response": response.values,
+                "fitted": measured.fitted,
+            }  # fmt: skip
+        return CalibrationRecord(
+            frequencies_hz=self.analysis.modes.frequencies_hz, first_bending=bending, rigid=self.rigid,
+            damping=self._damping(), excitation=self._excitation(), cavity=self.analysis.cavities,
+            warnings=self.warnings, versions=versions(), provenance=self.analysis.structure.matrices.provenance,
+            **arrays,
+        )  # fmt: skip
+
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
+        record = self.record
+        told = record.plain()
         return {
             "status": "ok",
-            "first_bending": self.analysis.first_bending,
-            "frequency_hz": self.analysis.modes.frequencies_hz.tolist(),
-            "rigid": asdict(self.rigid),
-            "cavity": {label: asdict(motion) for label, motion in self.analysis.cavities.items()},
-            "damping": self._damping(),
-            "excitation": self._excitation(),
+            "frequency_hz": record.frequencies_hz.tolist(),
+            **{name: told[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")},
             "tuning": None if self.tuning is None else _tuning_json(self.tuning, self.case),
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
-
-    def save(self, path: str | Path) -> None:
-        """Write an HDF5 record: the numbers as attributes, the tuning's changes as arrays."""
-        result = self.to_json()
-        frequencies = self.analysis.modes.frequencies_hz
-        variables = {"frequency": Variable(frequencies, ("mode",), "Hz")}
-        if self.tuning is not None:
-            tuning = self.tuning
-            variables |= {
-                "part": Variable(np.array(tuning.names, dtype=object), ("part",)),
-                "factor": Variable(tuning.factors, ("part",)),
-                "factor_deviation": Variable(tuning.deviations, ("part",)),
-                "target_frequency": Variable(tuning.target_hz, ("target",), "Hz"),
-                "frequency_before": Variable(tuning.before_hz, ("target",), "Hz"),
-                "frequency_after": Variable(tuning.after_hz, ("target",), "Hz"),
-                "mac_before": Variable(tuning.mac_before, ("target",)),
-                "mac_after": Variable(tuning.mac_after, ("target",)),
-                "sensitivity": Variable(tuning.sensitivities, ("target", "part")),
-            }
-        if self.damping is not None:
-            variables |= self.damping.variables()
-        attributes = {name: result[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")}
-        attributes = {name: value for name, value in attributes.items() if value not in (None, {})}
-        if self.warnings:
-            attributes["warnings"] = list(self.warnings)
-        attributes |= {"versions": versions(), "provenance": dict(self.analysis.structure.matrices.provenance)}
-        save(path, "calibration", variables, attributes)
 
     def _damping(self) -> dict[str, Any]:
         damping: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}

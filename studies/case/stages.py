@@ -501,13 +501,14 @@ def reduction(
     max_frequency: float | None = None,
     spots: int = 0,
     keep_recovery: bool = False,
+    level: bool = True,
 ) -> ReducedModel:
     """Reduce the case's structure to its interface, with `modes` modes or (None) as many as a tolerance needs.
 
-    spots: places of its first mode whose stresses are outputs; keep_recovery: keep the basis, by which responses are
-    shown on the mesh.
+    spots: places whose stresses are outputs; keep_recovery: keep the basis, by which responses are shown on the mesh;
+    level: keep the amplitude at the case's fatigue strength, in the model's provenance.
 
-    The amplitude at the case's fatigue strength is in the model's provenance, and so is the estimate of its error. This
+    The estimate of the model's error is in its provenance, too. This
     covers receptances of the whole interface up to max_frequency, by default 1.5 times the first bending (of most
     effective mass along the case's direction; of a free structure its first elastic mode). Craig-Bampton models have a
     block of quasi-static modes. A rotating structure is reduced for all speeds up to the maximum of its case, and the
@@ -516,7 +517,7 @@ def reduction(
     """
     greatest = _greatest_speed(structure, basis)
     rotating = structure.rotating_to(greatest) if greatest else None
-    levelled = structure.case.response_label is not None and bool(structure.case.fatigue_strength)
+    levelled = level and structure.case.response_label is not None and bool(structure.case.fatigue_strength)
     recovery = keep_recovery or bool(spots) or levelled
     found = basis_named(basis)
     coordinates = interface(structure.case, structure.matrices)

@@ -206,6 +206,11 @@ class MaterialTable:
         fatigue = self.fatigue or (None if strength is None else Fatigue())
         return None if fatigue is None else fatigue.completed(strength)
 
+    @property
+    def own_strength(self) -> float | None:
+        """The fatigue strength of the fatigue data, or else the material's; None without either, Pa."""
+        return (None if self.fatigue is None else self.fatigue.strength) or self.fatigue_strength
+
 
 _STRENGTHS = ("strength", "tensile_strength", "yield_strength")
 #: keys by which a table below [material] is a material, or fatigue data
@@ -256,7 +261,7 @@ def _spread(materials: dict[str, MaterialTable | Fatigue]) -> dict[str, Material
 
 
 def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
-    return min((t.fatigue_strength for t in materials.values() if t.fatigue_strength is not None), default=None)
+    return min((t.own_strength for t in materials.values() if t.own_strength is not None), default=None)
 
 
 def _with_fatigue(schema: dict[str, Any]) -> None:
@@ -527,13 +532,13 @@ class Case:
         if least is None:
             return {}
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
-        return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
+        return {name: (table.own_strength if table else None) or least for name, table in tables.items()}
 
     def without_strength(self, volumes: Iterable[str]) -> list[str]:
         """Return the volume groups for which the least strength of the others counts; none without any strength."""
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         known = self.fatigue_strength is not None
-        return [name for name, table in tables.items() if known and (table is None or table.fatigue_strength is None)]
+        return [name for name, table in tables.items() if known and (table is None or table.own_strength is None)]
 
     def fatigue(self, volume: str) -> Fatigue | None:
         """Return the complete fatigue data of a volume group's material; None without any.

@@ -20,7 +20,7 @@ def run(arguments: Namespace, case: Case) -> None:
     calibration = calibrate(case, arguments.checkpoint)
     result = calibration.to_json()
     write_result(
-        arguments, result, _summary(result), calibration.warnings, output=calibration.save,
+        arguments, result, _summary(result), calibration.warnings, output=calibration.record.save,
         case=partial(save_tuned_case, arguments.input, calibration),
         scene=partial(save_rigid_scene, arguments.input, calibration),
     )  # fmt: skip

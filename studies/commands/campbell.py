@@ -29,7 +29,7 @@ def run(arguments: Namespace, case: Case) -> None:
     warnings = [*diagram.warnings, *unit_doubts(structure)]
 
     def picture(path: str) -> None:
-        from vanedamp.studies.report.campbell_picture import campbell_picture  # matplotlib, for this file only
+        from vanedamp.studies.kinds.campbell.picture import campbell_picture  # matplotlib, for this file only
 
         campbell_picture(diagram, Path(path))
 

@@ -7,8 +7,8 @@ from importlib import import_module
 
 from vanedamp.files.toml_input import read_toml
 from vanedamp.studies.commands.support import facts
-from vanedamp.studies.commands.support.facts import fact_lines, word
 from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.facts import fact_lines, word
 from vanedamp.studies.file_kinds import a, kind_of
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
+from vanedamp.files.store import write_csv
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.commands.support.messages import write_result
-from vanedamp.studies.identification.deviations import identify_deviations, load_table, save
+from vanedamp.studies.identification.deviations import identify_deviations, load_table
 from vanedamp.studies.identification.record import Identification, IdentificationStatus
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
@@ -50,13 +51,12 @@ def _deviations(arguments: Namespace) -> None:
         raise InputError("--scene: not for deviations of a ring; --output or --csv has them")
     table = load_table(arguments.input)
     arguments.outputs.keep([table.ring, table.file])
-    found = identify_deviations(table)
-    result = {"deviation": found.stiffness.tolist(), "error": found.errors.tolist(), "misfit": found.misfit}
+    found = replace(identify_deviations(table), provenance={"table": asdict(table), "versions": versions()})
     lines = [f"misfit {found.misfit:.3g} of omega^2 u", "sector  stiffness deviation  standard deviation"]
     for sector, (value, error) in enumerate(zip(found.stiffness, found.errors, strict=True)):
         lines.append(f"{sector:6}{value:21.6f}{error:20.2g}")
-    written = partial(save, found=found, provenance={"table": asdict(table), "versions": versions()})
-    write_result(arguments, result, lines, output=written, csv=written)
+    rows = partial(write_csv, header=("sector", "deviation"), rows=enumerate(found.stiffness.tolist()))
+    write_result(arguments, found.to_json(), lines, output=found.save, csv=rows)
 
 
 def _summary(found: Identification) -> Iterator[str]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from vanedamp.studies.terminal import progress
 
 #: defaults of the options that a case with [ring] does not take, and of the basis
 _OF_STRUCTURES, _BASIS = (12, 0, False), "craig-bampton"
+_LISTED = 8
 
 
 def run(arguments: Namespace, case: Case) -> None:
@@ -88,15 +90,15 @@ def _ring_summary(ring: RingModel | SectorRing) -> Iterator[str]:
     """Yield sizes, the estimates of errors, and natural frequencies by nodal diameter."""
     estimate = ring.provenance["estimate"]
     yield f"{ring.sectors} sectors, {ring.size} coordinates; interface of each: {', '.join(ring.interface)}"
-    yield f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz"
+    yield f"{estimate['sentence']}, {_band(ring.frequencies_hz, estimate)}"
     if isinstance(ring, SectorRing):
-        yield "frequencies, Hz: " + _listed(ring.model())
+        yield "frequencies, Hz: " + _listed(ring.frequencies_hz[:_LISTED], estimate)
         return
     if ring.greatest_speed:
         yield f"for speeds up to {ring.greatest_speed:.6g} rad/s; at standstill:"
     for number in range(ring.sectors // 2 + 1):
         own = np.unique(ring.frequencies_hz[ring.diameters[: ring.modes] == number])
-        yield f"nodal diameter {number}, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in own)
+        yield f"nodal diameter {number}, Hz: " + _listed(own, estimate)
 
 
 def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
@@ -104,10 +106,10 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     kind = "natural" if model.free_modes else "fixed-interface"
     yield f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}"
-    yield f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz"
+    yield f"{estimate['sentence']}, {_band(model.natural_frequencies_hz, estimate)}"
     if rotation is not None:
         yield rotation["sentence"]
-    yield "frequencies, Hz: " + _listed(model)
+    yield "frequencies, Hz: " + _listed(model.natural_frequencies_hz[:_LISTED], estimate)
     yield from spot_lines(hot_spots(model))
     if (level := model.provenance.get("fatigue")) is not None:
         yield (
@@ -115,8 +117,16 @@ def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:
             f"{plus_minus(level['error'])}"
         )
     if rotation is not None:
-        yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest)
+        yield f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest.natural_frequencies_hz[:_LISTED], estimate)
 
 
-def _listed(model: ReducedModel) -> str:
-    return ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8])
+def _band(frequencies_hz: np.ndarray, estimate: Mapping[str, Any]) -> str:
+    top = estimate["frequencies_hz"][1]
+    beyond = "; frequencies in brackets lie beyond and may be far too high" if frequencies_hz.max() > top else ""
+    return f"up to {top:.4g} Hz{beyond}"
+
+
+def _listed(frequencies_hz: np.ndarray, estimate: Mapping[str, Any]) -> str:
+    """Return frequencies as text, those beyond the band of the estimated error in brackets."""
+    top = estimate["frequencies_hz"][1]
+    return ", ".join(f"{value:.6g}" if value <= top else f"({value:.6g})" for value in frequencies_hz)

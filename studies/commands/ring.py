@@ -75,7 +75,7 @@ def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str
         save_vtk(with_parts(named), ring.points, ring.cells, cell_type, path)
 
     def picture(path: str) -> None:
-        from vanedamp.studies.report.ring_picture import interference_picture  # matplotlib, for this file only
+        from vanedamp.studies.kinds.ring_modes.picture import interference_picture  # matplotlib, for this file only
 
         interference_picture(found, Path(path))
 

@@ -15,9 +15,9 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.kinds.orbits.motions import phase_figure
 from vanedamp.studies.report.motion import motion_of
 from vanedamp.studies.report.motion_page import motion_page
-from vanedamp.studies.report.orbit_charts import phase_figure
 from vanedamp.studies.report.plane_history import slider_samples
 from vanedamp.studies.report.time_history import History, history_figure
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from vanedamp.files import store
 from vanedamp.files.formats.lab_table import lab_table
 from vanedamp.files.toml_input import STRICT, InputError, Whole, read_toml, validate
 from vanedamp.rom.ring.deviations import RingError
 from vanedamp.rom.ring.identification import Identified, deviations_of_modes, deviations_of_responses
 from vanedamp.rom.ring.ring_model import RingModel
-
-_KIND = "deviations"
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -64,19 +60,6 @@ def identify_deviations(table: DeviationsTable) -> Identified:
         return deviations_of_responses(*given, table.order, table.family - 1)
     except RingError as error:
         raise InputError(f"{table.file}: {error}") from None
-
-
-def save(path: str | os.PathLike[str], found: Identified, provenance: dict[str, Any]) -> None:
-    """Write the deviations: HDF5, or a CSV file that the table [mistuning.stiffness] reads."""
-    if Path(path).suffix == ".csv":
-        store.write_csv(path, ("sector", "deviation"), enumerate(found.stiffness.tolist()))
-        return
-    variables = {
-        "sector": store.Variable(np.arange(len(found.stiffness)), ("sector",)),
-        "deviation": store.Variable(found.stiffness, ("sector",)),
-        "error": store.Variable(found.errors, ("sector",)),
-    }
-    store.save(path, _KIND, variables, {"misfit": found.misfit, "provenance": provenance})
 
 
 def _motions(file: str, sectors: int) -> tuple[np.ndarray, np.ndarray]:

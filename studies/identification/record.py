@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene, relative
 from vanedamp.files.display import Plotted
-from vanedamp.files.store import Variable, frozen, load, reader, save
+from vanedamp.files.record import Array, Coded, Record
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import write_commented
 
-_KIND = "identification"
 #: chance of a misfit below which it is none, and noise, relative, that no measurement has
 CHANCE, ROUGHEST = 0.01, 0.2
-_ARRAYS = {
-    "best": ("number",), "covariance": ("number", "other_number"), "interval": ("number", "end"),
-    "open": ("number", "end"), "profile_number": ("profile_point",), "profile_value": ("profile_point",),
-    "profile_rise": ("profile_point",), "minima": ("minimum", "number"), "minima_misfit": ("minimum",),
-    "deviation": ("channel",), "estimated": ("channel",), "data_channel": ("datum",), "data_at": ("datum",),
-    "data_value": ("datum",), "data_deviation": ("datum",), "data_model": ("datum",), "data_band": ("datum",),
-    "data_repeats": ("datum",),
-}  # fmt: skip
-_WHOLE = {"open": bool, "estimated": bool, "data_repeats": bool, "profile_number": int, "data_channel": int}
-_PLAIN = ("status", "threshold", "misfit", "wall_time_s", "sentence")
-_TABLES = ("study", "notes", "paths", "channels", "test", "counts", "provenance")
 
 
 class IdentificationStatus(StrEnum):
@@ -89,59 +77,88 @@ class Proposal(NamedTuple):
         return int(np.argmin(self.shrink[:, self.worst]))
 
 
+def _encode_proposal(proposal: Proposal | None) -> dict[str, Any] | None:
+    if proposal is None:
+        return None
+    return proposal._asdict() | {"points": proposal.points.tolist(), "shrink": proposal.shrink.tolist()}
+
+
+def _decode_proposal(data: Mapping[str, Any], _path: str) -> Proposal:
+    return Proposal(tuple(data["axes"]), frozen(data["points"]), frozen(data["shrink"]), data["worst"])
+
+
+_Misfit = Annotated[Misfit, Coded(Misfit._asdict, lambda data, _: Misfit(**data))]
+_Proposal = Annotated[Proposal | None, Coded(_encode_proposal, _decode_proposal)]
+_Scene = Annotated[Scene, Coded(Scene.to_dict, lambda data, path: validate(Scene, data, path))]
+_OfNumbers = Annotated[np.ndarray, Array(("number",))]
+_ProfilePoints = Annotated[np.ndarray, Array(("profile_point",))]
+_Data = Annotated[np.ndarray, Array(("datum",))]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Plotted):
-    """Numbers of a scene that measurements tell: P numbers, c channels of N values (data), q points of profiles.
+class Identification(Record, Plotted):
+    """Numbers of a scene that measurements tell."""
 
-    status, notes       how it ended, and what to know before the numbers are used
-    paths               (P,) of the numbers
-    best                (P,) values with the least misfit
-    covariance          (P, P), by Gauss and Newton; infinite of a number that nothing tells
-    interval            (P, 2) 95 % intervals by profile likelihood; open: (P, 2) where an end is a bound of the number
-    profile_*           points (q,): number, its value, rise of the misfit with the other numbers at their best;
-                        threshold: the rise at the ends of an interval
-    misfit, test        sum of squared residuals in standard deviations, with priors, and what it says of the model
-    minima              (s, P) where the searches ended, minima_misfit: (s,)
-    channels            (c,) names of what was measured; deviation: (c,) their standard deviations, relative ones of
-                        "ratio", estimated: (c,) whether they are those of the residuals
-    data_*              (N,) channel, place (Hz or s), measured value with its standard deviation, value of the model
-                        with the half width of its 95 % band, and whether the model's motion repeats or is one run
-    proposal            what further measurements would tell; None without a level
-    counts              engine runs ("runs"), evaluations of period maps ("passages")
-    scene               with the best numbers
-    """
-
+    KIND: ClassVar[str] = "identification"
     study: Mapping[str, Any]
+    """the numbers sought and the measurements, as plain data"""
     status: IdentificationStatus
+    """how it ended"""
     notes: tuple[str, ...]
+    """what to know before the numbers are used"""
     sentence: str
+    """the answer in words"""
     paths: tuple[str, ...]
-    best: np.ndarray
-    covariance: np.ndarray
-    interval: np.ndarray
-    open: np.ndarray
-    profile_number: np.ndarray
-    profile_value: np.ndarray
-    profile_rise: np.ndarray
+    """of the numbers"""
+    best: _OfNumbers
+    """values with the least misfit"""
+    covariance: Annotated[np.ndarray, Array(("number", "other_number"))]
+    """by Gauss and Newton; infinite of a number that nothing tells"""
+    interval: Annotated[np.ndarray, Array(("number", "end"))]
+    """95 % intervals by profile likelihood"""
+    open: Annotated[np.ndarray, Array(("number", "end"), dtype=bool)]
+    """where an end is a bound of the number"""
+    profile_number: Annotated[np.ndarray, Array(("profile_point",), dtype=np.int64)]
+    """to whose profile a point belongs"""
+    profile_value: _ProfilePoints
+    """of that number"""
+    profile_rise: _ProfilePoints
+    """of the misfit with the other numbers at their best"""
     threshold: float
+    """the rise at the ends of an interval"""
     misfit: float
-    test: Misfit
-    minima: np.ndarray
-    minima_misfit: np.ndarray
+    """sum of squared residuals in standard deviations, with priors"""
+    test: _Misfit
+    """what the misfit says of the model"""
+    minima: Annotated[np.ndarray, Array(("minimum", "number"))]
+    """where the searches ended"""
+    minima_misfit: Annotated[np.ndarray, Array(("minimum",))]
     channels: tuple[Mapping[str, str], ...]
-    deviation: np.ndarray
-    estimated: np.ndarray
-    data_channel: np.ndarray
-    data_at: np.ndarray
-    data_value: np.ndarray
-    data_deviation: np.ndarray
-    data_model: np.ndarray
-    data_band: np.ndarray
-    data_repeats: np.ndarray
-    proposal: Proposal | None
+    """names of what was measured"""
+    deviation: Annotated[np.ndarray, Array(("channel",))]
+    """standard deviations of the channels; of "ratio" relative"""
+    estimated: Annotated[np.ndarray, Array(("channel",), dtype=bool)]
+    """whether the deviations are those of the residuals"""
+    data_channel: Annotated[np.ndarray, Array(("datum",), dtype=np.int64)]
+    data_at: _Data
+    """Hz or s"""
+    data_value: _Data
+    """as measured"""
+    data_deviation: _Data
+    """standard deviation"""
+    data_model: _Data
+    """value of the model"""
+    data_band: _Data
+    """half width of the model's 95 % band"""
+    data_repeats: Annotated[np.ndarray, Array(("datum",), dtype=bool)]
+    """whether the model's motion repeats or is one run"""
     counts: Mapping[str, int]
+    """engine runs ("runs"), evaluations of period maps ("passages")"""
     wall_time_s: float
-    scene: Scene
+    scene: _Scene
+    """with the best numbers"""
+    proposal: _Proposal = None
+    """what further measurements would tell; None without a level"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -156,62 +173,18 @@ class Identification(Plotted):
         """Paths of the numbers that the measurements do not tell between their bounds."""
         return tuple(path for path, ends in zip(self.paths, self.open, strict=True) if ends.all())
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
-        proposal = None if self.proposal is None else _plain(self.proposal)
-        return self._named() | arrays | {
-            "correlation": self.correlation.tolist(), "flat": list(self.flat), "proposal": proposal,
-            "scene": self.scene.to_dict(),
+    def labels(self) -> dict[str, Any]:
+        """Return the paths of the numbers."""
+        return {"number": self.paths}
+
+    def derived(self) -> dict[str, Any]:
+        """Return the correlations, the numbers that are not told, and the provenance."""
+        return {
+            "correlation": self.correlation.tolist(), "flat": list(self.flat), "provenance": dict(self.provenance),
         }  # fmt: skip
-
-    def _named(self) -> dict[str, Any]:
-        plain: dict[str, Any] = {name: getattr(self, name) for name in _PLAIN}
-        tables = {name: getattr(self, name) for name in _TABLES if name != "test"}
-        return plain | {"status": self.status.value, "test": self.test._asdict()} | tables
-
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens. Raises files.store.StoreError."""
-        variables = {name: Variable(_stored(getattr(self, name)), dims) for name, dims in _ARRAYS.items()}
-        variables["number"] = Variable(np.array(self.paths, object), ("number",))
-        attributes = self._named() | {"scene": self.scene.to_dict()}
-        for name in ("notes", "paths", "channels"):
-            attributes[name] = json.dumps(list(attributes[name]))
-        if self.proposal is not None:
-            attributes["proposal"] = _plain(self.proposal)
-        save(path, _KIND, variables, attributes)
-
-    @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Identification:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, _KIND)
-        tables = {name: json.loads(attributes[name]) for name in _TABLES}
-        tables |= {name: tuple(tables[name]) for name in ("notes", "paths", "channels")}
-        found = json.loads(attributes.get("proposal", "null"))
-        proposal = None
-        if found is not None:
-            proposal = Proposal(tuple(found["axes"]), frozen(found["points"]), frozen(found["shrink"]), found["worst"])
-        arrays: dict[str, Any] = {name: frozen(values[name], _WHOLE.get(name, float)) for name in _ARRAYS}
-        plain = {name: attributes[name] for name in _PLAIN} | {"status": IdentificationStatus(attributes["status"])}
-        return cls(
-            **plain, **arrays, **tables | {"test": Misfit(**tables["test"])}, proposal=proposal,
-            scene=validate(Scene, json.loads(attributes["scene"]), str(path)),
-        )  # fmt: skip
 
     def save_scene(self, path: str | Path) -> None:
         """Write the scene with the best numbers as a TOML file, with the meaning of its keys. Raises StoreError."""
         from vanedamp.studies.file_kinds import KINDS
 
         write_commented(path, relative(self.scene.to_dict(), path), KINDS["scene"], {"": self.sentence})
-
-
-def _plain(proposal: Proposal) -> dict[str, Any]:
-    return {
-        "axes": list(proposal.axes), "points": proposal.points.tolist(), "shrink": proposal.shrink.tolist(),
-        "worst": proposal.worst,
-    }  # fmt: skip
-
-
-def _stored(array: np.ndarray) -> np.ndarray:
-    return array.astype(np.int8) if array.dtype == bool else array

@@ -354,14 +354,13 @@ def _identification(
     status, notes = outcome(study, opened, interval, test, best.converged, others, cold, least, work.over, factor)
     return Identification(
         study=study.to_json(), status=status, notes=notes, paths=study.paths,
-        sentence=sentence_of(study.paths, values, interval, opened), best=frozen(values),
-        covariance=frozen(scatter * np.multiply.outer(slope, slope)), interval=frozen(interval),
-        open=frozen(opened, bool),
-        profile_number=frozen(np.repeat(np.arange(len(profiles)), [len(own.z) for own in profiles]), int),
-        profile_value=frozen(np.concatenate([study.along(place, own.z) for place, own in enumerate(profiles)])),
-        profile_rise=frozen(np.concatenate([own.rise for own in profiles])), threshold=work.rise, misfit=least,
-        test=test, minima=frozen(ended), minima_misfit=frozen(squares), deviation=frozen(fit.deviations),
-        estimated=frozen(fit.estimated, bool), proposal=proposal, counts=dict(work.count + fit.count),
+        sentence=sentence_of(study.paths, values, interval, opened), best=values,
+        covariance=scatter * np.multiply.outer(slope, slope), interval=interval, open=opened,
+        profile_number=np.repeat(np.arange(len(profiles)), [len(own.z) for own in profiles]),
+        profile_value=np.concatenate([study.along(place, own.z) for place, own in enumerate(profiles)]),
+        profile_rise=np.concatenate([own.rise for own in profiles]), threshold=work.rise, misfit=least, test=test,
+        minima=ended, minima_misfit=squares, deviation=np.array(fit.deviations),
+        estimated=np.array(fit.estimated), proposal=proposal, counts=dict(work.count + fit.count),
         wall_time_s=time.perf_counter() - began, scene=study.scene_at(values), provenance=provenance, **data,
     )  # fmt: skip
 
@@ -411,8 +410,4 @@ def _data(fit: Fit, z: np.ndarray, scatter: np.ndarray) -> dict[str, Any]:
              "compare": channel.compare, "at_unit": measured.unit}
         )  # fmt: skip
     names = ("data_channel", "data_at", "data_value", "data_deviation", "data_model", "data_band", "data_repeats")
-    types = {"data_channel": int, "data_repeats": bool}
-    found = {
-        name: frozen(row, types.get(name, float)) for name, row in zip(names, np.concatenate(rows, axis=1), strict=True)
-    }
-    return found | {"channels": tuple(channels)}
+    return dict(zip(names, np.concatenate(rows, axis=1), strict=True)) | {"channels": tuple(channels)}

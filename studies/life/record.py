@@ -2,88 +2,73 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.response.contact_work import contact_name
-from vanedamp.files.store import Variable, frozen, load, reader, save
+from vanedamp.files.record import Array, Record
 from vanedamp.studies.life.study import Contact, Life
 from vanedamp.studies.worst_start import worst_words
 
-_KIND = "life"
-_PLAIN = ("reference", "hours", "runs", "trouble", "sentence")
-_ARRAYS = {
-    "frequency": (("frequency",), "Hz"), "time": (("time",), "h"),
-    "depth": (("time", "contact"), "m"), "depth_band": (("time", "contact"), "m"),
-    "depth_error": (("time", "contact"), "m"), "depth_rate": (("time", "contact"), "m/h"),
-    "depth_rate_confidence": (("time", "contact"), "m/h"),
-    "gap": (("time", "cavity"), "m"), "gap_band": (("time", "cavity"), "m"), "play": (("time", "cavity"), "m"),
-    "lost": (("time", "damper"), "1"), "reduction": (("time",), "1"), "reduction_band": (("time",), "1"),
-    "amplitude": (("time", "frequency"), "1"),
-}  # fmt: skip
+_Moments = Annotated[np.ndarray, Array(("time",))]
 
 
-@dataclass(frozen=True, eq=False)
-class LifeRecord:
-    """Result of a life over n moments, c contacts and f frequencies.
+@dataclass(frozen=True, eq=False, repr=False)
+class LifeRecord(Record):
+    """Result of a life over n moments, c contacts and f frequencies. Bands are half widths of 95 % intervals."""
 
-    study              the [life] table and the scene, as plain data
-    reference          m, amplitude without bodies in the band: its maximum, or its mean
-    contacts           that wear, as in Contact
-    time               (n,) h
-    depth, depth_rate  (n, c) m and m/h of both partners of a contact; nan where its patch is not known
-    depth_band, depth_rate_confidence  (n, c) half widths of 95 % intervals; depth_error: (n, c) m, of the steps
-    gap, play          (n, cavities) m; play nan without; gap_band: (n, cavities) m, by confidence and steps
-    lost               (n, bodies) fraction of each body that is worn away; nan where its size is not known
-    reduction          (n,) of what counts of the band; reduction_band: (n,) half widths
-    amplitude          (n, f) over the reference; nan where a run failed
-    hours              when the reduction is lost: of its curve, of the lower and of the upper bound; None: not within
-                       the hours; 0: never reached
-    runs, trouble      number of runs, and of those with another status than ok
-    sentence           the answer in words
-    worn_away          h after which a body is worn away, which ends the life; None: none is
-    starts             worst of the damper over starts (worst_start.worst_start), as "new" and at the "end"
-    """
-
+    KIND: ClassVar[str] = "life"
     study: Mapping[str, Any]
+    """the [life] table and the scene, as plain data"""
     reference: float
+    """amplitude without bodies in the band: its maximum, or its mean [m]"""
     contacts: tuple[Contact, ...]
-    frequency: np.ndarray
-    time: np.ndarray
-    depth: np.ndarray
-    depth_band: np.ndarray
-    depth_error: np.ndarray
-    depth_rate: np.ndarray
-    depth_rate_confidence: np.ndarray
-    gap: np.ndarray
-    gap_band: np.ndarray
-    play: np.ndarray
-    lost: np.ndarray
-    reduction: np.ndarray
-    reduction_band: np.ndarray
-    amplitude: np.ndarray
+    """that wear: body, side and corner, area of the patch, share of the cavity"""
+    frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
+    time: Annotated[np.ndarray, Array(("time",), "h")]
+    depth: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    """of both partners of a contact; nan where its patch is not known"""
+    depth_band: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    depth_error: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    """of the steps"""
+    depth_rate: Annotated[np.ndarray, Array(("time", "contact"), "m/h")]
+    depth_rate_confidence: Annotated[np.ndarray, Array(("time", "contact"), "m/h")]
+    gap: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
+    gap_band: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
+    """by confidence and steps"""
+    play: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
+    """nan without"""
+    lost: Annotated[np.ndarray, Array(("time", "damper"))]
+    """fraction of each body that is worn away; nan where its size is not known"""
+    reduction: _Moments
+    """of what counts of the band"""
+    reduction_band: _Moments
+    amplitude: Annotated[np.ndarray, Array(("time", "frequency"))]
+    """over the reference; nan where a run failed"""
     hours: tuple[float | None, float | None, float | None]
+    """when the reduction is lost: of its curve, of the lower and of the upper bound; None: not within the hours; 0:
+    never reached [h]"""
     runs: int
     trouble: int
+    """of the runs, those with another status than ok"""
     sentence: str
+    """the answer in words"""
     starts: Mapping[str, Any] = field(default_factory=dict)
+    """worst of the damper over starts (worst_start.worst_start), as new ("new") and at the end ("end")"""
     worn_away: float | None = None
+    """after which a body is worn away, which ends the life; None: none is [h]"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data, arrays as nested lists."""
-        data = {name: getattr(self, name) for name in (*_PLAIN, "worn_away")}
-        data |= {
-            "study": dict(self.study),
-            "starts": dict(self.starts),
-            "contacts": [one._asdict() for one in self.contacts],
-        }
-        return data | {name: getattr(self, name).tolist() for name in _ARRAYS}
+    def labels(self) -> dict[str, Any]:
+        """Return the names of the contacts."""
+        return {"contact": [one.name for one in self.contacts]}
+
+    def derived(self) -> dict[str, Any]:
+        """Return the contacts by the names of their parts."""
+        return {"contacts": [one._asdict() for one in self.contacts]}
 
     @property
     def faces(self) -> dict[str, list[int]]:
@@ -103,30 +88,6 @@ class LifeRecord:
                 f"{hours:.0f}", opened,
                 f"{100 * self.reduction[number]:.1f} +- {100 * self.reduction_band[number]:.1f}",
             )  # fmt: skip
-
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens. Raises files.store.StoreError."""
-        variables = {name: Variable(getattr(self, name), dims, unit) for name, (dims, unit) in _ARRAYS.items()}
-        variables["contact"] = Variable(np.array([one.name for one in self.contacts], object), ("contact",))
-        attributes = {name: getattr(self, name) for name in _PLAIN} | {
-            "hours": json.dumps(self.hours), "study": dict(self.study), "provenance": dict(self.provenance),
-            "starts": dict(self.starts),
-            "contacts": json.dumps([list(one) for one in self.contacts]), "worn_away": json.dumps(self.worn_away),
-        }  # fmt: skip
-        save(path, _KIND, variables, attributes)
-
-    @classmethod
-    @reader
-    def load(cls, path: str | Path) -> LifeRecord:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, _KIND)
-        given: dict[str, Any] = {name: attributes[name] for name in _PLAIN}
-        given |= {name: json.loads(attributes.get(name, "{}")) for name in ("study", "starts", "provenance")}
-        given["worn_away"] = json.loads(attributes.get("worn_away", "null"))
-        given["hours"] = tuple(json.loads(attributes["hours"]))
-        given["contacts"] = tuple(Contact(*one) for one in json.loads(attributes["contacts"]))
-        given |= {name: frozen(values[name]) for name in _ARRAYS}
-        return cls(**given)
 
 
 def sentence_of(

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.files.store import Variable, frozen, load, reader, save
+from vanedamp.files.record import Array, Coded, Record
 from vanedamp.studies.machining import fine_gap
 from vanedamp.studies.optimisation.study import Design
 
-_KIND = "optimisation"
 #: distance from a bound, over the range, at which a search has run into it
 _AT_BOUND = 0.01
-_PLAIN = ("mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "sentence")
-_TABLES = ("study", "headlines", "starts", "gradient", "provenance")
-_ARRAYS = {
-    "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
-    "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
-    "history_design": (("evaluation", "variable"), "1"), "history_amplitude": (("evaluation",), "1"),
-    "history_robust": (("evaluation",), "1"), "frequency": (("frequency",), "Hz"),
-    "undamped": (("frequency",), "1"), "nominal_response": (("frequency",), "1"),
-    "robust_response": (("frequency",), "1"),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -75,57 +62,73 @@ class Optimum:
         }  # fmt: skip
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> Optimum:
+    def of(cls, data: Mapping[str, Any], _path: str = "") -> Optimum:
         """Return the record of `to_json`."""
         design = Design(data["mass_ratio"], data["gap_ratio"], int(data["bodies"]))
         return cls(design, data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
 
 
-@dataclass(frozen=True, eq=False)
-class Optimisation:
-    """Result of an optimisation. Amplitudes refer to the band (worst or mean, as the study says), over `reference`.
+_Optimum = Annotated[Optimum, Coded(Optimum.to_json, Optimum.of)]
+_Tried = Annotated[np.ndarray, Array(("evaluation",))]
+_OverBand = Annotated[np.ndarray, Array(("frequency",))]
 
-    study              the [optimise] table and the scene, as plain data
-    mass, amplitude    kg of the structure and m of X: references of mass ratio and gap ratio
-    reference          m, amplitude without bodies in the band: its maximum, at the points or between them, or its mean
-    resonance_frequency  Hz of the resonance that X and mass are of
-    nominal, robust    the best design as it is, and the best within the tolerances
-    map_*              axes (a,), (b,) and amplitudes (a, b) of designs as they are, with the bodies of `nominal`
-    history_*          designs (h, 3) in the order in which they were tried, their amplitudes (h,), and whether these
-                       are amplitudes within the tolerances (1) or as designed (0)
-    frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
-                       where a run is not ok
-    headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
-    starts             worst of these designs over starts (worst_start.worst_start), by the same names
-    gradient           where derivatives led the best design as designed (gradient.descend)
-    scenes, trouble    number of runs, and of those with another status than ok
-    sentence           the answer in words
-    """
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimisation(Record):
+    """Result of an optimisation. Amplitudes refer to the band (worst or mean, as the study says), over `reference`."""
+
+    KIND: ClassVar[str] = "optimisation"
     study: Mapping[str, Any]
+    """the [optimise] table and the scene, as plain data"""
     mass: float
+    """of the structure, to which mass ratios refer [kg]"""
     amplitude: float
+    """X, to which gap ratios refer [m]"""
     reference: float
+    """amplitude without bodies in the band: its maximum, at the points or between them, or its mean [m]"""
     resonance_frequency: float
-    nominal: Optimum
-    robust: Optimum
-    map_mass_ratio: np.ndarray
-    map_gap_ratio: np.ndarray
-    map_amplitude: np.ndarray
-    history_design: np.ndarray
-    history_amplitude: np.ndarray
-    history_robust: np.ndarray
-    frequency: np.ndarray
-    undamped: np.ndarray
-    nominal_response: np.ndarray
-    robust_response: np.ndarray
+    """of the resonance that X and mass are of [Hz]"""
+    nominal: _Optimum
+    """the best design as it is"""
+    robust: _Optimum
+    """the best within the tolerances"""
+    map_mass_ratio: Annotated[np.ndarray, Array(("map_mass_ratio",))]
+    map_gap_ratio: Annotated[np.ndarray, Array(("map_gap_ratio",))]
+    map_amplitude: Annotated[np.ndarray, Array(("map_mass_ratio", "map_gap_ratio"))]
+    """of designs as they are, with the bodies of `nominal`"""
+    history_design: Annotated[np.ndarray, Array(("evaluation", "variable"))]
+    """designs in the order in which they were tried"""
+    history_amplitude: _Tried
+    history_robust: _Tried
+    """whether an amplitude is within the tolerances (1) or as designed (0)"""
+    frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
+    """of the band"""
+    undamped: _OverBand
+    """amplitudes without bodies"""
+    nominal_response: _OverBand
+    """nan where a run is not ok"""
+    robust_response: _OverBand
     scenes: int
+    """number of runs"""
     trouble: int
+    """of the runs, those with another status than ok"""
     sentence: str
+    """the answer in words"""
     headlines: Mapping[str, Any] = field(default_factory=dict)
+    """by "nominal" and "robust": of the responses (studies.headline.Headline)"""
     starts: Mapping[str, Any] = field(default_factory=dict)
+    """worst of these designs over starts (worst_start.worst_start), by the same names"""
     gradient: Mapping[str, Any] = field(default_factory=dict)
+    """where derivatives led the best design as designed (gradient.descend)"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def labels(self) -> dict[str, Any]:
+        """Return the names of a design's variables."""
+        return {"variable": Design._fields}
+
+    def derived(self) -> dict[str, Any]:
+        """Return the remarks."""
+        return {"remarks": self.remarks}
 
     @property
     def remarks(self) -> list[str]:
@@ -167,37 +170,6 @@ class Optimisation:
     def optima(self) -> dict[str, Optimum]:
         """Both optima by what they are best for."""
         return {"as designed": self.nominal, "within the tolerances": self.robust}
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data, arrays as nested lists."""
-        arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
-        given = {name: dict(getattr(self, name)) for name in _TABLES if name != "provenance"}
-        return self._plain() | {"remarks": self.remarks} | given | arrays
-
-    def _plain(self) -> dict[str, Any]:
-        optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}
-        return {name: getattr(self, name) for name in _PLAIN} | optima
-
-    def save(self, path: str | Path) -> None:
-        """Write HDF5 that xarray opens. Raises files.store.StoreError."""
-        variables = {name: Variable(getattr(self, name), dims, unit) for name, (dims, unit) in _ARRAYS.items()}
-        variables["variable"] = Variable(np.array(Design._fields, object), ("variable",))
-        tables = {name: dict(getattr(self, name)) for name in _TABLES}
-        save(path, _KIND, variables, self._plain() | tables)
-
-    @classmethod
-    @reader
-    def load(cls, path: str | Path) -> Optimisation:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = load(path, _KIND)
-        arrays: dict[str, Any] = {name: frozen(values[name]) for name in _ARRAYS}
-        return cls(
-            **{name: attributes[name] for name in _PLAIN},
-            **arrays,
-            nominal=Optimum.of(json.loads(attributes["nominal"])),
-            robust=Optimum.of(json.loads(attributes["robust"])),
-            **{name: json.loads(attributes.get(name, "{}")) for name in _TABLES},
-        )
 
 
 def _words(reason: str) -> str:

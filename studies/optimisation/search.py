@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from vanedamp.files.store import finite, frozen
+from vanedamp.files.store import finite
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.checkpoint import Checkpoint
@@ -89,16 +89,16 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         resonance_frequency=study.resonance.frequency,
         nominal=replace(nominal, estimate=estimates["nominal"]),
         robust=replace(robust, estimate=estimates["robust"]),
-        map_mass_ratio=frozen(masses),
-        map_gap_ratio=frozen(gaps),
-        map_amplitude=frozen(amplitudes),
-        history_design=frozen(tried_designs),
-        history_amplitude=frozen(tried_amplitudes),
-        history_robust=frozen(tried_robust),
+        map_mass_ratio=masses,
+        map_gap_ratio=gaps,
+        map_amplitude=amplitudes,
+        history_design=np.array(tried_designs),
+        history_amplitude=np.array(tried_amplitudes),
+        history_robust=np.array(tried_robust),
         frequency=study.frequencies,
-        undamped=frozen(responses["nominal"][1]),
-        nominal_response=frozen(responses["nominal"][0]),
-        robust_response=frozen(responses["robust"][0]),
+        undamped=responses["nominal"][1],
+        nominal_response=responses["nominal"][0],
+        robust_response=responses["robust"][0],
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
         starts=starts,
         gradient=gradient,

@@ -145,7 +145,7 @@ class Calibrate(CaseStage):
         if tools.fresh:
             clear(checkpoint)
         found = calibrate(Case.load(self.file), checkpoint)
-        found.save(record)
+        found.record.save(record)
         save_tuned_case(self.file, found, tuned)
         save_rigid_scene(self.file, found, scene)
         clear(checkpoint)
@@ -191,7 +191,10 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's inputs and the options, without strengths, which a model has with its hot spots only."""
+        """Return the case's inputs and the options, without those of the fatigue level, which sweeps take elsewhere.
+
+        Strengths are in a model with its hot spots only.
+        """
         return _without_level(super().inputs(), self.table.hot_spots > 0) | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
@@ -200,7 +203,9 @@ class Reduce(CaseStage):
 
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
-        model = reduction(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
+        model = reduction(
+            structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots, level=False
+        )
         model.save(self.outputs[0])
         tools.warn(reduction_warnings(structure, model))
         return str(model.provenance["estimate"]["sentence"])
@@ -357,10 +362,14 @@ class Sweep(Stage):
         source = self.products.get("rigid")
         if source is None or not source.exists() or (self.table.structure != "rigid" and self.table.level is None):
             return {}, None
-        calibrated = source.name == CALIBRATION
-        _, attributes = load(source, "calibration" if calibrated else "modes")
-        rigid = json.loads(attributes["rigid"]) if "rigid" in attributes else {}
-        fatigue = json.loads(attributes.get("excitation" if calibrated else "fatigue", "{}"))
+        if source.name == CALIBRATION:
+            from vanedamp.studies.case.calibration_record import CalibrationRecord
+
+            record = CalibrationRecord.load(source)
+            rigid, fatigue = asdict(record.rigid), record.excitation or {}
+        else:
+            _, attributes = load(source, "modes")
+            rigid, fatigue = (json.loads(attributes.get(name, "{}")) for name in ("rigid", "fatigue"))
         if self.table.structure == "rigid" and not rigid:
             raise InputError(f"structure: {source} has no rigid model; give the case an [interface.<label>] table")
         if self.table.level is not None and not fatigue:

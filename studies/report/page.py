@@ -88,14 +88,14 @@ class Page:
             if kind == CLAIMS:
                 blocks.append(self._common_sections())
             moves = {name: partial(self._put_off, name) for name in _COMMON}
-            template = Path(section.__file__).with_suffix(".html").read_text(encoding="utf-8")
+            template = Path(getattr(section, "TEMPLATE", section.__file__)).with_suffix(".html")
             for study, files in [(None, own), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
                     name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
                     shows = section.section(results, replace(self, study=name))
                     of = {"section": shows, "study": name, "title": title, "not_ok": not_ok, **moves}
-                    blocks.append(self.environment.from_string(template).render(of))
+                    blocks.append(self.environment.from_string(template.read_text(encoding="utf-8")).render(of))
         return "".join(blocks)
 
     def _put_off(self, section: str, caller: Callable[[], str]) -> str:

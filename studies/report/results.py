@@ -1,4 +1,4 @@
-"""Results in files, the parts of a report. Each kind is read by its section (studies.report.sections)."""
+"""Results in files, the parts of a report. Each kind is read by its section (studies.kinds)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from vanedamp.files.store import decoding, kind_of
 from vanedamp.files.toml_input import InputError
 
 SECTIONS = ExtensionPoint(
-    "section of the report", "vanedamp.studies.report.sections", "vanedamp.report_sections",
-    ("KIND", "load", "section", "__file__"),
+    "section of the report", "vanedamp.studies.kinds", "vanedamp.report_sections",
+    ("KIND", "load", "section", "__file__"), folders=True, inside=".page",
 )  # fmt: skip
 
 
@@ -40,7 +40,7 @@ class Result:
 
 
 class Section(Protocol):
-    """The contract of a section; the folder `sections` says more."""
+    """The contract of a section; studies.kinds says more."""
 
     KIND: str
     __file__: str

@@ -17,7 +17,6 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.modal.algebra import von_mises
 from vanedamp.rom.recovery import COMPONENTS
 from vanedamp.studies.report.charts import COLOURS, DASHES, Chart, axis_title, dressed
-from vanedamp.studies.report.life_charts import wear_figure
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.strength_charts import (
     CURVES,
@@ -27,6 +26,7 @@ from vanedamp.studies.report.strength_charts import (
     lines_figure,
     lives_figure,
     stress_figure,
+    wear_figure,
 )
 
 #: periods of a course that are drawn

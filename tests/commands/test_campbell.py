@@ -11,8 +11,9 @@ from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.operation_tables import CampbellTable
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.report.campbell_picture import campbell_picture
-from vanedamp.studies.report.sections.campbell import campbell_figure, campbell_table
+from vanedamp.studies.kinds.campbell.page import campbell_table
+from vanedamp.studies.kinds.campbell.page import figure as campbell_figure
+from vanedamp.studies.kinds.campbell.picture import campbell_picture
 
 #: the block 0.1 m out from an axis across it, halfway between its sides
 ROTATION = """

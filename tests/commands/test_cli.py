@@ -192,6 +192,14 @@ def test_foreign_checkpoints_are_told_and_kept(folder, capfd):
     assert "name the result with -o" in capfd.readouterr().err
 
 
+def test_frequencies_beyond_the_estimate_are_marked(folder, capsys):
+    """A beam's second bending in its plane is far above 1.5 times the first: one without modes has it too high."""
+    assert main(["reduce", "case.toml", "--modes", "0", "-o", "rom.h5"]) == 0
+    text, (first, *rest) = capsys.readouterr().out, ReducedModel.load("rom.h5").natural_frequencies_hz[:8]
+    assert f"frequencies, Hz: {first:.6g}" in text and all(f"({value:.6g})" in text for value in rest)
+    assert "frequencies in brackets lie beyond" in text
+
+
 def test_sweep_of_a_reduced_model_by_two_workers(folder, capsys):
     assert main(["reduce", "case.toml", "--modes", "1", "-o", "rom.h5"]) == 0
     first = ReducedModel.load("rom.h5").natural_frequencies_hz[0]

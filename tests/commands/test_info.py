@@ -17,9 +17,9 @@ from tests.tools.extras import bare
 from tests.tools.input_files import DAMPED_BLOCK, SCENE
 from tests.tools.processes import ROOT
 from vanedamp.files.store import Variable, digest, load_any, save
+from vanedamp.studies import kinds
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.commands import COMMANDS
-from vanedamp.studies.file_kinds import RESULT_KINDS
 
 ROTATING = """
 [rotation]
@@ -196,7 +196,7 @@ def kinds_in_the_code():
 
 
 def test_every_kind_of_result_is_known():
-    assert set(kinds_in_the_code()) == set(RESULT_KINDS)
-    for kind in RESULT_KINDS.values():
-        assert inspect.isclass(pkgutil.resolve_name(kind.record)) and set(kind.commands) <= set(COMMANDS.own())
-    assert all(kind.commands for name, kind in RESULT_KINDS.items() if name != "system-matrices")
+    assert set(kinds_in_the_code()) == set(kinds.names())
+    for kind in map(kinds.kind, kinds.names()):
+        assert inspect.isclass(pkgutil.resolve_name(kind.RECORD)) and set(kind.COMMANDS) <= set(COMMANDS.own())
+        assert kind.COMMANDS or kind.NAME == "system-matrices"

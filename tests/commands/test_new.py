@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["scene", "case", "study"])
 def test_a_new_file_is_valid_commented_and_names_its_schema(folder, kind, capfd):
-    assert main(["new", kind]) == 0
+    assert main(["new", kind, "-o", f"{kind}.toml"]) == 0
     text = Path(f"{kind}.toml").read_text()
     assert text.splitlines()[0] == f"#:schema ./{kind}.schema.json"
     assert json.loads(Path(f"{kind}.schema.json").read_text()) == KINDS[kind].file_schema
@@ -40,8 +40,15 @@ def test_a_new_file_is_valid_commented_and_names_its_schema(folder, kind, capfd)
     assert max(map(len, text.splitlines())) <= 120
     assert main(["check", f"{kind}.toml"]) == 0
     assert f"a {kind}, for vanedamp" in capfd.readouterr().out
-    assert main(["new", kind]) == BAD_INPUT
+    assert main(["new", kind, "-o", f"{kind}.toml"]) == BAD_INPUT
     assert "exists already" in capfd.readouterr().err
+
+
+def test_without_a_name_it_is_shown(folder, capfd):
+    assert main(["new", "case"]) == 0
+    shown = capfd.readouterr()
+    assert list(folder.iterdir()) == [] and faults("case", tomllib.loads(shown.out)) == []
+    assert "nothing written; -o case.toml writes the file" in shown.err
 
 
 def test_a_new_scene_runs_and_its_body_works(folder, capfd):
@@ -53,13 +60,13 @@ def test_a_new_scene_runs_and_its_body_works(folder, capfd):
 
 
 def test_a_new_study_is_small(folder):
-    assert main(["new", "study"]) == 0
+    assert main(["new", "study", "-o", "study.toml"]) == 0
     study = Study.load("study.toml")
     assert scenes_of(study) < 1000 and study.scene.damper
 
 
 def test_a_new_case_has_the_groups_of_its_mesh(folder):
-    assert main(["new", "case"]) == 0
+    assert main(["new", "case", "-o", "case.toml"]) == 0
     case = Case.load("case.toml")
     case.check_groups(["clamp", "shroud", "c1_floor"], ["airfoils"])
     assert case.response_label == "shroud"
@@ -83,7 +90,7 @@ def test_a_new_scene_of_a_reduced_model(folder, labels, at, cavities, capfd):
     walls = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
     model(labels)
     (folder / "deep").mkdir()
-    assert main(["new", "scene", "--rom", "rom.h5"]) == 0
+    assert main(["new", "scene", "--rom", "rom.h5", "-o", "scene.toml"]) == 0
     scene = Scene.load("scene.toml")
     assert scene.excitation.at == at
     assert [{"name": c.name, "floor": c.floor} | ({"left": c.left} if c.left else {}) for c in scene.cavity] == cavities
@@ -115,7 +122,7 @@ def test_a_new_scene_takes_the_level_of_the_model_and_blocks_of_its_cavity(folde
         np.eye(3), np.diag([1e8, 2e9, 9e9]), rows, damping_ratio=0.01, arms=[0, 0, 0, 19e-3 / np.sqrt(12)],
         positions=[[0, 0, 0.2], [0, 0, 0.23], [0, 0, 0.23], [0, 0, 0.2325]], provenance={"fatigue": level},
     ).save("rom.h5")  # fmt: skip
-    assert main(["new", "scene", "--rom", "rom.h5"]) == 0
+    assert main(["new", "scene", "--rom", "rom.h5", "-o", "scene.toml"]) == 0
     scene = Scene.load("scene.toml")
     assert (scene.excitation.at, scene.excitation.resonance_amplitude) == ("c1", 31e-6)
     (cavity,), (body,) = scene.cavity, scene.damper
@@ -124,7 +131,7 @@ def test_a_new_scene_takes_the_level_of_the_model_and_blocks_of_its_cavity(folde
     assert body.height + cavity.play == pytest.approx(5e-3, rel=1e-3)
     assert warnings_of_check(capfd) == []
     assert "70% of the case's fatigue strength, 4e+08 Pa" in Path("scene.toml").read_text().replace("\n# ", " ")
-    assert main(["new", "study", "--rom", "rom.h5"]) == 0
+    assert main(["new", "study", "--rom", "rom.h5", "-o", "study.toml"]) == 0
     assert Study.load("study.toml").scene.damper[0].shape == "slider"
 
 

@@ -188,6 +188,7 @@ def test_hot_spots_have_the_fatigue_data_of_the_case(tmp_path, monkeypatch):
     vd.pipeline("pipeline.toml")
     replace_in(Path("case.toml"), "exponent = 6.0", "exponent = 5.0")
     assert vd.pipeline("pipeline.toml").stages[1].status == "kept"
+    assert "fatigue" not in vd.ReducedModel.load("out/rom.h5").provenance  # which would be of the exponent before
 
 
 #: by the file, the change in it, the stages that depend on it, and what is told

@@ -14,7 +14,7 @@ from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.report.mistuning_charts import sectors_figure
+from vanedamp.studies.kinds.mistuning.charts import sectors_figure
 from vanedamp.studies.ring_mesh import whole_ring
 
 DISK = """

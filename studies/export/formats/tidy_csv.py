@@ -1,4 +1,4 @@
-"""Tidy tables: one row per point of a sweep, sample, period or event; units stand in the header."""
+"""Tidy tables: one row per point of a sweep, sample, period, event, mode ...; units stand in the header."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.files.store import Variable, write_csv
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.export import Option
+from vanedamp.studies.export.export import ANY, Option
 from vanedamp.studies.export.record import Record
 
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
@@ -21,10 +21,11 @@ OPTIONS = (
 )  # fmt: skip
 #: tables by kind: dimensions of their rows, the first that a result has is written
 _TABLES = {
-    "response": ("time", "full_period"),
-    "ramp": ("period",),
-    "ring_down": ("cycle", "half_cycle"),
-    "modes": ("mode",),
+    "modes": ("mode",), "calibration": ("target", "mode"), "campbell": ("mode",), "ring-modes": ("mode",),
+    "reduced-model": ("mode",), "ring-model": ("coordinate",), "ring-sectors": ("interface",), "mistuning": ("order",),
+    "response": ("time", "full_period"), "ensemble": ("sample",), "orbits": ("point",), "ramp": ("period",),
+    "ring_down": ("cycle", "half_cycle"), "optimisation": ("frequency",), "life": ("time",),
+    "identification": ("number",), "deviations": ("sector",), "system-matrices": ("node",),
 }  # fmt: skip
 #: dimension of the Poincare sections of a sweep
 _SECTION = "section"
@@ -71,7 +72,7 @@ def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ..
     known = _lengths(record.variables)
     if table is not None and table not in known:
         raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
-    dimension = table or next(name for name in (*_TABLES[record.kind], *known) if name in known)
+    dimension = table or next(name for name in (*_TABLES.get(record.kind, ()), *known) if name in known)
     own = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
     own.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
     fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
@@ -80,7 +81,7 @@ def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ..
     return tuple(f"left out: {name}, a field; .mat or .vtkhdf hold it" for name in fields)
 
 
-WRITERS = {"sweep": sweep, **dict.fromkeys(_TABLES, table)}
+WRITERS = {"sweep": sweep, ANY: table}
 
 
 def _lengths(variables: Mapping[str, Variable]) -> dict[str, int]:

@@ -27,7 +27,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.report.sections.orbits import branches_figure
+from vanedamp.studies.kinds.orbits.page import branches_figure
 
 EPS = np.finfo(float).eps
 LAWS = {

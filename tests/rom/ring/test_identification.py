@@ -7,7 +7,7 @@ from scipy import linalg, sparse
 from tests.tools.rings import Chain, LumpedDisk
 from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.identification import deviations_of_modes, deviations_of_responses
+from vanedamp.rom.ring.identification import Identified, deviations_of_modes, deviations_of_responses
 from vanedamp.rom.ring.reduction import Part, reduce_ring
 
 SIZE = 7
@@ -35,7 +35,7 @@ def test_modes_of_a_disk():
     assert np.all(found.errors < 1e-4)
 
 
-def test_responses_of_a_disk():
+def test_responses_of_a_disk(tmp_path):
     disk, squares, tips = disk_modes()
     frequencies = np.linspace(0.97, 1.03, 12) * np.sqrt(squares[2]) / (2 * np.pi)
     omegas = 2 * np.pi * frequencies[:, None]
@@ -44,6 +44,10 @@ def test_responses_of_a_disk():
     found = deviations_of_responses(disk_ring(disk), frequencies, (3 - 1j) * responses, "tip", 2)
     np.testing.assert_allclose(found.stiffness, GIVEN, atol=1e-4)
     assert found.force == pytest.approx(3 - 1j, rel=1e-3)
+    found.save(tmp_path / "found.h5")
+    read = Identified.load(tmp_path / "found.h5")
+    assert read.force == found.force and read.to_json() == found.to_json()
+    np.testing.assert_array_equal(read.errors, found.errors)
 
 
 def test_errors_are_those_of_noise():

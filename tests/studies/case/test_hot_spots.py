@@ -70,9 +70,11 @@ def boxes(folder, near):
     return assemble(Case.load(folder / "case.toml"))
 
 
-def test_the_weaker_material_has_the_hot_spot(tmp_path):
+@pytest.mark.parametrize("near", ["fatigue_strength = 1e10", "fatigue = {strength = 1e10}"])
+def test_the_weaker_material_has_the_hot_spot(tmp_path, near):
     """By stress alone it would be at the clamp, with a hundredth of the utilisation."""
-    structure = boxes(tmp_path, "fatigue_strength = 1e10")
+    structure = boxes(tmp_path, near)
+    assert not [warning for warning in modal_analysis(structure).warnings if warning.startswith("material: ")]
     spot = hot_spots(with_hot_spots(structure, reduction(structure, 4, keep_recovery=True)))["hot1"]
     assert spot["group"] == "far" and spot["fatigue"]["strength"] == 1e8
     shape = solve_modes(structure.matrices, 1).shapes[0]

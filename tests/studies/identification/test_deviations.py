@@ -9,6 +9,7 @@ from scipy import linalg
 from tests.tools.rings import Chain
 from vanedamp.coupling.scene.mistuning import Deviation
 from vanedamp.rom.ring.deviations import Deviations
+from vanedamp.rom.ring.identification import Identified
 from vanedamp.studies.cli import main
 
 GIVEN = 0.03 * np.random.default_rng(2).standard_normal(6)
@@ -34,6 +35,9 @@ def test_command(folder: Path, capsys):
     assert main(["identify", str(folder / "study.toml"), "-o", str(written), "--csv", str(csv)]) == 0
     assert "sector  stiffness deviation" in capsys.readouterr().out
     np.testing.assert_allclose(Deviation(file=str(csv)).over(6, "stiffness", (0, 0)), GIVEN, atol=1e-9)
+    read = Identified.load(written)
+    np.testing.assert_allclose(read.deviations.stiffness, GIVEN, atol=1e-9)
+    assert read.force == 0 and read.provenance["table"]["at"] == "tip"
     assert main(["info", str(written)]) == 0
     assert main(["check", str(folder / "study.toml")]) == 0
     assert "natural modes, at tip" in capsys.readouterr().out

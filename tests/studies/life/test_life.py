@@ -15,11 +15,11 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.commands import life as command
+from vanedamp.studies.kinds.plot import plot
 from vanedamp.studies.life import fast
 from vanedamp.studies.life.life import life
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.life.study import LifeStudy
-from vanedamp.studies.report.plot import plot
 
 
 def study(**changes):

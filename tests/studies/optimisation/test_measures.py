@@ -6,10 +6,10 @@ from tests.coupling.strength.test_strength_of_runs import CURVE, FACTS, saved
 from tests.coupling.strength.test_stressed_runs import FIRST, STRESS
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
-from vanedamp.studies.report.optimum_chart import optimisation_figure
 
 RIGID = {"model": "rigid", "mass": 1.0, "stiffness": 1e6, "damping_ratio": 0.01}
 WEAR = {"rate": 1e-15, "impact_rate": 1e-13, "area": 1e-6}

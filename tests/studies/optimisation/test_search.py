@@ -14,11 +14,11 @@ from tests.tools.processes import ROOT
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation import search as module
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import deviations, optimise
 from vanedamp.studies.optimisation.study import Design, Study
-from vanedamp.studies.report.optimum_chart import optimisation_figure
 from vanedamp.studies.worst_start import STARTS
 
 EXAMPLE = ROOT / "docs" / "examples" / "optimise.toml"

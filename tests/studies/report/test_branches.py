@@ -16,11 +16,11 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
-from vanedamp.studies.report.border_chart import maps_of
+from vanedamp.studies.kinds.orbits.borders import maps_of
+from vanedamp.studies.kinds.orbits.page import joined
+from vanedamp.studies.kinds.plot import plot
 from vanedamp.studies.report.page import write_report
-from vanedamp.studies.report.plot import plot
 from vanedamp.studies.report.results import collect
-from vanedamp.studies.report.sections.orbits import joined
 from vanedamp.studies.report.sweep_beside import points_beside
 
 #: beside the resonance, where the motion with two impacts per period is symmetric

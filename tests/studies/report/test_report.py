@@ -24,12 +24,12 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
+from vanedamp.studies.kinds.modes import page as modes_section
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import energy_figure, jumps
 from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
 from vanedamp.studies.report.page import body_note, write_report
 from vanedamp.studies.report.results import collect
-from vanedamp.studies.report.sections import modes as modes_section
 
 FREQUENCIES = (np.linspace(0.97, 1.02, 7) * RESONANCE).tolist()
 

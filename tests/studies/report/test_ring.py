@@ -9,10 +9,10 @@ import vanedamp as vd
 from tests.tools.plate_rings import mesh_variables, plate_waves, sector_mesh
 from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.cli import main
-from vanedamp.studies.report import ring_view as module
-from vanedamp.studies.report.ring_charts import interference_figure, ring_campbell_figure
-from vanedamp.studies.report.ring_picture import interference_picture
-from vanedamp.studies.report.ring_view import ring_surface, ring_view, sector_table
+from vanedamp.studies.kinds.ring_modes import view as module
+from vanedamp.studies.kinds.ring_modes.charts import interference_figure, ring_campbell_figure
+from vanedamp.studies.kinds.ring_modes.picture import interference_picture
+from vanedamp.studies.kinds.ring_modes.view import ring_surface, ring_view, sector_table
 from vanedamp.studies.ring_mesh import whole_ring
 
 SECTORS = 8

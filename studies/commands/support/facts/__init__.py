@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from vanedamp.files.reference import FileKind, key_in, options, table_at
-
-
-class Fact(NamedTuple):
-    """A value under a key of the results for machines, with its unit and meaning."""
-
-    key: str
-    value: Any
-    unit: str = ""
-    text: str = ""
 
 
 def defaults(kind: FileKind, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -39,30 +30,3 @@ def _defaults(
             for index, entry in enumerate(value):
                 if isinstance(entry, Mapping):
                     yield from _defaults(schema, items, entry, f"{prefix}{key}.{index}.")
-
-
-def fact_lines(head: str, found: Iterable[Fact]) -> Iterator[str]:
-    """Yield facts for people, below a line."""
-    yield head
-    for key, value, unit, text in found:
-        if key == "warnings":
-            for warning in value:
-                yield f"warning: {warning}"
-        elif _known(value):
-            yield f"  {key:21} {f'{word(value)} {unit}':26} {text}".rstrip()
-
-
-def _known(value: Any) -> bool:
-    """Whether there is something to print of a value."""
-    return any(map(_known, value)) if isinstance(value, list) else value not in ({}, None)
-
-
-def word(value: Any) -> str:
-    """Return a value as it stands in a line."""
-    if isinstance(value, dict):
-        return "; ".join(f"{key}: {word(entry)}" for key, entry in value.items())
-    if isinstance(value, list):
-        return ", ".join(map(word, value))
-    if value is None:
-        return "unknown"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -15,7 +15,7 @@ from vanedamp.modal.mesh_import import group_names
 from vanedamp.modal.msh import checked_file
 from vanedamp.modal.units import material_doubts, size_doubts
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
-from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.facts import Fact
 
 #: elements of degree 2 in the length of a shear wave that show its mode to a per cent
 _IN_A_WAVE = 6

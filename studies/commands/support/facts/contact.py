@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vanedamp.coupling.strength.contact_numbers import contact
-from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.facts import Fact
 
 
 def facts(path: str | Path) -> list[Fact]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vanedamp.rom.ring.ring_model import RingModel
-from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.facts import Fact
 from vanedamp.studies.identification.deviations import load_table
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vanedamp.studies.case.external_model import External
-from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.facts import Fact
 
 
 def facts(path: str | Path) -> list[Fact]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene import facts_of
+from vanedamp.studies.facts import Fact
 from vanedamp.studies.identification.study import IdentificationStudy
 
 

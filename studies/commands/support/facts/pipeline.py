@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.facts import Fact
 from vanedamp.studies.pipeline.pipeline import pipeline
 from vanedamp.studies.pipeline.tables import PipelineFile
 

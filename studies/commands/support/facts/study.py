@@ -10,9 +10,9 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.system.transient import timed
 from vanedamp.studies.commands.support.budget import check_optimise, designs_of, scenes_of
-from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.facts.scene import facts_of
 from vanedamp.studies.commands.support.trial import mean_cost, tried
+from vanedamp.studies.facts import Fact
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
 from vanedamp.studies.workers import available_cores
 

@@ -1,0 +1,74 @@
+"""The kinds of results: each folder here is one, and what is known of it stands there.
+
+A kind is a folder named like the attribute `kind` of its HDF5 files (with _ for -), whose `__init__` has
+
+    NAME           the attribute
+    ABOUT          what it is, in words
+    COMMANDS       that write it
+    RECORD         class of its content in Python, by its public name
+    facts(found)   what `vanedamp info` says of a file (studies.facts.Found)
+
+and whose `page.py`, which draws, has
+
+    load(path)                read a file; returns a studies.report.results.Result
+    section(results, page)    the data of page.html; results: of the kind, by the path of their file, page: a
+                              studies.report.page.Page, which makes the charts
+    ORDER                     place on the page
+    figure(record)            what `vanedamp.plot` shows of the record that `load` read, or that a command returns
+
+page.html, a Jinja template, is given `section`, and the name of the `study` that the results belong to, if any, and its
+`title`. It has the macro `plot(chart)` and, for files, the filters `name` and `anchor`. What it writes inside
+`{% call later() %}` stands in the section of the energies, inside `{% call strength() %}` in that of strength and life.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any, Protocol
+
+from vanedamp.studies.facts import Fact, Found
+
+
+class Kind(Protocol):
+    """The contract of a kind's folder."""
+
+    NAME: str
+    ABOUT: str
+    COMMANDS: tuple[str, ...]
+    RECORD: str
+
+    def facts(self, found: Found) -> Iterator[Fact]:
+        """Yield the figures of a file."""
+
+
+def names() -> list[str]:
+    """Return the names of all kinds; loads none."""
+    folders = (name for _, name, is_folder in pkgutil.iter_modules(__path__) if is_folder)
+    return sorted(name if name in _UNDERSCORED else name.replace("_", "-") for name in folders if name != _PAGE_ONLY)
+
+
+def kind(name: str) -> Kind | None:
+    """Return the kind of a name; None where there is none."""
+    return _loaded(name) if name in names() else None
+
+
+def of_command(command: str) -> Kind | None:
+    """Return the kind that a command writes; None where there is none."""
+    return kind(command) or next((one for one in map(_loaded, names()) if command in one.COMMANDS), None)
+
+
+def of_record(record: Any) -> str | None:
+    """Return the name of the kind of a record; None where there is none."""
+    own = {one.__name__ for one in type(record).__mro__}
+    return next((name for name in names() if _loaded(name).RECORD.rpartition(".")[2] in own), None)
+
+
+def _loaded(name: str) -> Kind:
+    found: Kind = import_module(f"{__name__}.{name.replace('-', '_')}")
+    return found
+
+
+#: a kind that has the underscore in its name; a folder that is no kind of HDF5
+_UNDERSCORED, _PAGE_ONLY = {"ring_down"}, "claims"

@@ -1,0 +1,1 @@
+"""Claims of a study and what became of them: a page for the report only."""

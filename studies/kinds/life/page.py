@@ -1,0 +1,49 @@
+"""Lives of dampers: how long they damp, and wear, gaps and reduction over hours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.studies.kinds.life import NAME
+from vanedamp.studies.kinds.life.charts import life_figure
+from vanedamp.studies.life.record import LifeRecord
+from vanedamp.studies.report.charts import dressed
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.strength_charts import wear_figure
+
+ORDER = 57
+KIND = NAME
+figure = life_figure
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp life` wrote."""
+    return Result.of(LifeRecord.load(path))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return every life with its charts and the wear of its contacts."""
+    return [_life(file, result.record, page) for file, result in results.items()]
+
+
+def _life(file: str, record: LifeRecord, page: Page) -> dict[str, Any]:
+    faces = record.faces
+    depth = {name: record.depth[:, places].mean(axis=1) for name, places in faces.items()}
+    rate = [float(record.depth_rate[0, places].mean()) for places in faces.values()]
+    spread = [float(np.linalg.norm(record.depth_rate_confidence[0, places])) / len(places) for places in faces.values()]
+    header = ("hours", "reduction", "reduction_band", *(f"gap_{place}" for place in range(record.gap.shape[1])))
+    header += tuple(f"depth_{name.replace(' ', '_')}" for name in faces)
+    rows = zip(record.time, record.reduction, record.reduction_band, *record.gap.T, *depth.values(), strict=True)
+    course = page.chart("life", dressed(life_figure(record), height=780), header, rows, [file])
+    bars = dressed(wear_figure(list(faces), rate, spread), height=360)
+    wear = zip(faces, rate, spread, strict=True)
+    return {
+        "record": record, "file": file,
+        "faces": [(name, depth[name][-1], own) for name, own in zip(faces, rate, strict=True)],
+        "charts": [course, page.chart("wear", bars, ("face", "depth_rate", "confidence"), wear, [file])],
+    }  # fmt: skip

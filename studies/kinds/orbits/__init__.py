@@ -1,0 +1,29 @@
+"""Branches of periodic orbits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.studies.facts import Fact, Found
+
+NAME = "orbits"
+ABOUT = "branches of periodic orbits"
+COMMANDS = ("orbits",)
+RECORD = "vanedamp.Branches"
+
+
+def facts(record: Found) -> Iterator[Fact]:
+    """Yield its figures."""
+    branches = Branches.load(record.path)
+    yield Fact("parameter", branches.parameter)
+    found = branches.to_json()
+    yield Fact("branches", [
+        f"{branch['points']} orbits from {branch['parameter_min']:.6g} to {branch['parameter_max']:.6g} "
+        f"{found['unit']}, {branch['stable_points']} stable" for branch in found["branches"]
+    ])  # fmt: skip
+    yield Fact("special_points", dict(Counter(point["kind"] for point in found["special_points"])))
+    yield Fact("borders", [
+        f"{border['kind']}, {border['points']} points over {branches.second}" for border in found["borders"]
+    ])  # fmt: skip

@@ -1,0 +1,23 @@
+"""Run-ups and run-downs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.studies.facts import Fact, Found
+
+NAME = "ramp"
+ABOUT = "run-ups and run-downs"
+COMMANDS = ("ramp",)
+RECORD = "vanedamp.Ramp"
+
+
+def facts(record: Found) -> Iterator[Fact]:
+    """Yield its figures."""
+    found = Ramp.load(record.path).to_json()
+    yield Fact("runs", [
+        f"{abs(run['rate']):g} {found['unit']}/s {run['direction']}: {run['status']}, peak {run['peak']:.6g} m at "
+        f"{run['peak_frequency']:.6g} Hz, {run['peak_share']:.1%} of the steady peak without bodies"
+        for run in found["runs"]
+    ])  # fmt: skip

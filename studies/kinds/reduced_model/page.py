@@ -1,0 +1,90 @@
+"""Reduced models: frequencies, the mass that an impact feels, and hot spots on the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.rom.error_estimate import frequency_grid
+from vanedamp.rom.recovery import hot_spots
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.hot_spots import spot_lines, spot_warnings
+from vanedamp.studies.kinds.reduced_model import NAME
+from vanedamp.studies.report.charts import COLOURS, Chart
+from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+
+ORDER = 30
+KIND = NAME
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp reduce` or `vanedamp import` wrote."""
+    return Result.of(ReducedModel.load(path))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return the tables of every model."""
+    return [_reduction(file, result.record, page) for file, result in results.items()]
+
+
+def figure(record: ReducedModel) -> go.Figure:
+    """Draw the receptance of its first interface coordinate, |displacement / force|, around its first modes."""
+    frequencies = frequency_grid(record, *_range(record), points=801)
+    label = record.interface[0]
+    drawn = go.Figure(go.Scatter(
+        x=frequencies, y=np.abs(record.frf(frequencies, label, label)), mode="lines", line={"color": COLOURS[0]},
+        hovertemplate="%{x:.6g} Hz<br>%{y:.4g} m/N<extra></extra>",
+    ))  # fmt: skip
+    drawn.update_xaxes(title_text="frequency, Hz")
+    drawn.update_yaxes(title_text=f"receptance of {label}, m/N", type="log", exponentformat="power")
+    return drawn
+
+
+def _range(record: ReducedModel) -> tuple[float, float]:
+    """Return the band of the estimated error, or that of the first three modes, Hz."""
+    elastic = record.natural_frequencies_hz[record.rigid_modes :]
+    low, high = record.provenance.get("estimate", {}).get("frequencies_hz", [0.0, 1.5 * float(elastic[:3].max())])
+    return max(low, 0.01 * high), high
+
+
+def _reduction(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
+    spots = hot_spots(model)
+    placed = {name: facts for name, facts in spots.items() if "coordinates" in facts}
+    return {
+        "spots": list(spot_lines(spots)),
+        "doubts": list(spot_warnings(model.provenance)),
+        "picture": _picture(file, model, placed, page) if placed else None,
+        "file": file,
+        "interface": model.interface,
+        "masses": [
+            (label, model.contact_mass(label))
+            for label, length in zip(model.interface, model.lengths, strict=True)
+            if length == 1.0
+        ],
+        "modes": model.modes,
+        "frequencies": model.natural_frequencies_hz,
+        "covered_hz": model.provenance.get("estimate", {}).get("frequencies_hz", [0.0, float("inf")])[1],
+        "greatest_speed": model.greatest_speed,
+        "fastest": model.at_speed(model.greatest_speed).natural_frequencies_hz,
+        "rotation": model.provenance.get("rotation", {}).get("sentence"),
+        "damping_ratio": model.damping_ratio,
+    }
+
+
+def _picture(file: str, model: ReducedModel, spots: Mapping[str, Mapping[str, Any]], page: Page) -> Chart | None:
+    """Return the hot spots on the mesh of the page's modes, with their first bending's stress; None without."""
+    mesh = model.provenance.get("matrices", {}).get("mesh_sha256")
+    for modes, result in page.results.kinds["modes"].items():
+        values, attributes = result.record
+        same = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
+        surface = small_surface(values) if same and "von_mises" in values else None
+        if surface is not None:
+            figure = spots_figure(values, surface, int(attributes["first_bending"]), spots)
+            return page.chart("spots", figure, ("x", "y", "z", "stress"), spots_rows(values, surface), [file, modes])
+    return None

@@ -1,0 +1,120 @@
+"""Runs: results and energies, the time history and the motion in the plane where the run kept samples, impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from vanedamp.coupling.response.response import Response
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.kinds.response import NAME
+from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.page import Page, body_note
+from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
+from vanedamp.studies.report.results import Result
+from vanedamp.studies.report.sector_charts import sectors_shown
+from vanedamp.studies.report.strength import contacts_shown, spots_shown
+from vanedamp.studies.report.time_history import History, history_figure
+
+ORDER = 60
+KIND = NAME
+HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp run` wrote."""
+    history = History.load(path)
+    return Result.of(history, history.provenance.get("scene"))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return the results of every run, its charts and its motion if it was sampled, its impacts if it kept events."""
+    return [_history(file, result.record, page) for file, result in results.items()]
+
+
+def figure(record: History | Response) -> go.Figure:
+    """Draw the time history. Raises InputError for a run that kept no samples."""
+    history = record if isinstance(record, History) else History.of(record)
+    if not len(history.time):
+        raise InputError("plot: the run kept no samples; simulate(scene, events=True, samples_per_period=200)")
+    return history_figure(history.late())
+
+
+def _history(file: str, history: History, page: Page) -> dict[str, Any]:
+    energies = history.measures["energy"]
+    largest = max(map(abs, energies.values()), default=0.0)
+    shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}
+    shown["energies"] = {name: without_round_off(value, largest) for name, value in energies.items()}
+    shown["static"] = history.measures.get("static_deflection", 0.0)  # earlier files have none
+    notes = [body_note(history.measures, history.scene), *history.measures.get("warnings", ())]
+    shown |= {"hits": bool(history.hits), "notes": list(filter(None, notes))}
+    shown |= dict.fromkeys(("chart", "motion", "player", "impacts", "stress", "wear", "sectors"))
+    if stress := history.measures.get("stress"):
+        shown["stress"] = spots_shown(file, stress, history.measures.get("strength", {}), page)
+    if sectors := history.measures.get("sectors"):
+        shown["sectors"] = sectors_shown(file, sectors, page)
+    if wear := history.measures.get("wear"):
+        shown["wear"] = contacts_shown(file, wear, page)
+    if len(history.time):
+        late = history.late()
+        shown["chart"] = page.chart("history", history_figure(late), late.header(), late.rows(), [file])
+        shown["motion"] = late.motion()
+        shown["player"] = shown["motion"] and page.motion(shown["motion"], [file])
+    if history.by_place:
+        measures = history.measures
+        figure = impacts_figure(history.by_place, max(measures["periods"] - measures["transient"], 1))
+        shown["impacts"] = page.chart("impacts", figure, HEADER, impacts_rows(history.by_place), [file])
+        shown["lost"] = sum(each.loss for each in history.by_place)
+    return shown
+
+
+def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
+    """Return number, tilt, lift and neglected part of each planar body."""
+    figures = [measures.get(name, []) for name in ("tilt_max", "lift_share", "linearisation")]
+    return [
+        {"number": number, "tilt": tilt, "lift": lift, "neglected": neglected}
+        for number, (tilt, lift, neglected) in enumerate(zip(*figures, strict=True), start=1)
+        if np.isfinite(tilt)
+    ]
+
+
+def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
+    """Draw impacts per period, mean normal and tangential impulse, and energy taken per period, one bar per contact."""
+    known = bool(np.isfinite([each.loss for each in impacts]).all())
+    figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for body in dict.fromkeys(each.body for each in impacts):
+        mine = [each for each in impacts if each.body == body]
+        places, count = [each.place for each in mine], np.array([each.impacts for each in mine])
+        colour, name = COLOURS[body % len(COLOURS)], f"body {body + 1}"
+        normal = 1e3 * np.array([each.normal_impulse for each in mine]) / count
+        tangential = 1e3 * np.array([each.tangential_impulse for each in mine]) / count
+        bars = [(1, count / periods, "impacts per period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
+        bars += [(2, tangential, "tangential impulse", " mN s", 0.4)]
+        if known:
+            loss = 1e6 * np.array([each.loss for each in mine]) / periods
+            bars += [(3, loss, "energy per period", " µJ", 1.0)]
+        for row, values, title, unit, opacity in bars:
+            figure.add_bar(
+                x=places, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
+                name=name, legendgroup=name, offsetgroup=f"{body}{opacity}" if row == 2 else f"{body}",
+                hovertemplate=f"{name}, {title}: %{{y:.4g}}{unit}<extra></extra>", row=row, col=1,
+            )  # fmt: skip
+    figure.update_xaxes(categoryorder="array", categoryarray=places_in_order(impacts))
+    figure.update_yaxes(title_text="impacts per period", row=1, col=1)
+    figure.update_yaxes(title_text="mean impulse, mN s", row=2, col=1)
+    if known:
+        figure.update_yaxes(title_text="energy per period, µJ", row=3, col=1)
+    dressed(figure, height=240 * (2 + known))
+    return figure.update_layout(barmode="group", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
+
+
+def impacts_rows(impacts: Sequence[ImpactsAtPlace]) -> Iterator[tuple[object, ...]]:
+    """Yield a line a contact, bodies counted from 1, sums over the evaluated periods in SI units."""
+    yield from ((each.body + 1, *astuple(each)[1:]) for each in impacts)

@@ -1,0 +1,60 @@
+"""Reduced models of rings: their size, their frequencies by nodal diameter, and the estimate of their error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.rom.ring.ring_model import RingModel
+from vanedamp.rom.ring.sector_ring import SectorRing, load_ring
+from vanedamp.studies.kinds.ring_model import NAME
+from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+
+ORDER = 31
+KIND = NAME
+#: frequencies that are drawn and listed
+_MOST = 200
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp reduce` wrote of a case with [ring]."""
+    return Result.of(load_ring(path))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return every ring with the chart of its frequencies."""
+    return [
+        {
+            "file": file, "ring": result.record, "estimate": result.record.provenance.get("estimate", {}),
+            "chart": page.chart(
+                "ring-frequencies", dressed(figure(result.record), height=420), *_table(result.record), [file]
+            ),
+        }
+        for file, result in results.items()
+    ]  # fmt: skip
+
+
+def figure(record: RingModel | SectorRing) -> go.Figure:
+    """Draw the natural frequencies over the nodal diameter, or over their number where sectors are the basis."""
+    (title, _), rows = _table(record)
+    numbers, frequencies = np.array(rows, dtype=float).T
+    drawn = go.Figure(go.Scatter(
+        x=numbers, y=frequencies, mode="markers", marker={"color": COLOURS[0], "size": 8},
+        hovertemplate=f"{title} %{{x}}<br>%{{y:.6g}} Hz<extra></extra>",
+    ))  # fmt: skip
+    drawn.update_xaxes(title_text=title, dtick=1 if len(set(numbers)) < 30 else None)
+    drawn.update_yaxes(title_text="natural frequency of the tuned ring, Hz")
+    return drawn
+
+
+def _table(record: RingModel | SectorRing) -> tuple[tuple[str, str], list[tuple[int, float]]]:
+    frequencies = record.frequencies_hz[:_MOST].tolist()
+    if isinstance(record, RingModel):
+        return ("nodal diameter", "frequency_hz"), list(zip(record.diameters.tolist(), frequencies, strict=False))
+    return ("mode", "frequency_hz"), list(enumerate(frequencies, 1))

@@ -1,0 +1,11 @@
+"""Reduced models of rings by sectors: shown as those by modes."""
+
+from __future__ import annotations
+
+from vanedamp.studies.kinds.ring_model.page import __file__ as TEMPLATE
+from vanedamp.studies.kinds.ring_model.page import figure, load, section
+from vanedamp.studies.kinds.ring_sectors import NAME as KIND
+
+__all__ = ["KIND", "ORDER", "TEMPLATE", "figure", "load", "section"]
+
+ORDER = 32

@@ -1,0 +1,56 @@
+"""Matrices of finite elements: their size, and their nodes with the supports and patches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.studies.kinds.system_matrices import NAME
+from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+
+ORDER = 12
+KIND = NAME
+#: nodes that are drawn, evenly chosen of more
+_MOST = 20_000
+
+
+def load(path: Path) -> Result:
+    """Read what SystemMatrices.save wrote."""
+    return Result.of(SystemMatrices.load(path))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return the sizes of matrices and the chart of their nodes."""
+    return [
+        {
+            "file": file, "matrices": result.record,
+            "chart": page.chart("nodes", dressed(figure(result.record), height=520), ("x", "y", "z"),
+                                result.record.coordinates.tolist(), [file]),
+        }
+        for file, result in results.items()
+    ]  # fmt: skip
+
+
+def figure(record: SystemMatrices) -> go.Figure:
+    """Draw the nodes: free, held and those of patches."""
+    drawn = go.Figure()
+    count = len(record.coordinates)
+    held = np.unique(record.fixed // 3)
+    sets: list[tuple[str, Iterable[int]]] = [("nodes", range(0, count, max(1, count // _MOST))), ("held", held)]
+    sets += [(name, patch.nodes) for name, patch in record.patches.items()]
+    for number, (name, nodes) in enumerate(sets):
+        x, y, z = record.coordinates[np.array(nodes, dtype=int)].T
+        drawn.add_scatter3d(
+            x=x, y=y, z=z, mode="markers", name=name,
+            marker={"size": 2 if number == 0 else 4, "color": COLOURS[number % len(COLOURS)]},
+        )  # fmt: skip
+    drawn.update_layout(scene={"aspectmode": "data", "xaxis": {"title": "x, m"}, "yaxis": {"title": "y, m"},
+                               "zaxis": {"title": "z, m"}})  # fmt: skip
+    return drawn
