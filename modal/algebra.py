@@ -133,3 +133,17 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
     """Return the rotations (N, 3, 3) of the frames of N sectors about an axis (3,)."""
     return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])
+
+
+def speed_weights(speed: float, greatest: float, count: int) -> np.ndarray:
+    """Return the weights (count,) by which a speed W adds matrices to a stiffness.
+
+    W^2 of the first, (rad/s)^2, and (W / greatest)^4, (W / greatest)^6, ... of others, up to the greatest speed.
+    """
+    return np.array([speed**2, *((speed / greatest) ** (2 * power) for power in range(2, count + 1))])
+
+
+def added_by_speed(speed: float, greatest: float, matrices: Sequence[Any]) -> Any:
+    """Return what a speed adds to a stiffness: the sum of matrices by their `speed_weights`."""
+    weights = speed_weights(speed, greatest, len(matrices))
+    return sum(weight * matrix for weight, matrix in zip(weights, matrices, strict=True))

@@ -18,6 +18,8 @@ from vanedamp.modal.speed_range import SpeedRange
 
 # frequencies closer than this multiple of their error are one
 _SAME = 10.0
+# relative error of a frequency that a warning names
+_NOTABLE = 1e-3
 
 
 class CampbellError(VanedampError):
@@ -68,6 +70,8 @@ def campbell(
         warnings = list(tracks.notes)
         if errors.max() > tolerance:
             warnings.append(f"frequencies are estimated to be wrong by up to {errors.max():.2g} of their value")
+        neglected = source.neglected_error()
+        warnings += neglected_notes(neglected)
         frequencies = np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi)
         for mode, curve in zip(tracks.kept, frequencies, strict=True):
             known = tracks.speeds[np.isfinite(curve)]
@@ -89,7 +93,18 @@ def campbell(
             gyroscopic=gyroscopic,
             warnings=tuple(warnings),
             provenance=rotating.standing.provenance,
+            neglected=neglected or None,
         )
+
+
+def neglected_notes(error: float) -> list[str]:
+    """Return the warning of a relative error of frequencies for what the stiffness neglects between its speeds."""
+    if error <= _NOTABLE:
+        return []
+    return [
+        f"between standstill and the highest speed, frequencies are estimated to be wrong by up to {100.0 * error:.2g} "
+        "%, since the structure bends much; a lower highest speed makes it smaller"
+    ]
 
 
 def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
@@ -98,8 +113,8 @@ def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> l
     found = [
         Crossing(tracks.number_at(speed, place), float(order), speed, order * speed / (2.0 * np.pi))
         for order in orders
-        for place, speed in enumerate(source.meetings(order).tolist()[: source.count])
-        if low <= speed <= high
+        for place, speed in source.meetings(order)
+        if place < source.count and low <= speed <= high
     ]
     kept = [crossing for crossing in found if crossing.mode in tracks.kept]
     return sorted(kept, key=lambda crossing: (crossing.speed, crossing.mode))

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.campbell import CampbellError, checked_speeds
+from vanedamp.modal.campbell import CampbellError, checked_speeds, neglected_notes
 from vanedamp.modal.cyclic import CyclicSector, aliased
 from vanedamp.modal.cyclic_rotation import rotating_diameter
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.records.campbell import Campbell, Crossing
 from vanedamp.modal.rotating import RotatingMatrices
-from vanedamp.modal.speed_range import SpeedRange, meetings, ritz_modes
+from vanedamp.modal.speed_range import SmallMatrices, SpeedRange, meetings, ritz_modes
 
 
 def ring_campbell(
@@ -44,7 +44,7 @@ def ring_campbell(
         raise CampbellError("orders: expected whole engine orders of a ring")
     curves: list[_Curve] = []
     crossings: list[Crossing] = []
-    errors, solved = [], set()
+    errors, solved, neglected = [], set(), 0.0
     for diameter in sector.diameters:
         if report is not None:
             report(diameter, len(sector.diameters))
@@ -62,9 +62,11 @@ def ring_campbell(
                 ]
                 curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
             errors.append(_errors(source, wanted))
+            neglected = max(neglected, source.neglected_error())
             solved |= set(source.solved)
     worst = np.max(errors, axis=0)
     warnings = [] if worst.max() <= tolerance else [f"frequencies are estimated to be wrong by up to {worst.max():.2g}"]
+    warnings += neglected_notes(neglected)
     return Campbell(
         speeds=wanted,
         asked=np.ones(wanted.size, dtype=bool),
@@ -78,6 +80,7 @@ def ring_campbell(
         gyroscopic=gyroscopic,
         warnings=tuple(warnings),
         provenance=rotating.standing.provenance,
+        neglected=neglected or None,
         diameters=np.array([curve.diameter for curve in curves]),
         families=np.array([curve.family for curve in curves]),
     )
@@ -125,8 +128,8 @@ def _of_sense(
         (order, family, speed)
         for order, own in exciting
         if own == sense or not split
-        for family, speed in enumerate(meetings(small, order)[:count].tolist())
-        if speeds[0] <= speed <= speeds[-1]
+        for family, speed in meetings(small, order)
+        if family < count and speeds[0] <= speed <= speeds[-1]
     ]
     return _Wave(sense, np.where(frequencies <= known, frequencies, np.nan), met)
 
@@ -148,13 +151,12 @@ def _refine(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> None:
 class _Waves(SpeedRange):
     """A basis for the real form of a diameter, with i times every field, so that its two waves can be told apart."""
 
-    def of_sense(self, sense: int) -> list[np.ndarray]:
+    def of_sense(self, sense: int) -> SmallMatrices:
         """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of those with -h."""
         basis = self.basis
         turned = basis.T @ (self.rotating.standing.of_free(self.rotating.standing.mass) @ _turned(basis.T).T)
         values, vectors = np.linalg.eigh(-1j * sense * turned)
-        own = vectors[:, values > 0.5]
-        return [own.conj().T @ matrix @ own for matrix in self.small]
+        return self.small.within(vectors[:, values > 0.5])
 
     def _join(self, speed: float, modes: Arrays) -> None:
         super()._join(speed, {**modes, "shape": np.vstack([modes["shape"], _turned(modes["shape"])])})

@@ -32,6 +32,9 @@ def rotating_diameter(sector: CyclicSector, rotating: RotatingMatrices, diameter
         load=np.zeros(problem.matrices.size),
         axis=rotating.axis,
         point=rotating.point,
+        greatest=rotating.greatest,
+        higher=tuple(map(problem.real_form, rotating.higher)),
+        neglected=None if rotating.neglected is None else problem.real_form(rotating.neglected),
     )
 
 
@@ -49,9 +52,8 @@ def gyroscopic_ring_modes(
 
     Raises what `ring_modes` and modal.gyroscopic.gyroscopic_modes raise.
     """
-    here = replace(sector, matrices=replace(
-        rotating.standing, stiffness=rotating.standing.stiffness + speed**2 * rotating.centrifugal_stiffness
-    ))  # fmt: skip
+    stiffness = rotating.standing.stiffness + rotating.added(speed)
+    here = replace(sector, matrices=replace(rotating.standing, stiffness=stiffness))
     wanted = list(sector.diameters if diameters is None else diameters)
     found: list[Family] = []
     for done, number in enumerate(wanted):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from vanedamp.modal.records.modes import Modes
 
 __all__ = [
     "Factorization", "NoModesError", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
-    "stable_share", "static_shape",
+    "stable", "stable_share", "static_shape", "static_solver",
 ]  # fmt: skip
 
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
@@ -104,12 +106,29 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
     return low
 
 
+def stable(matrices: SystemMatrices) -> bool:
+    """Return whether the free stiffness is positive definite."""
+    return petsc.negative_eigenvalues(matrices.of_free(matrices.stiffness)) == 0
+
+
+@contextmanager
+def static_solver(matrices: SystemMatrices) -> Iterator[Callable[[np.ndarray], np.ndarray]]:
+    """Yield the displacements (N,), m, by a static load (N,), N. Raises SolverError if the supports do not hold."""
+    free = matrices.free
+    with factorize(matrices.of_free(matrices.stiffness)) as factors:
+
+        def shape(load: np.ndarray) -> np.ndarray:
+            found = np.zeros(matrices.size)
+            found[free] = factors.solve(load[free])
+            return found
+
+        yield shape
+
+
 def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
     """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
-    free, shape = matrices.free, np.zeros(matrices.size)
-    with factorize(matrices.of_free(matrices.stiffness)) as factors:
-        shape[free] = factors.solve(load[free])
-    return shape
+    with static_solver(matrices) as solve:
+        return solve(load)
 
 
 class _Pencil(NamedTuple):

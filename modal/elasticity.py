@@ -16,15 +16,18 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
 from vanedamp.modal.algebra import cross_matrix, von_mises
 from vanedamp.modal.eigen import SolverError
+from vanedamp.modal.equilibrium import Deformation, Equilibria
 from vanedamp.modal.fenicsx import ufl
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
-from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product
+from vanedamp.modal.rotating import RotatingMatrices, UnstableError, nodal_product, unstable_at
 from vanedamp.modal.statics import Statics
 from vanedamp.modal.stress_recovery import StressRecovery
 from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
+# equilibria at speeds by which one that is hard to find is sought
+_MOST_TRIES = 60
 _NO_CENTRIFUGAL_SOLUTION = (
     "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no static "
     "solution; clamp a group in [support], or give it springs"
@@ -153,13 +156,22 @@ class Solid:
         self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
         self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
+        growth = None
         if temperature is not None:
-            softening = self._field(lambda material, values: material.softening(values))
+            stretch = self._field(lambda material, values: 1.0 + material.expansion * (values - temperature.reference))
+            # moduli are those of the grown body: E d/dx and the volume give one factor of the stretch, of three
+            softening = self._field(lambda material, values: material.softening(values)) / stretch
             self._lame, self._shear = softening * self._lame, softening * self._shear
+            if any(material.expansion for material in self.materials.values()):
+                growth = 0.5 * (stretch**2 - 1.0)
+        self._deformation = Deformation(self.space, self._hooke, growth, degree)
+        self._expanded = np.zeros(3 * len(fenicsx.node_coordinates(self.space)))
 
     def stress(self, displacement: Any) -> Any:
         """Return the UFL stress tensor of a UFL displacement, Pa."""
-        strain = ufl.sym(ufl.grad(displacement))
+        return self._hooke(ufl.sym(ufl.grad(displacement)))
+
+    def _hooke(self, strain: Any) -> Any:
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(
@@ -168,9 +180,9 @@ class Solid:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
         Groups are of facets, or of edges and points, whose nodes have the weight one; one of both can be held, but is
-        no patch. Elastic supports are
-        part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them,
-        from the static solution of `statics` (default: the body's own).
+        no patch. Elastic supports are part of the stiffness, which is that about the equilibrium of a temperature: with
+        the stress that it leaves between the supports, and the growth, from static solutions of `statics` (default: the
+        body's own).
         Raises UnstableError for a temperature at which the structure has buckled.
         """
         # facets weigh their nodes by area, edges and points by one: both in one group have no common weights
@@ -202,28 +214,48 @@ class Solid:
         return self._heated(unheated, statics or Statics())
 
     def rotating(
-        self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float], statics: Statics | None = None
+        self,
+        matrices: SystemMatrices,
+        axis: Sequence[float],
+        point: Sequence[float],
+        statics: Statics | None = None,
+        speed: float = 0.0,
     ) -> RotatingMatrices:
         """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
 
-        The stress comes from the static solution of `statics` (default: the body's own) under the centrifugal load,
-        linear in the squared speed; supports turn with the structure. Raises ElasticityError for a structure that is
-        free to move, MatricesError for an axis of length zero.
+        They hold up to `speed` (rad/s). The stiffness is that about the centrifugal equilibrium, which `statics`
+        (default: the body's own) finds, at that speed and at its half in the square, and a polynomial through these.
+        Supports turn with the structure. Raises ElasticityError for a structure that is free to move, MatricesError for
+        an axis of length zero, UnstableError for a speed without a stable equilibrium.
         """
         direction, origin, statics = unit_direction(axis), np.array(point, dtype=float), statics or Statics()
         softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
         load = softening @ (matrices.coordinates - origin).ravel()
-        stress = self.stress(self._static(statics, matrices, load, _NO_CENTRIFUGAL_SOLUTION))
-        self._static_stresses["rotation"] = stress
-        return RotatingMatrices(
+        still = RotatingMatrices(
             standing=matrices,
-            centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
+            centrifugal_stiffness=sparse.csr_array(matrices.mass.shape),
             gyroscopic=nodal_product(matrices.mass, 2.0 * cross_matrix(direction)),
             load=load,
             axis=direction,
             point=origin,
             statics=statics,
+            greatest=speed,
         )
+        rest = self._expanded
+        before = self._deformation.tangent(rest)
+        with self._equilibria(statics, matrices, matrices.stiffness - before, _NO_CENTRIFUGAL_SOLUTION) as found:
+            self._static_stresses["rotation"] = self.stress(fenicsx.field(self.space, found.solve(load)))
+            if not speed:
+                return still
+            quarter, half, whole = self._followed(found, still, softening, before)
+        linear, *higher = self._deformation.over((rest, half, whole))
+        rotating = replace(
+            still,
+            centrifugal_stiffness=sparse.csr_array(linear / speed**2 - softening),
+            higher=tuple(higher),
+        )
+        exact = self._deformation.tangent(quarter) - before - 0.25 * speed**2 * softening
+        return replace(rotating, neglected=sparse.csr_array(exact - rotating.added(0.5 * speed)))
 
     def stiffness_parts(self) -> dict[str, sparse.csr_array]:
         """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
@@ -312,30 +344,82 @@ class Solid:
         return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
 
     def _heated(self, matrices: SystemMatrices, statics: Statics) -> SystemMatrices:
-        """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""
+        """Return the matrices about the thermal equilibrium."""
         if self.temperature is None or not any(material.expansion for material in self.materials.values()):
             return matrices
-        reference = self.temperature.reference
-        strain = self._field(lambda material, values: material.expansion * (values - reference))
-        pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
-        load = fenicsx.vector(pressure * ufl.div(self._test) * ufl.dx)
-        stress = self.stress(self._static(statics, matrices, load, _NO_THERMAL_SOLUTION)) - pressure * ufl.Identity(3)
-        self._static_stresses["temperature"] = stress
-        added = self._geometric_stiffness(stress)
+        cold = self._deformation.deformed(self._expanded)
+        springs = sparse.csr_array(matrices.stiffness - cold)
+        with self._equilibria(statics, matrices, springs, _NO_THERMAL_SOLUTION) as equilibria:
+            start = equilibria.solve(-self._deformation.force(self._expanded))
+            found = equilibria.under(np.zeros(matrices.size), start)
+        self._expanded = start if found is None else found
+        self._static_stresses["temperature"] = self._deformation.stress(fenicsx.field(self.space, self._expanded))
+        added = sparse.csr_array(self._deformation.tangent(self._expanded) - cold)
         share = statics.stable_share(matrices, added)
-        if share < 1.0:
+        if share < 1.0 or found is None:
             raise UnstableError(
                 f"temperature: the structure buckles at {share:.3g} of its thermal stress; give it less, or supports "
                 "that let it expand"
             )
         return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
 
-    def _static(self, statics: Statics, matrices: SystemMatrices, load: np.ndarray, without: str) -> Any:
-        """Return the displacements under a static load as a function; without: the error where there are none."""
+    def _equilibria(
+        self, statics: Statics, matrices: SystemMatrices, springs: sparse.csr_array, without: str
+    ) -> Equilibria:
+        """Return the equilibria of the solid on its springs; without: the error where nothing holds it."""
         try:
-            return fenicsx.field(self.space, statics.shape(matrices, load))
+            return Equilibria(self._deformation, statics, matrices, springs)
         except SolverError:
             raise ElasticityError(without) from None
+
+    def _followed(
+        self, equilibria: Equilibria, still: RotatingMatrices, softening: sparse.csr_array, before: sparse.csr_array
+    ) -> list[np.ndarray]:
+        """Return the displacements (N,) at 1/4, 1/2 and all of the greatest squared speed.
+
+        Newton's method goes straight there. Where that leads to none, or to an unstable one, they are followed in small
+        steps along stable ones, since beyond an instability another equilibrium may be found; but only if the stress
+        alone leaves the structure stable. Raises UnstableError.
+        """
+        top, load, standing, rest = still.greatest**2, still.load, still.standing, self._expanded
+        slope = equilibria.solve(load)
+        nodes = [0.25 * top, 0.5 * top, top]
+
+        def stable(shape: np.ndarray, square: float) -> bool:
+            tangent = standing.stiffness + self._deformation.tangent(shape) - before - square * softening
+            return still.statics.stable(replace(standing, stiffness=sparse.csr_array(tangent)))
+
+        found, low, here = [], 0.0, rest
+        for node in nodes:
+            shape = equilibria.under(node * load, here + (node - low) * slope, node * softening)
+            if shape is None:
+                break
+            found.append(shape)
+            slope = (shape - here) / (node - low)
+            low, here = node, shape
+        else:
+            if stable(here, top):
+                return found
+        slope = equilibria.solve(load)
+        ahead, behind = (self._deformation.geometric(rest + side * top * slope) for side in (1.0, -1.0))
+        share = still.statics.stable_share(standing, sparse.csr_array(0.5 * (ahead - behind) - top * softening))
+        if share < 1.0:
+            raise unstable_at(still.greatest, math.sqrt(share * top))
+        found, low, here, step = [], 0.0, rest, 0.125 * top
+        for _ in range(_MOST_TRIES):
+            node = nodes[len(found)]
+            to = min(low + step, node)
+            shape = equilibria.under(to * load, here + (to - low) * slope, to * softening)
+            if shape is None or not stable(shape, to):
+                step = 0.5 * (to - low)
+                continue
+            slope = (shape - here) / (to - low)
+            low, here, step = to, shape, 2.0 * step
+            if to == node:
+                found.append(shape)
+            if to == top:
+                return found
+        raise unstable_at(still.greatest, math.sqrt(low))
 
     def _check_size(self, displacements: np.ndarray, most: int = 1) -> None:
         """Raise ElasticityError for displacements that are not (N,), or (m, N) where `most` is 2."""
@@ -345,12 +429,6 @@ class Solid:
 
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
         return fenicsx.matrix(ufl.inner(self.stress(self._trial), ufl.sym(ufl.grad(self._test))) * measure)
-
-    def _geometric_stiffness(self, stress: Any) -> sparse.csr_array:
-        """Return the matrix of the integral of sigma_jk u_i,j v_i,k: the stiffness of a stress at rest."""
-        # exact for straight tetrahedra; the degree that UFL estimates takes four times as many points in hexahedra
-        measure = ufl.dx(metadata={"quadrature_degree": 2 * self.degree + 1})
-        return fenicsx.matrix(ufl.inner(ufl.grad(self._trial) * stress, ufl.grad(self._test)) * measure)
 
     def _support_stiffness(self, name: str) -> sparse.csr_array:
         support, domain, trial = self.elastic[name], self.domain, self._trial

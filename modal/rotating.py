@@ -1,12 +1,14 @@
-"""A structure that rotates: K(speed) = K0 + speed^2 K1, as matrices in the rotating frame.
+"""A structure that rotates: its stiffness by the speed, as matrices in the rotating frame.
 
 About its centrifugal equilibrium at a constant speed W (rad/s) the structure moves by
 
-    M q'' + W G q' + (K0 + W^2 K1) q = loads,
+    M q'' + W G q' + (K0 + W^2 K1 + (W / W_g)^4 H2 + (W / W_g)^6 H3 + (W / W_g)^8 H4) q = loads,
 
-K1 = geometric stiffness of the centrifugal stress at unit speed, less the spin softening (the mass across the axis),
-and G the gyroscopic coupling, skew. The stress comes from the linear static solution, so that K1 is one matrix.
-Lawrence et al. (1987), NASA TM 100187; Geradin and Rixen (2015), Mechanical Vibrations, section 1.
+where the stiffness holds the geometric stiffness of the centrifugal stress, the initial-displacement stiffness of the
+deformed shape and the spin softening (less the mass across the axis), and G is the gyroscopic coupling, skew. Shape
+and stress are quadratic in W^2 through those of the equilibria at standstill, at W_g / sqrt 2 and at the greatest speed
+W_g; the stiffness is quadratic in the shape. Lawrence et al. (1987), NASA TM 100187; Geradin and Rixen (2015),
+Mechanical Vibrations, section 1; Bathe (2014), Finite Element Procedures, section 6.3.
 """
 
 from __future__ import annotations
@@ -14,15 +16,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import added_by_speed, orthonormal, symmetric_part
+from vanedamp.modal.eigen import factorize
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.statics import Statics
 
 
 class UnstableError(VanedampError):
     """A structure that leaves its equilibrium, heated or at a speed; the message names the limit."""
+
+
+class SpeedError(VanedampError):
+    """A speed beyond those of the matrices; the message names their greatest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +43,10 @@ class RotatingMatrices:
     load                   (N,) kg m: centrifugal load per squared speed
     axis, point            (3,) unit vector, and (3,) m, a point of the axis
     statics                by which its stability is checked
+    greatest               rad/s, up to which they hold: W_g
+    higher                 (N, N) symmetric CSR, N/m: H2, H3, ...; none: linear in the squared speed
+    neglected              (N, N) N/m, stiffness about the equilibrium at W_g / 2 less that of these matrices; None: not
+                           known
     """
 
     standing: SystemMatrices
@@ -44,22 +56,67 @@ class RotatingMatrices:
     axis: np.ndarray
     point: np.ndarray
     statics: Statics = field(default_factory=Statics)
+    greatest: float = np.inf
+    higher: tuple[sparse.csr_array, ...] = ()
+    neglected: sparse.csr_array | None = None
+
+    @property
+    def by_speed(self) -> tuple[sparse.csr_array, ...]:
+        """K1, H2, H3, ..."""
+        return (self.centrifugal_stiffness, *self.higher)
+
+    def added(self, speed: float) -> sparse.csr_array:
+        """Return what a speed, rad/s, adds to the stiffness (N, N), N/m. Raises SpeedError beyond the greatest."""
+        if speed > self.greatest * (1.0 + 1e-12):
+            raise SpeedError(
+                f"speed: the matrices hold up to {self.greatest:.6g} rad/s, not at {speed:.6g}; make them for a higher "
+                "one (rotating_to)"
+            )
+        return sparse.csr_array(added_by_speed(speed, self.greatest, self.by_speed))
 
     def at(self, speed: float) -> SystemMatrices:
         """Return the matrices at a speed, rad/s, without the gyroscopic coupling.
 
-        Raises UnstableError where their stiffness is not positive definite. Gyroscopic forces might still hold the
-        structure there, but not together with its own damping, however little (Thomson and Tait).
+        Raises UnstableError where their stiffness is not positive definite, and what `added` raises. Gyroscopic forces
+        might still hold the structure there, but not together with its own damping, however little (Thomson and Tait).
         """
-        added = speed**2 * self.centrifugal_stiffness
-        share = self.statics.stable_share(self.standing, added)
+        added = self.added(speed)
+        # the equilibrium at the greatest speed was found stable
+        share = 1.0 if self.higher and speed == self.greatest else self.statics.stable_share(self.standing, added)
         if share < 1.0:
-            raise UnstableError(
-                f"speed: at {speed:.6g} rad/s the structure is unstable, since the spin softening outweighs its "
-                f"stiffness above {np.sqrt(share) * speed:.4g} rad/s; stay below it"
-            )
+            raise unstable_at(speed, np.sqrt(share) * speed)
         provenance = dict(self.standing.provenance) | {"speed": speed}
         return replace(self.standing, stiffness=self.standing.stiffness + added, provenance=provenance)
+
+    def neglected_error(self, shapes: np.ndarray) -> float:
+        """Return the largest relative error of frequencies for what is neglected between standstill and W_g.
+
+        That at W_g / 2, near which it is largest, of modes of about these shapes (m, N) there; 0 where not known. Both
+        stiffnesses have Ritz values in the shapes and one step of inverse iteration from them: strains that only one of
+        them resists need room to vanish.
+        """
+        if self.neglected is None:
+            return 0.0
+        free, given = self.standing.free, self.standing.of_free
+        mass, near = given(self.standing.mass), given(self.standing.stiffness + self.added(0.5 * self.greatest))
+        exact = sparse.csr_array(near + given(self.neglected))
+        fields = shapes[:, free].T
+        with factorize(exact) as factors:
+            space = orthonormal(np.hstack([fields, factors.solve(mass @ fields)]), mass)
+        count = min(len(shapes), space.shape[1])
+        told, right = (
+            linalg.eigh(symmetric_part(space.T @ (matrix @ space)), eigvals_only=True)[:count]
+            for matrix in (near, exact)
+        )
+        return float(np.abs(np.sqrt(np.maximum(told, 0.0) / right) - 1.0).max())
+
+
+def unstable_at(speed: float, limit: float) -> UnstableError:
+    """Return the error of a speed, rad/s, above the limit of the stable ones."""
+    return UnstableError(
+        f"speed: at {speed:.6g} rad/s the structure is unstable, since the spin softening outweighs its "
+        f"stiffness above {limit:.4g} rad/s; stay below it"
+    )
 
 
 def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:

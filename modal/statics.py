@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
 import numpy as np
 from scipy import sparse
 
-from vanedamp.modal.eigen import stable_share, static_shape
+from vanedamp.modal.eigen import stable, stable_share, static_solver
 from vanedamp.modal.matrices import SystemMatrices
 
 
 class Statics:
     """Those of a structure by itself."""
 
-    def shape(self, matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
-        """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError where nothing holds it."""
-        return static_shape(matrices, load)
+    def solver(self, matrices: SystemMatrices) -> AbstractContextManager[Callable[[np.ndarray], np.ndarray]]:
+        """Return a context with the displacements (N,), m, by a static load (N,), N.
+
+        Raises SolverError where nothing holds the structure.
+        """
+        return static_solver(matrices)
+
+    def stable(self, matrices: SystemMatrices) -> bool:
+        """Return whether the stiffness is positive definite."""
+        return stable(matrices)
 
     def stable_share(self, matrices: SystemMatrices, added: sparse.csr_array) -> float:
         """Return the largest fraction (0 to 1) of a stiffness (N, N) that leaves the structure stable."""

@@ -65,7 +65,9 @@ def blade() -> Blade:
     rotating = structure.rotating
     assert rotating is not None
     speeds = np.linspace(0.0, case.rotation.greatest, _SPEEDS)
-    across = structure.solid.rotating(rotating.standing, (0.0, 1.0, 0.0), case.rotation.point)
+    across = structure.solid.rotating(
+        rotating.standing, (0.0, 1.0, 0.0), case.rotation.point, speed=case.rotation.greatest
+    )
     flapwise, lagwise = (campbell(each, speeds, ORDERS, COUNT) for each in (rotating, across))
     model = reduction(structure, _MODES)
     return Blade(

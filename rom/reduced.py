@@ -17,7 +17,7 @@ from scipy import linalg
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.modal.algebra import symmetric_part
+from vanedamp.modal.algebra import added_by_speed, symmetric_part
 from vanedamp.rom.checks import ReducedModelError, check_definite, check_mass, shaped, symmetric, unit
 from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
 
@@ -48,6 +48,7 @@ _ARRAYS = {
     "output_residual": (("output", "force"), "1"),
     "residual_recovery": (("dof", "force"), "m/N"),
     "centrifugal_stiffness": (("row", "column"), "kg"),
+    "higher_stiffness": (("power", "row", "column"), "N/m"),
     "rotation_axis": (("axis",), "1"),
     "rotation_point": (("axis",), "m"),
 }
@@ -84,6 +85,7 @@ class ReducedModel(Displayed):
                               positions of its nodes; None when not kept
     residual_recovery         (N, k) m/N, additional displacements per unit interface force; with residual_flexibility
     centrifugal_stiffness     (n, n) kg, what a squared speed (rad/s) adds to the stiffness; None: does not rotate
+    higher_stiffness          (p, n, n) N/m, what the 4th, 6th, ... power of the speed over the greatest adds; or None
     rotation_axis             (3,) unit vector, with rotation_point (3,), m, the axis that it rotates about; or None
     greatest_speed            rad/s, up to which the basis holds
 
@@ -113,6 +115,7 @@ class ReducedModel(Displayed):
     positions: np.ndarray | None = None
     arms: np.ndarray | None = None
     centrifugal_stiffness: np.ndarray | None = None
+    higher_stiffness: np.ndarray | None = None
     rotation_axis: np.ndarray | None = None
     rotation_point: np.ndarray | None = None
     greatest_speed: float = 0.0
@@ -251,6 +254,8 @@ class ReducedModel(Displayed):
         for name in ("mass", "damping", "stiffness", "centrifugal_stiffness"):
             if (matrix := getattr(self, name)) is not None:
                 values[name] = symmetric_part(basis.T @ matrix @ basis)
+        if self.higher_stiffness is not None:
+            values["higher_stiffness"] = basis.T @ self.higher_stiffness @ basis
         for name in ("selection", "output_rows", "recovery"):
             if (rows := getattr(self, name)) is not None:
                 values[name] = rows @ basis
@@ -259,7 +264,7 @@ class ReducedModel(Displayed):
         return replace(self, **(values | changes))
 
     def at_speed(self, speed: float) -> ReducedModel:
-        """Return the model as it vibrates while it rotates at a constant speed, rad/s: K + speed^2 K1.
+        """Return the model as it vibrates while it rotates at a constant speed, rad/s: with the stiffness there.
 
         A damping ratio holds for the modes at that speed. Raises ReducedModelError for a model that does not rotate, a
         speed beyond its basis, and a speed at which the structure is unstable.
@@ -275,10 +280,14 @@ class ReducedModel(Displayed):
             raise ReducedModelError(
                 f"speed: the basis holds from 0 to {self.greatest_speed:.6g} rad/s, not at {speed:.6g}; reduce again"
             )
-        stiffness = self.stiffness + speed**2 * self.centrifugal_stiffness
+        higher = () if self.higher_stiffness is None else self.higher_stiffness
+        added = added_by_speed(speed, self.greatest_speed, (self.centrifugal_stiffness, *higher))
+        stiffness = symmetric_part(self.stiffness + added)
         if spectrum(self.mass, stiffness)[0][0] <= 0.0:
             raise ReducedModelError(f"speed: at {speed:.6g} rad/s the structure is unstable: lower the speed")
-        changes = {"stiffness": stiffness, "centrifugal_stiffness": None, "greatest_speed": 0.0}
+        changes = {
+            "stiffness": stiffness, "centrifugal_stiffness": None, "higher_stiffness": None, "greatest_speed": 0.0,
+        }  # fmt: skip
         if self.damping_ratio is not None:
             changes["damping"] = modal_damping(self.mass, stiffness, self.damping_ratio)
         return replace(self, **changes)
@@ -396,6 +405,7 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
     lengths = {
         "row": size, "column": size, "interface": count, "force": count, "axis": 3,
         "output": len(model.outputs), "dof": 3 * nodes, "node": nodes,
+        "power": 0 if model.higher_stiffness is None else len(model.higher_stiffness),
     }  # fmt: skip
     values: dict[str, Any] = {
         "interface": tuple(str(label) for label in model.interface),

@@ -1,10 +1,10 @@
-"""Reduction of a rotating structure: K0 + speed^2 K1 on one basis that holds from standstill to a maximum speed.
+"""Reduction of a rotating structure: its stiffness on one basis that holds from standstill to a maximum speed.
 
 The basis joins Craig-Bampton bases at several speeds, each from one factorisation. The constraint modes at
 standstill move the interface; at other speeds these modes, and the fixed-interface and quasi-static modes there,
 differ from those at standstill by motions that leave the interface at rest. Of these differences a basis, orthogonal to
 the modes at standstill in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps
-it. As the squared speed enters the stiffness linearly, a few speeds are enough, spaced evenly in its square.
+it. The stiffness is almost linear in the squared speed, so that a few speeds are enough, spaced evenly in its square.
 
 The error between the speeds of the basis is estimated halfway (in the square), by the gain of the model from
 the basis of that speed, which is exact there but for the modes cut off at every speed.
@@ -82,9 +82,11 @@ class SpeedBases:
         standing, interface = self.rotating.standing, self.interface
         joined = self._joined(speeds, modes)
         basis = interface.motions @ joined.fields
+        projected = [symmetric_part(basis.T @ (matrix @ basis)) for matrix in self.rotating.by_speed]
         model = replace(
             craig_bampton.reduced_model(standing, interface, joined, origin, keep_recovery),
-            centrifugal_stiffness=symmetric_part(basis.T @ (self.rotating.centrifugal_stiffness @ basis)),
+            centrifugal_stiffness=projected[0],
+            higher_stiffness=np.array(projected[1:]) if projected[1:] else None,
             rotation_axis=self.rotating.axis,
             rotation_point=self.rotating.point,
             greatest_speed=speeds[-1],
@@ -95,9 +97,20 @@ class SpeedBases:
             raise ReductionError(str(error)) from None
         return model
 
+    def neglected(self, model: ReducedModel, speeds: Sequence[float], modes: int, count: int) -> float:
+        """Return the relative error of the lowest frequencies for what the matrices neglect between their speeds.
+
+        model: `model` of the same speeds and modes.
+        """
+        if self.rotating.neglected is None:
+            return 0.0
+        shapes = model.at_speed(0.5 * self.rotating.greatest).natural[1][:, :count]
+        fields = self.interface.motions @ (self._joined(speeds, modes).fields @ shapes)
+        return self.rotating.neglected_error(np.asarray(fields).T)
+
     def _matrices(self, speed: float) -> SystemMatrices:
         standing = self.rotating.standing
-        return replace(standing, stiffness=standing.stiffness + speed**2 * self.rotating.centrifugal_stiffness)
+        return replace(standing, stiffness=standing.stiffness + self.rotating.added(speed))
 
     def _joined(self, speeds: Sequence[float], modes: int) -> Basis:
         """Return the basis at standstill, with the differences of the others from it, after the constraint modes."""
@@ -158,9 +171,13 @@ def reduce_rotating(
             break
         speeds = sorted([*speeds, worst])
     frequency, receptance = (max(values) for values in zip(*errors.values(), strict=True))
+    fastest = model.at_speed(greatest_speed)
+    count = max(1, int(np.count_nonzero(fastest.natural_frequencies_hz <= frequencies(fastest)[-1])))
+    neglected = bases.neglected(model, speeds, modes, count)
     estimate = {
         "greatest_speed": greatest_speed, "speeds": speeds, "checked": sorted(errors), "frequency": frequency,
-        "receptance": receptance, "met": met, "sentence": _sentence(speeds, sorted(errors), frequency, receptance, met),
+        "receptance": receptance, "met": met, "neglected": neglected,
+        "sentence": _sentence(speeds, sorted(errors), frequency, receptance, met, neglected),
     }  # fmt: skip
     return replace(model, provenance=dict(model.provenance) | {"rotation": estimate})
 
@@ -177,10 +194,20 @@ def _errors(
     return float(natural.max()), float(frf_errors(model, richer, grid).max())
 
 
-def _sentence(speeds: Sequence[float], checked: Sequence[float], frequency: float, receptance: float, met: bool) -> str:
+def _sentence(
+    speeds: Sequence[float], checked: Sequence[float], frequency: float, receptance: float, met: bool,
+    neglected: float,
+) -> str:  # fmt: skip
     joined, between = (", ".join(f"{speed:.4g}" for speed in values) for values in (speeds, checked))
     sentence = (
         f"basis of the speeds {joined} rad/s: estimated error at {between} rad/s {100 * frequency:.1g} % of natural "
         f"frequencies, {100 * receptance:.1g} % of the receptance"
     )
-    return sentence if met else sentence + "; beyond the tolerance, lower the greatest speed or keep more modes"
+    if not met:
+        sentence += "; beyond the tolerance, lower the greatest speed or keep more modes"
+    if not neglected:
+        return sentence
+    return (
+        f"{sentence}; {100 * neglected:.1g} % of natural frequencies for the shape between standstill and "
+        f"{speeds[-1]:.4g} rad/s"
+    )

@@ -14,7 +14,7 @@ from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectru
 from vanedamp.rom.reduced import ReducedModel
 
 # natural modes and the residual response belong to one stiffness
-_AT_ONE_SPEED: dict[str, Any] = {"centrifugal_stiffness": None, "greatest_speed": 0.0}
+_AT_ONE_SPEED: dict[str, Any] = {"centrifugal_stiffness": None, "higher_stiffness": None, "greatest_speed": 0.0}
 
 
 def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> ReducedModel:

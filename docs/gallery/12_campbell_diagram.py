@@ -19,7 +19,7 @@ case = vd.Case(
     mesh={"generator": "block", "length": 0.19, "width": 0.05, "thickness": 0.004, "divisions": [12, 4, 1]},
     material={"default": {"young": 2.0e11, "poisson": 0.3, "density": 8000.0}},
     support={"clamped": ["root"]},
-    rotation={"axis": [0.0, 0.574, 0.819], "point": [-0.15, 0.0, 0.06]},
+    rotation={"axis": [0.0, 0.574, 0.819], "point": [-0.15, 0.0, 0.06], "max_rpm": 15000.0},
 )
 structure = vd.assemble(case)
 rpm = np.linspace(0.0, 15000.0, 31)

@@ -99,6 +99,9 @@ class Campbell(Record, Plotted):
     """of a ring, nodal diameters of the modes, -h of the wave that runs with the turn; else empty"""
     families: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="family")] = field(default_factory=empty)
     """of a ring, order within the diameter, from 0, in which curves of a diameter do not cross"""
+    neglected: float | None = None
+    """largest estimated relative error of a frequency, for the shape of the structure between the speeds of its
+    equilibria; None: it has none between"""
 
     def label(self, mode: int) -> str:
         """Return the name of a mode: its number from 1, or of a ring its family from 1 and its signed diameter."""

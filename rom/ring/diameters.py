@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, sparse
 
+from vanedamp.modal.algebra import added_by_speed
 from vanedamp.modal.cyclic import CyclicSector, Diameter
 from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.records.ring_modes import RingModes
@@ -65,7 +66,7 @@ class Bases(NamedTuple):
 
 def ring_waves(
     sector: CyclicSector, vectors: np.ndarray, families: int, max_frequency: float | None, part: Part,
-    centrifugal: sparse.csr_array | None, greatest_speed: float, factorize: Factorize,
+    by_speed: Sequence[sparse.csr_array], greatest_speed: float, factorize: Factorize,
     report: Callable[[int, int], None] | None,
 ) -> Bases:  # fmt: skip
     """Return natural modes and static responses of every nodal diameter; vectors (k, n) of the interface.
@@ -73,8 +74,8 @@ def ring_waves(
     Other arguments and errors: see rom.ring.reduction.reduce_ring.
     """
     sectors = [sector]
-    if centrifugal is not None:
-        stiffness = sector.matrices.stiffness + greatest_speed**2 * centrifugal
+    if by_speed:
+        stiffness = sector.matrices.stiffness + added_by_speed(greatest_speed, greatest_speed, by_speed)
         sectors.append(replace(sector, matrices=replace(sector.matrices, stiffness=stiffness)))
     found = [ring_modes(one, families, max_frequency) for one in sectors]
     if found[0].frequencies_hz.min() == 0.0:

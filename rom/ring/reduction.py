@@ -35,6 +35,7 @@ def reduce_ring(
     factorize: Factorize = superlu,
     report: Callable[[int, int], None] | None = None,
     basis: str = "modes",
+    higher: Sequence[sparse.csr_array] = (),
 ) -> RingModel | SectorRing:
     """Reduce a ring to its modes of every nodal diameter and the interface of every sector.
 
@@ -46,6 +47,7 @@ def reduce_ring(
     report         called with the number of diameters done, and of all
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
+    higher         (n, n) N/m each, what the 4th, 6th, ... power of a speed over the greatest adds
 
     The estimate of the error is `estimate` of the provenance: `receptance` of the interface, up to 1.5 times the first
     family's frequencies or the last family's lowest; `deviation`, of squared frequencies per squared deviation;
@@ -59,9 +61,10 @@ def reduce_ring(
         interface = Interface.on_patches(sector.matrices, interface)
     if any(item.kind not in ("average", "node") for item in interface.coordinates):
         raise RingError('interface: patches of a ring are of kind "average" or "node"')
+    by_speed = () if centrifugal is None else (centrifugal, *higher)
     part = part or Part(sector.matrices.stiffness, sector.matrices.mass)
     waves, estimate = ring_waves(
-        sector, interface.vectors.T, families, max_frequency, part, centrifugal, greatest_speed, factorize, report
+        sector, interface.vectors.T, families, max_frequency, part, by_speed, greatest_speed, factorize, report
     )
     provenance = {
         "matrices": dict(sector.matrices.provenance), "basis": basis, "estimate": estimate,
@@ -70,7 +73,7 @@ def reduce_ring(
     made: tuple[RingModel | SectorRing, np.ndarray] = (
         sector_ring(sector, interface, part, waves, factorize, provenance)
         if basis == "sectors"
-        else _model(sector, interface, part, waves, centrifugal, greatest_speed, provenance)
+        else _model(sector, interface, part, waves, by_speed, greatest_speed, provenance)
     )
     ring, fields = made
     errors = deviation_errors(ring, sector, fields, part, factorize)
@@ -86,7 +89,7 @@ def reduce_ring(
 
 def _model(
     sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
-    centrifugal: sparse.csr_array | None, greatest_speed: float, provenance: dict[str, Any],
+    by_speed: Sequence[sparse.csr_array], greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
     """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
     fields = np.vstack([one.real_fields for one in waves])
@@ -95,10 +98,10 @@ def _model(
                                                                   for one in waves])  # fmt: skip
     lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
     order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
-    spinning = None
-    if centrifugal is not None:
-        blocks = [_hermitian(one.factor * one.fields.conj() @ (centrifugal @ one.fields.T), one) for one in waves]
-        spinning = linalg.block_diag(*blocks)[np.ix_(order, order)]
+    spinning = []
+    for matrix in by_speed:
+        blocks = [_hermitian(one.factor * one.fields.conj() @ (matrix @ one.fields.T), one) for one in waves]
+        spinning.append(linalg.block_diag(*blocks)[np.ix_(order, order)])
     fields, matrices = fields[order], sector.matrices
     translations = matrices.rigid_translations()
     ring = RingModel(
@@ -108,7 +111,9 @@ def _model(
         directions=interface.directions, normals=interface.normals, positions=interface.positions, arms=interface.arms,
         base_load=fields @ (matrices.mass @ translations), part_load=fields @ (part.mass @ translations),
         stiffness=fields @ (part.stiffness @ fields.T), mass=fields @ (part.mass @ fields.T),
-        damping_ratio=matrices.damping_ratio, centrifugal_stiffness=spinning, greatest_speed=greatest_speed,
+        damping_ratio=matrices.damping_ratio, greatest_speed=greatest_speed,
+        centrifugal_stiffness=spinning[0] if spinning else None,
+        higher_stiffness=np.array(spinning[1:]) if spinning[1:] else None,
         provenance=provenance,
     )  # fmt: skip
     return ring, fields

@@ -12,7 +12,7 @@ from scipy import linalg
 
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
-from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.modal.algebra import added_by_speed, symmetric_part, turns
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
@@ -40,6 +40,7 @@ class RingModel(Ring, Displayed):
     stiffness, mass        (n, n) of the part of a sector that deviates, in sector 0's fields
     damping_ratio          of every mode
     centrifugal_stiffness  (n, n) kg, of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate
+    higher_stiffness       (p, n, n) N/m, of the whole ring: as in ReducedModel
     greatest_speed         rad/s, up to which the waves hold
     provenance             where the numbers come from (JSON-able); "estimate": of the error
 
@@ -53,9 +54,10 @@ class RingModel(Ring, Displayed):
         "stiffness": (("coordinate", "column"), "N/m"),
         "mass": (("coordinate", "column"), "kg"),
         "centrifugal_stiffness": (("coordinate", "column"), "kg"),
+        "higher_stiffness": (("power", "coordinate", "column"), "N/m"),
     }
     _symmetric = ("stiffness", "mass", "centrifugal_stiffness")
-    _optional = ("centrifugal_stiffness",)
+    _optional = ("centrifugal_stiffness", "higher_stiffness")
     _numbers: ClassVar[dict[str, Any]] = {"sectors": int, "modes": int, "damping_ratio": float, "greatest_speed": float}
 
     sectors: int
@@ -76,11 +78,13 @@ class RingModel(Ring, Displayed):
     mass: np.ndarray
     damping_ratio: float
     centrifugal_stiffness: np.ndarray | None = None
+    higher_stiffness: np.ndarray | None = None
     greatest_speed: float = 0.0
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._settle({"coordinate": len(self.squares)})
+        higher = () if self.higher_stiffness is None else self.higher_stiffness
+        self._settle({"coordinate": len(self.squares), "power": len(higher)})
         object.__setattr__(self, "diameters", store.frozen(self.diameters, np.int64))
         _check_waves(self)
 
@@ -134,8 +138,8 @@ class RingModel(Ring, Displayed):
         return ReducedModel(
             mass=mass, stiffness=stiffness, damping=damping, selection=self.rows.reshape(-1, self.size),
             base_load=self._base_load(deviations), damping_ratio=self.damping_ratio if added is None else None,
-            centrifugal_stiffness=self.centrifugal_stiffness, greatest_speed=self.greatest_speed, **self.placed(),
-            **self._turning(),
+            centrifugal_stiffness=self.centrifugal_stiffness, higher_stiffness=self.higher_stiffness,
+            greatest_speed=self.greatest_speed, **self.placed(), **self._turning(),
         )  # fmt: skip
 
     def matrices(self, deviations: Deviations, speed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +149,9 @@ class RingModel(Ring, Displayed):
         if speed:
             if self.centrifugal_stiffness is None or not 0.0 < speed <= self.greatest_speed * (1.0 + 1e-12):
                 raise RingError(f"speed: the ring holds up to {self.greatest_speed:.6g} rad/s, not at {speed:.6g}")
-            stiffness = stiffness + speed**2 * self.centrifugal_stiffness
+            higher = () if self.higher_stiffness is None else self.higher_stiffness
+            added = added_by_speed(speed, self.greatest_speed, (self.centrifugal_stiffness, *higher))
+            stiffness = symmetric_part(stiffness + added)
         return mass, stiffness
 
     def tuned_families(self, speed: float = 0.0) -> Families:

@@ -38,8 +38,8 @@ def ring_analysis(structure: Structure, report: Callable[[int, int], None] | Non
     """
     table, rotation, sector = structure.case.modes, structure.case.rotation, ring_sector(structure)
     count = table.count or MODES
-    if rotation is not None and structure.rotating is not None and rotation.gyroscopic:
-        return gyroscopic_ring_modes(sector, structure.rotating, rotation.omega, count, report=report)
+    if rotation is not None and structure.turning is not None and rotation.gyroscopic:
+        return gyroscopic_ring_modes(sector, structure.turning, rotation.omega, count, report=report)
     return ring_modes(sector, count, table.max_frequency, report=report, solver=table.solver)
 
 
@@ -54,18 +54,17 @@ def ring_reduction(
     diameters done, and of all; basis: as of `rom.ring.reduction.reduce_ring`. Raises InputError without the table
     [ring] or interface coordinates, and what reduce_ring raises.
     """
-    case, rotating = structure.case, structure.rotating
+    case = structure.case
     if case.ring is None:
         raise InputError("ring: missing; give [ring] with sectors, low and high")
     if not case.interface:
         raise InputError("interface: missing; a reduced ring needs coordinates of a sector that loads can act on")
-    standing = structure.matrices if rotating is None else rotating.standing
     greatest = 0.0 if case.rotation is None else case.rotation.greatest
-    if rotating is not None and greatest:
-        rotating.at(greatest)
+    rotating = structure.rotating_to(greatest) if greatest else None
+    standing = structure.matrices if structure.turning is None else structure.turning.standing
     return reduce_ring(
         case.ring.sector(standing, case.rotation), interface(case, standing), families, max_frequency,
         Part(*structure.solid.part(case.ring.deviating)) if case.ring.deviating else None,
-        rotating.centrifugal_stiffness if rotating is not None and greatest else None, greatest, factorize, report,
-        basis,
+        None if rotating is None else rotating.centrifugal_stiffness, greatest, factorize, report, basis,
+        () if rotating is None else rotating.higher,
     )  # fmt: skip

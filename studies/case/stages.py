@@ -96,8 +96,9 @@ def assemble(case: Case) -> Structure:
         _functional(case, matrices, label)
     if case.rotation is None:
         return Structure(case, solid, matrices)
-    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics)
-    return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
+    speed = case.rotation.omega
+    turning = solid.rotating(matrices, case.rotation.axis, case.rotation.point, statics, speed)
+    return Structure(case, solid, turning.at(speed), turning)
 
 
 def _temperature(table: TemperatureTable | None) -> Temperature | None:
@@ -341,9 +342,9 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         if fatigue is not None:
             warnings += (*level_warnings(fatigue.to_json()), *strength_warnings(structure))
     gyroscopic = None
-    if case.rotation is not None and structure.rotating is not None and case.rotation.gyroscopic:
+    if case.rotation is not None and structure.turning is not None and case.rotation.gyroscopic:
         with stage("gyroscopic modes"):
-            gyroscopic = gyroscopic_modes(structure.rotating, case.rotation.omega, len(modes))
+            gyroscopic = gyroscopic_modes(structure.turning, case.rotation.omega, len(modes))
     return ModalAnalysis(
         structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, fatigue, warnings,
         time.perf_counter() - started, gyroscopic,
@@ -476,8 +477,9 @@ def campbell_diagram(
     (files.checkpoint_file.clear). Of a ring, modes of every nodal diameter. Raises the errors of
     `modal.campbell.campbell`.
     """
-    table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
-    assert table is not None and rotation is not None and rotating is not None
+    table, rotation = structure.case.campbell, structure.case.rotation
+    assert table is not None and rotation is not None
+    rotating = structure.rotating_to(float(table.speeds[-1]))
     most = rotating.standing.free.size
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
@@ -513,7 +515,8 @@ def reduction(
     number of modes suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the
     tolerance, and InputError for a structure that rotates with another basis, or up to no speed.
     """
-    rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
+    greatest = _greatest_speed(structure, basis)
+    rotating = structure.rotating_to(greatest) if greatest else None
     levelled = level and structure.case.response_label is not None and bool(structure.case.fatigue_strength)
     recovery = keep_recovery or bool(spots) or levelled
     found = basis_named(basis)
@@ -587,8 +590,8 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
 
     Raises InputError for none, or a basis that does not hold over speeds, and UnstableError beyond the stable ones.
     """
-    table, rotating = structure.case.rotation, structure.rotating
-    if table is None or rotating is None:
+    table = structure.case.rotation
+    if table is None or structure.turning is None:
         return 0.0
     if basis_named(basis).speeds is None:
         raise InputError(
@@ -599,7 +602,6 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
         raise InputError(
             "rotation: a reduced model is for speeds up to a greatest one; give max_speed (rad/s), max_rpm or a speed"
         )
-    rotating.at(table.greatest)
     return table.greatest
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from vanedamp.files.store import Variable
 from vanedamp.modal.elasticity import Solid
@@ -15,13 +16,33 @@ from vanedamp.studies.case.tables import Case
 class Structure:
     """A case with its finite elements: the solid on its mesh, and the matrices.
 
-    rotating: matrices of a case that rotates; `matrices` holds at its speed.
+    turning: matrices of a case that rotates, up to its speed, at which `matrices` holds.
     """
 
     case: Case
     solid: Solid
     matrices: SystemMatrices
-    rotating: RotatingMatrices | None = None
+    turning: RotatingMatrices | None = None
+
+    @cached_property
+    def rotating(self) -> RotatingMatrices | None:
+        """Matrices of a case that rotates, up to the highest speed that it names. Errors: as `rotating_to`."""
+        rotation, diagram = self.case.rotation, self.case.campbell
+        if rotation is None or self.turning is None:
+            return None
+        highest = rotation.greatest if diagram is None else max(rotation.greatest, float(diagram.speeds[-1]))
+        return self.rotating_to(highest)
+
+    def rotating_to(self, speed: float) -> RotatingMatrices:
+        """Return the matrices of a case that rotates for speeds up to one (rad/s).
+
+        Raises modal.rotating.UnstableError for a speed without a stable equilibrium.
+        """
+        given = self.turning
+        assert given is not None
+        if speed == given.greatest:
+            return given
+        return self.solid.rotating(given.standing, given.axis.tolist(), given.point.tolist(), given.statics, speed)
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
         """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""

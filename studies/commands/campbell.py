@@ -69,4 +69,5 @@ def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:
     yield (
         f"{len(diagram.solved)} solutions of the full structure in {seconds:.1f} s, their modes the basis for all "
         f"speeds: estimated error {diagram.error:.1e} of the frequencies"
+        + (f", {diagram.neglected:.1e} for the shape between standstill and the highest" if diagram.neglected else "")
     )

@@ -85,7 +85,8 @@ def test_modes_are_those_at_the_speed(folder, found):
     np.testing.assert_allclose(found.modes.frequencies_hz, modes.frequencies_hz, rtol=1e-9)
     assert found.speed == pytest.approx(1000 * np.pi) and found.orders == (1, 4, 5, 7, 10)
     column = found.over_speed_hz[:, found.speeds == found.speed].ravel()
-    np.testing.assert_allclose(column, modes.frequencies_hz, rtol=1e-9)
+    # the diagram goes beyond that speed, where it interpolates the equilibrium
+    np.testing.assert_allclose(column, modes.frequencies_hz, rtol=1e-7)
 
 
 def test_meetings_are_those_of_solutions_at_their_speeds(folder, found):

@@ -1,5 +1,7 @@
 """Campbell diagrams: modes over speeds, veerings and crossings told apart, engine orders, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg, sparse
@@ -43,6 +45,21 @@ def shaken_truss():
     standing, random = truss(nodes=18), np.random.default_rng(1)
     changes, coupling = random.standard_normal((2, standing.size, standing.size))
     return rotating(standing, 5e-4 * changes @ changes.T, 0.02 * (coupling - coupling.T))
+
+
+@pytest.mark.parametrize("gyroscopic", [False, True])
+def test_an_order_meets_a_mode_twice(gyroscopic):
+    """Of a stiffness with a fourth power of the speed: a + h (W / W_g)^4 = (k W)^2, and a mode beside it."""
+    a, b, h, greatest, order = 1e4, 2.3e4, 3.6e4, 100.0, 2.0
+    structure = replace(
+        point_mass(np.diag([a, b, 9e6]), np.zeros((3, 3))),
+        greatest=greatest, higher=(sparse.csr_array(np.diag([h, 0.0, 0.0])),),
+    )  # fmt: skip
+    diagram = campbell(structure, [0.0, 50.0, greatest], [order], 2, gyroscopic)
+    twice = np.sqrt(np.roots([h / greatest**4, -(order**2), a])[::-1])
+    expected = sorted([*twice, np.sqrt(b) / order])
+    assert [crossing.speed for crossing in diagram.crossings] == pytest.approx(expected, rel=1e-9)
+    assert [crossing.mode for crossing in diagram.crossings] == [0, 1, 0]
 
 
 # coarse speeds: both modes go straight on by their shapes, whatever the gap

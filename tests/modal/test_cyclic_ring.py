@@ -20,12 +20,14 @@ from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
 from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes
 from vanedamp.modal.cyclic_statics import RingStatics
-from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
 from vanedamp.modal.gyroscopic import gyroscopic_modes
 from vanedamp.modal.matrices import patch_average
 from vanedamp.modal.rotating import UnstableError
 from vanedamp.modal.temperature import Temperature
+from vanedamp.rom.interface import InterfaceCoordinate
+from vanedamp.rom.ring.reduction import reduce_ring
 
 SECTORS, SPEED = 6, 1500.0
 Z, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
@@ -63,7 +65,7 @@ def rotating(solids, standing):
     """Their matrices with rotation about the axis of the ring."""
     statics = (RingStatics(of_ring), None)
     both = zip(solids, standing, statics, strict=True)
-    return [solid.rotating(matrices, Z, ORIGIN, given) for solid, matrices, given in both]
+    return [solid.rotating(matrices, Z, ORIGIN, given, 2.0 * SPEED) for solid, matrices, given in both]
 
 
 def test_frequencies_are_those_of_the_whole_mesh(standing):
@@ -122,7 +124,7 @@ def test_wave_with_gyroscopic_coupling_moves_the_whole_mesh(rotating):
     modes = gyroscopic_ring_modes(of_ring(sector.standing), sector, SPEED, 1)
     places = [sector.standing.coordinates @ rotation(Z, 2 * np.pi * j / SECTORS).T for j in range(SECTORS)]
     nodes = cKDTree(np.concatenate(places)).query(whole.standing.coordinates)[1]
-    stiffness = whole.standing.stiffness + SPEED**2 * whole.centrifugal_stiffness
+    stiffness = whole.standing.stiffness + whole.added(SPEED)
     for mode in range(len(modes)):
         omega = 2 * np.pi * modes.frequencies_hz[mode]
         moved, quarter = (modes.whole(mode, phase).reshape(-1, 3)[nodes].ravel() for phase in (0.0, 0.5 * np.pi))
@@ -151,6 +153,19 @@ def test_campbell_diagram_by_nodal_diameter(rotating, gyroscopic):
     for crossing in found.crossings:
         known = gyroscopic_modes(whole, crossing.speed, 14) if gyroscopic else solve_modes(whole.at(crossing.speed), 14)
         assert np.abs(known.frequencies_hz / crossing.frequency_hz - 1).min() < 1e-7
+
+
+def test_reduced_ring_at_a_speed(rotating):
+    """Its modes are those of the sector at the speed, between the speeds of its equilibria."""
+    sector, _ = rotating
+    tip = InterfaceCoordinate("tip", "tip", (0.0, 0.0, 1.0))
+    ring = reduce_ring(
+        of_ring(sector.standing), [tip], 2, None, None, sector.centrifugal_stiffness, sector.greatest, factorize,
+        higher=sector.higher,
+    )  # fmt: skip
+    found = np.sort(ring.tuned_families(SPEED).squares)[:6]
+    known = ring_modes(of_ring(sector.at(SPEED)), 2)
+    assert np.sqrt(found) / (2.0 * np.pi) == pytest.approx(every(known)[:6], rel=1e-6)
 
 
 def test_engine_orders_move_the_whole_mesh_alike(standing):
@@ -194,7 +209,9 @@ def test_speed_at_which_the_ring_is_unstable(rotating):
     """The limit is that of the whole mesh, whichever diameter has it."""
     limits = []
     for structure in rotating:
-        compressed = replace(structure, centrifugal_stiffness=-1.0 * structure.centrifugal_stiffness)
+        compressed = replace(
+            structure, centrifugal_stiffness=-1.0 * structure.centrifugal_stiffness, higher=(), greatest=np.inf
+        )
         with pytest.raises(UnstableError, match="the structure is unstable") as caught:
             compressed.at(1e5)
         limits.append(float(str(caught.value).split(" above ")[1].split()[0]))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.tools.arched_cluster import write as write_arched
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
@@ -77,8 +78,8 @@ def test_heat_buckles_a_held_beam(mesh):
     assert 0.49 < share < 0.505
 
 
-def test_free_expansion_changes_nothing(mesh):
-    """No stress, no other stiffness: the reference is a body of the same material at its reference temperature."""
+def test_free_expansion_is_growth(mesh):
+    """No stress: a body that is 1 + alpha (T - T0) times as large, of the same modulus and mass, is as much stiffer."""
     material = replace(STEEL, poisson=0.3)
     cold, hot = (
         Solid(mesh, {"default": material}, temperature=uniform(value, 20.0)).assemble(FREE_TO_EXPAND, 0.0)
@@ -86,9 +87,36 @@ def test_free_expansion_changes_nothing(mesh):
     )
     # of the stress of a body that is held, E alpha (T - T0), at the size of an element
     held = YOUNG * EXPANSION * 500.0 * SIDE
-    assert abs(hot.stiffness - cold.stiffness).max() < 1e-8 * held
+    assert abs(hot.stiffness - (1.0 + EXPANSION * 500.0) * cold.stiffness).max() < 1e-6 * held
+    assert abs(hot.mass - cold.mass).max() == 0.0
     clamped = Solid(mesh, {"default": material}, temperature=uniform(70.0, 20.0)).assemble(HELD, 0.0)
     assert abs(clamped.stiffness - cold.stiffness).max() > 1e-3 * held
+
+
+# Hz of ten modes by CalculiX 2.20, C3D10 elements on the mesh of `arched_cluster.write`: *STEP, NLGEOM with *STATIC and
+# *TEMPERATURE, then *STEP, PERTURBATION with *FREQUENCY; cold, and 300 K hotter
+CALCULIX_COLD = (
+    3462.486, 7583.315, 7690.099, 8786.882, 12542.74, 17280.92, 19731.81, 20624.61, 24768.48, 26430.92,
+)  # fmt: skip
+CALCULIX_HOT = (
+    3467.391, 7617.162, 7710.327, 8805.708, 12586.43, 17410.90, 19792.30, 20631.28, 24855.42, 26533.32,
+)  # fmt: skip
+
+
+def test_hot_cluster_equals_calculix(tmp_path):
+    """Arched bands and vanes held at the outer band: stress and deformation shift each frequency in its own way.
+
+    CalculiX takes the modulus as one of the cold sizes: its squares are larger by 1 + alpha (T - T0).
+    """
+    steel = {"default": Material(YOUNG, 0.3, 8190.0, EXPANSION)}
+    path = write_arched(tmp_path / "arched.msh")
+    cold, hot = (
+        solve_modes(Solid(path, steel, temperature=uniform(rise)).assemble({"clamp": "xyz"}, 0.0), 10).frequencies_hz
+        for rise in (0.0, 300.0)
+    )
+    expected = np.divide(CALCULIX_HOT, CALCULIX_COLD) / np.sqrt(1.0 + 300.0 * EXPANSION)
+    assert hot / cold == pytest.approx(expected, rel=7e-5)
+    assert np.ptp(expected) > 5e-3
 
 
 def test_frequency_follows_the_modulus(mesh):
@@ -217,13 +245,17 @@ def test_materials_that_are_refused(tmp_path, capsys, material, message):
 
 
 def test_stress_of_a_held_beam(mesh):
-    """-E alpha T along a beam whose ends are held along it, Poisson's ratio 0; nothing in one that can expand."""
+    """-E alpha T along a beam whose ends are held along it, Poisson's ratio 0; nothing in one that can expand.
+
+    Green's strain of the growth, and the modulus by the cold size.
+    """
+    stretch = 1.0 + EXPANSION * 10.0
     held = Solid(mesh, {"default": STEEL}, temperature=uniform(30.0, 20.0))
     held.assemble(FREE_TO_EXPAND | {"tip": "x"}, 0.0)
     points = np.arange(0, len(held.stress_points()), 7)
     stress = held.static_stresses(points)
     assert list(stress) == ["temperature"] and stress["temperature"].shape == (6, len(points))
-    assert stress["temperature"][0] == pytest.approx(-YOUNG * EXPANSION * 10.0, rel=1e-9)
+    assert stress["temperature"][0] == pytest.approx(-0.5 * YOUNG * (stretch**2 - 1.0) / stretch, rel=1e-9)
     assert np.abs(stress["temperature"][1:]).max() < 1e-6 * YOUNG * EXPANSION * 10.0
     free = Solid(mesh, {"default": STEEL}, temperature=uniform(30.0, 20.0))
     free.assemble(FREE_TO_EXPAND, 0.0)

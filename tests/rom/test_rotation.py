@@ -36,13 +36,15 @@ def rotating(tmp_path_factory):
     solid = Solid(
         build(block, tmp_path_factory.mktemp("plate") / "plate.msh"), {"default": Material(2e11, 0.3, 8000.0)}
     )
-    return solid.rotating(solid.assemble({"root": "xyz"}, 0.002), [0.0, 0.6, 0.8], [-0.1, 0.0, 0.0])
+    standing = solid.assemble({"root": "xyz"}, 0.002)
+    speed = FAST * float(solve_modes(standing, 1).angular_frequencies[0])
+    return solid.rotating(standing, [0.0, 0.6, 0.8], [-0.1, 0.0, 0.0], speed=speed)
 
 
 @pytest.fixture(scope="module")
 def greatest(rotating):
     """Greatest speed, rad/s."""
-    return FAST * float(solve_modes(rotating.at(0.0), 1).angular_frequencies[0])
+    return rotating.greatest
 
 
 def tip(matrices, kind="average"):
@@ -91,16 +93,15 @@ def test_receptance_between_the_speeds_of_the_basis(rotating, bases, model, grea
 
 def test_the_estimate_is_the_error_between_the_speeds(rotating, model):
     estimate = model.provenance["rotation"]
-    (speed,) = estimate["checked"]
-    full = solve_modes(rotating.at(speed), 1).frequencies_hz
-    error = frequency_errors(model.at_speed(speed), full)[0]
+    fulls = [(speed, solve_modes(rotating.at(speed), 1).frequencies_hz) for speed in estimate["checked"]]
+    error = max(frequency_errors(model.at_speed(speed), full)[0] for speed, full in fulls)
     assert 0.5 * error < estimate["frequency"] < 2.0 * error
     assert estimate["met"] and estimate["sentence"].startswith("basis of the speeds 0, ")
 
 
 def test_speeds_are_added_where_the_estimate_asks(rotating, greatest):
-    """A basis of few modes at two speeds misses a tight tolerance; more speeds lower the error."""
-    bases = SpeedBases(rotating, tip(rotating.standing), 2, factorize, quasi_static=0)
+    """A basis of few modes at few speeds misses a tight tolerance; more speeds lower the error."""
+    bases = SpeedBases(rotating, tip(rotating.standing), 2, factorize, quasi_static=1)
     loose = reduce_rotating(bases, greatest, tolerance=0.9).provenance["rotation"]
     tight = reduce_rotating(bases, greatest, tolerance=0.2 * loose["receptance"]).provenance["rotation"]
     assert len(tight["speeds"]) > len(loose["speeds"])
@@ -118,7 +119,8 @@ def test_smaller_models_keep_what_the_speed_changes(rotating, model, greatest):
     assert fewer.size == model.size - 4 and fewer.fixed_interface_modes == 6
     for share in (0.0, 0.5, 1.0):
         full = solve_modes(rotating.at(share * greatest), 3).frequencies_hz
-        assert frequency_errors(fewer.at_speed(share * greatest), full).max() < 1e-3
+        # at speed the bent plate's bending stretches it, of which the modes that are dropped have a part
+        assert frequency_errors(fewer.at_speed(share * greatest), full).max() < (5e-3 if share else 1e-3)
 
 
 def test_natural_modes_are_taken_at_the_speed(model, greatest):
@@ -140,8 +142,9 @@ def test_the_record_keeps_the_rotation(model, greatest, tmp_path):
     again = ReducedModel.load(tmp_path / "rom.h5")
     assert again.greatest_speed == greatest
     assert np.array_equal(again.centrifugal_stiffness, model.centrifugal_stiffness)
+    assert np.array_equal(again.higher_stiffness, model.higher_stiffness) and len(again.higher_stiffness) == 3
     assert np.array_equal(again.rotation_axis, [0.0, 0.6, 0.8]) and again.rotation_point[0] == -0.1
-    assert again.provenance["rotation"]["speeds"] == [0.0, greatest]
+    assert again.provenance["rotation"]["speeds"] == pytest.approx([0.0, np.sqrt(0.5) * greatest, greatest])
 
 
 def test_what_cannot_be_reduced_over_speeds(rotating, bases):
@@ -162,7 +165,10 @@ def test_a_case_is_reduced_for_all_of_its_speeds(tmp_path, capsys):
     command = ["reduce", str(path), "-o", str(tmp_path / "rom.h5"), "--modes", "auto", "--hot-spots", "1"]
     assert main(command) == 0
     said = capsys.readouterr().out
-    assert "basis of the speeds 0, 6283 rad/s: estimated error at 4443 rad/s" in said and "\nat 6283.19 rad/s: " in said
+    assert (
+        "basis of the speeds 0, 4443, 6283 rad/s: estimated error at 3142, 5441" in said
+        and "\nat 6283.19 rad/s: " in said
+    )
     model = ReducedModel.load(tmp_path / "rom.h5")
     estimate = model.provenance["estimate"]
     assert estimate["met"] and model.modes == estimate["modes"] and "hot1.xx" in model.outputs
@@ -245,7 +251,7 @@ def test_the_report_shows_the_speeds_of_a_model(tmp_path, capsys):
     assert main(["report", str(tmp_path / "rom.h5"), "-o", str(tmp_path / "report.html")]) == 0
     text = (tmp_path / "report.html").read_text()
     fastest = ReducedModel.load(tmp_path / "rom.h5")
-    assert "It holds up to\n6283.19 rad/s (basis of the speeds 0, 6283 rad/s: " in text
+    assert "It holds up to\n6283.19 rad/s (basis of the speeds 0, 4443, 6283 rad/s: " in text
     assert f"<td>{fastest.at_speed(fastest.greatest_speed).natural_frequencies_hz[0]:.2f}</td>" in text
 
 
