@@ -339,7 +339,9 @@ class Response(Record, Plotted):
             given[name] = tuple(None if np.isnan(number) else number for number in numbers)
         of_events = {name.removeprefix("event_"): values[name] for name in values if name.startswith("event_")}
         columns = zip(*(column.tolist() for column in of_events.values()), strict=True)
-        unknown = {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}  # of earlier files
+        unknown: dict[str, Any] = (
+            {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}
+        )  # of earlier files
         return cls(
             event_list=[Event(**dict(zip(of_events, row, strict=True)), **unknown) for row in columns],
             time=values.get("time", np.zeros(0)), displacement=values.get("displacement", np.zeros(0)),
