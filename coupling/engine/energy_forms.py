@@ -50,21 +50,74 @@ def add_segment(system, flows, st, rec, scratch, s, period, tau, constant, grows
                 rec.swing[period, 2] += mean
             break
         _add_slow_pair(flows, st, rec, s, period, i, tau, constant)
+    response = flows.response[s]
     if deflected:
-        _extremes(system, flows, st, rec, scratch, s, period, tau, constant, grows)
+        swing = rec.swing[period]
+        _extremes(system, flows, st, scratch, s, response, tau, constant, grows, swing)
+        rec.peak[period] = max(rec.peak[period], max(swing[0], -swing[1]))
     else:
-        rec.peak[period] = highest(system, flows, st, scratch, s, tau, constant, grows, rec.peak[period], 0.0)
+        top = rec.peak[period]
+        rec.peak[period] = highest(system, flows, st, scratch, s, response, tau, constant, grows, top, 0.0)
+    if rec.outputs.shape[1] > 0 and period >= rec.counted[0]:
+        _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows)
 
 
 @kernel
-def _extremes(system, flows, st, rec, scratch, s, period, tau, constant, grows):
-    """Record the largest and the smallest response of the segment."""
-    swing = rec.swing[period]
+def _highest(system, flows, st, scratch, s, response, tau, constant, grows, peak, side):
+    """As `highest`, in one place for all but the response itself."""
+    return highest(system, flows, st, scratch, s, response, tau, constant, grows, peak, side)
+
+
+@kernel
+def _extremes(system, flows, st, scratch, s, response, tau, constant, grows, swing):
+    """Record the largest and the smallest value of a functional in the segment."""
     for k in range(2):
         side = 1.0 - 2.0 * k
-        top = highest(system, flows, st, scratch, s, tau, constant, grows, side * swing[k], side)
-        swing[k] = side * top
-        rec.peak[period] = max(rec.peak[period], top)
+        swing[k] = side * _highest(system, flows, st, scratch, s, response, tau, constant, grows, side * swing[k], side)
+
+
+@kernel
+def _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows):
+    """Record largest values of the further outputs, or where bodies deflect the structure their swing and integral."""
+    deflected, count = len(rec.swing) > 0, st.counters[ACTIVE]
+    if deflected:
+        _integrate_amplitudes(flows, st, scratch, s, tau, count)
+    for k in range(rec.outputs.shape[1]):
+        row, constant, found = flows.outputs[s, k], st.offset[1 + k], rec.outputs[period, k]
+        if deflected:
+            _extremes(system, flows, st, scratch, s, row, tau, constant, grows, found)
+            found[2] += constant * tau + _real_part(row, scratch.total, count)
+        else:
+            found[0] = _highest(system, flows, st, scratch, s, row, tau, constant, grows, found[0], 0.0)
+
+
+@kernel
+def _integrate_amplitudes(flows, st, scratch, s, tau, count):
+    """Set scratch.total to the integrals of the amplitudes over [0, tau], by real and imaginary parts in turns."""
+    e = flows.driven.shape[1] - 1
+    for j in range(count):
+        rate = flows.eigenvalue[s, j]
+        # of a driven mode, whose rate is no slower than its harmonic's, the harmonic's part is not to be added twice
+        if j < flows.driven[s, e] and j >= e:
+            h = 0
+            while j >= flows.driven[s, h + 1]:
+                h += 1
+            phase = complex(scratch.total[2 * h], scratch.total[2 * h + 1])
+            integral = (scratch.gain[j] - flows.load[s, j] * phase) / rate
+        elif abs(rate) * tau < SLOW:
+            integral = st.amplitude[j] * _slow_integral(rate, tau)
+        else:
+            integral = scratch.gain[j] / rate
+        scratch.total[2 * j], scratch.total[2 * j + 1] = integral.real, integral.imag
+
+
+@summing
+def _real_part(row, parts, count):
+    """Return the real part of a functional of complex numbers by their real and imaginary parts."""
+    total = 0.0
+    for j in range(count):
+        total += row[j].real * parts[2 * j] - row[j].imag * parts[2 * j + 1]
+    return total
 
 
 @inlined

@@ -22,25 +22,24 @@ def grid_factors(rate: np.ndarray, period: float) -> np.ndarray:
 
 
 @inlined
-def highest(system, flows, st, scratch, s, tau, constant, grows, peak, side):
+def highest(system, flows, st, scratch, s, response, tau, constant, grows, peak, side):
     """Return the largest |response| on [0, tau] and before; side 1: of the response, -1: of its negative.
 
-    grows: factor by which a mode may grow within tau, 1 for those that decay.
+    response: functional (m,) of the amplitudes; constant: its constant part; grows: factor by which a mode may grow
+    within tau, 1 for those that decay.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
     Where interpolant and bound stay below the peak so far there is nothing to find.
     """
     count = whole_vectors(st.counters[ACTIVE], len(st.amplitude))
-    x0, v0, x1, v1, size, fourth = _ends(
-        flows.response[s], flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count
-    )
+    x0, v0, x1, v1, size, fourth = _ends(response, flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count)
     x0, x1, size, fourth = constant + x0, constant + x1, abs(constant) + size * grows, fourth * grows
     e = flows.driven.shape[1] - 1
     if flows.driven[s, e] > e:
         more = _set_drive(
-            flows.eigenvalue[s], flows.response[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain,
-            system.period, scratch.drive,
+            flows.eigenvalue[s], response, flows.driven[s], flows.load[s], st.amplitude, scratch.gain, system.period,
+            scratch.drive,
         )  # fmt: skip
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:

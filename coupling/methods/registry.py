@@ -35,14 +35,15 @@ def respond(
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
     watch: Watch | None = None,
+    outputs: bool = False,
 ) -> Response:
     """Return the response of a scene without open choices. Arguments as in coupling.simulation.simulate.
 
-    watch: looks at more samples than are asked for.
+    watch: looks at more samples than are asked for; outputs: with the response of the sectors of a ring.
     """
     started = time.perf_counter()
     logs = scene.wear is not None and scene.yields  # the energies of their impacts are in the log
-    run = run_of(scene, events or logs, samples_per_period, start, watch)
+    run = run_of(scene, events or logs, samples_per_period, start, watch, outputs)
     ended = run_scene(run, scene, progress, watch)
     outcome = run.outcome() if watch is None else watch.close(run.outcome())
     response = evaluate(scene, outcome, ended, started, events)
@@ -81,6 +82,7 @@ def run_of(
     samples_per_period: int = 0,
     start: RestartState | None = None,
     watch: Watch | None = None,
+    outputs: bool = False,
 ) -> Run:
     """Return a run of the scene's method at time zero.
 
@@ -103,6 +105,7 @@ def run_of(
         isinstance(scene.structure, Rom),
         deflects(scene, system),
         _impact_exponent(scene),
+        outputs,
     )
     records = records if watch is None else watch.records(records)
     return method.begin(scene, system, records, events, start_of(scene, system, start))

@@ -15,7 +15,7 @@ from vanedamp.coupling.numerics.codes import (
     STEPS,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.response.recorder import note_step, note_tilts, put_sample, record_section
+from vanedamp.coupling.response.recorder import note_outputs, note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
 from vanedamp.coupling.system.unit_kinematics import elongation, gap
@@ -167,6 +167,8 @@ def _record_response(system, times, motion, records, k):
     motion.response[0], motion.response[1] = x1, rate1
     c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
     note_step(records, p, h, x0, x1, rate0, rate1)
+    if records.outputs.shape[1] > 0:
+        note_outputs(system, records, p, h, motion.start[0], motion.start[1], motion.q, motion.v)
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
     m0, m1 = 0.0, 0.0

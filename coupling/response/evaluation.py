@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.by_sector import response_by_sector
 from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import Rows, events_of, impact_energies
 from vanedamp.coupling.response.figures import (
@@ -126,8 +127,9 @@ def run_scene(
     dropped, periods, most = transient.length()
     if scene.time.steady == "auto":
         return _run_until_known(run, transient, periods, progress, watch)
-    done = 0
+    done, counted = 0, run.outcome().records.counted
     while True:
+        counted[0] = dropped
         while done < periods:
             if watch is not None:
                 watch(run, dropped)
@@ -200,6 +202,8 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     if scene.wear is not None and records.worn.shape[1]:  # a ring-down does not count it
         extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
+    if records.outputs.shape[1]:
+        extent["sectors"] = response_by_sector(scene, system, records, run.rows, slice(first, done))
     return Response(
         status=status,
         frequency=scene.frequency,

@@ -91,6 +91,12 @@ def cubic_extremum(h, x0, x1, rate0, rate1):
     return x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1)
 
 
+@inlined
+def _integral(h, x0, x1, rate0, rate1):
+    """Return the integral over a step of length h of the cubic through both ends."""
+    return h * (0.5 * (x0 + x1) + h * (rate0 - rate1) / 12.0)
+
+
 @kernel
 def note_impact(records, period, row, energy):
     """Let an impact on a row of the log, and the energy of its relative motion (J), count in wear."""
@@ -113,4 +119,20 @@ def note_step(records, period, h, x0, x1, rate0, rate1):
     note_response(records, period, x1)
     note_response(records, period, cubic_extremum(h, x0, x1, rate0, rate1))
     if len(records.swing) > 0:
-        records.swing[period, 2] += h * (0.5 * (x0 + x1) + h * (rate0 - rate1) / 12.0)
+        records.swing[period, 2] += _integral(h, x0, x1, rate0, rate1)
+
+
+@entry
+def note_outputs(system, records, period, h, q0, v0, q1, v1):
+    """Let the further outputs on a step count as `note_step` does; q, v: coordinates and rates at both ends, (N,)."""
+    for k in range(records.outputs.shape[1] if period >= records.counted[0] else 0):
+        x0, x1, rate0, rate1, found = 0.0, 0.0, 0.0, 0.0, records.outputs[period, k]
+        for i in range(system.outputs.shape[1]):
+            part = system.outputs[k, i]
+            x0, x1, rate0, rate1 = x0 + part * q0[i], x1 + part * q1[i], rate0 + part * v0[i], rate1 + part * v1[i]
+        top = cubic_extremum(h, x0, x1, rate0, rate1)
+        if len(records.swing) > 0:
+            found[0], found[1] = max(found[0], max(x1, top)), min(found[1], min(x1, top))
+            found[2] += _integral(h, x0, x1, rate0, rate1)
+        else:
+            found[0] = max(found[0], max(abs(x1), abs(top)))

@@ -41,6 +41,10 @@ class Records(NamedTuple):
     struck: np.ndarray  # (periods + 1, w) sum over its impacts of their energy to the power `exponent`, J^exponent
     hits: np.ndarray  # (periods + 1, w) its impacts
     exponent: np.ndarray  # (1,)
+    # (periods + 1, k, 3) of further outputs (System.outputs): largest |value|, or where bodies bring a static load as
+    # `swing`; -inf: not noted; k = 0: not wanted
+    outputs: np.ndarray
+    counted: np.ndarray  # (1,) int: period from which on they are noted
 
     @property
     def samples_per_period(self) -> int:
@@ -50,12 +54,13 @@ class Records(NamedTuple):
 
 def new_records(
     system: System, periods: int, samples: int, coordinates: bool = False, deflected: bool = False,
-    exponent: float | None = None,
+    exponent: float | None = None, outputs: bool = False,
 ) -> Records:  # fmt: skip
     """Return empty records for `periods` periods with `samples` samples each.
 
     coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure;
-    exponent: of the energies of impacts that wear; None: wear is not wanted.
+    exponent: of the energies of impacts that wear; None: wear is not wanted; outputs: whether largest values of the
+    further outputs are wanted.
     """
     b = system.bodies
     kept = np.empty((periods * samples, system.modes if coordinates else 0))
@@ -74,4 +79,6 @@ def new_records(
         log=np.zeros((4096 + 4 * (system.bodies + system.dampers + system.contacts), 6)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
         worn=worn, struck=struck, hits=hits, exponent=np.array([1.0 if exponent is None else exponent]),
+        outputs=np.tile([-np.inf, np.inf, 0.0], (periods + 1, len(system.outputs) * outputs, 1)),
+        counted=np.zeros(1, np.int64),
     )  # fmt: skip

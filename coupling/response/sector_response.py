@@ -18,8 +18,6 @@ BY_SECTOR = {
 }  # fmt: skip
 #: results of the whole ring and their units
 OF_RING = {"amplification": "1", "localisation": "1"}
-#: sampling error that is printed
-_TOLD = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +29,7 @@ class SectorResponse:
     amplitude_undamped, amplitude_fixed     (N,) m, of the linear ring without bodies, and with every body fixed to its
                                             floor; nan for an excitation that is no sum of sines
     impacts_per_period                      (N,) of the sector's bodies; nan for a method that does not count them
-    sampling_error                          fraction by which samples miss the exact mean amplitude at `excitation.at`,
-                                            and about so much in every sector
+    sampling_error                          0: amplitudes come from no samples
     tuned                                   m, of the tuned ring without bodies at its resonance near the excitation,
                                             at `excitation.at`; None: not known
     """
@@ -78,8 +75,6 @@ class SectorResponse:
         text = f"largest amplitude {1e6 * self.amplitude_mean[number]:.4g} um in sector {number} of {count}"
         if self.amplification is not None:
             text += f", {self.amplification:.4g} of the tuned ring without bodies in resonance"
-        if self.sampling_error > _TOLD:
-            text += f"; samples miss {self.sampling_error:.1%}"
         if self.localisation is not None:
             text += f"; localisation {self.localisation:.4g}"
         hits = self.impacts_per_period

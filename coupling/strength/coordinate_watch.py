@@ -7,9 +7,7 @@ known before, and their memory is given back.
 from __future__ import annotations
 
 import mmap
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +16,8 @@ from vanedamp.coupling.response.evaluation import Outcome, Run
 from vanedamp.coupling.response.plane import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.strength.spots import Functionals, samples_of
+from vanedamp.coupling.strength.spots import samples_of
+from vanedamp.coupling.strength.stress_watch import StressTaker
 from vanedamp.coupling.system.system import System
 
 #: fields of the records with a row for every sample
@@ -27,30 +26,18 @@ _SAMPLED = ("samples", "coordinates", "sampled", "shut")
 _TOGETHER = 20_000
 
 
-class Taker(Protocol):
-    """What takes functionals of the modal coordinates."""
-
-    @property
-    def functionals(self) -> Functionals:
-        """The functionals."""
-
-    def take(self, begin: int, coordinates: np.ndarray, each: int) -> None:
-        """Take periods from number `begin` on: coordinates (p each + 2, n), with a sample more at both ends."""
-
-
 class CoordinateWatch:
-    """Hands the samples of every period to those that take them as a run advances (response.evaluation.Watch)."""
+    """Hands the samples of every period to what takes their stress as a run advances (response.evaluation.Watch)."""
 
-    def __init__(self, takers: Sequence[Taker]) -> None:
-        self.takers, self.each, self.asked = takers, 0, 0
-        self.outcome: Outcome | None = None
+    def __init__(self, taker: StressTaker) -> None:
+        self.taker, self.each, self.asked = taker, 0, 0
         self._rooms: list[tuple[np.ndarray, mmap.mmap]] = []
         self._whole: Records | None = None
         self._taken, self._sampling, self._first = 0, True, -1
 
     def samples(self, scene: Scene, system: System, asked: int) -> int:
         """Return how many samples of each period the run keeps."""
-        self.each = max(samples_of(scene, system, taker.functionals, asked) for taker in self.takers)
+        self.each = samples_of(scene, system, self.taker.spots, asked)
         self.asked = asked
         return self.each
 
@@ -74,8 +61,7 @@ class CoordinateWatch:
         records = _cut(outcome.records, slice(None, None, self.each // self.asked) if self.asked else slice(0))
         if (plane := outcome.plane) is not None:
             plane = plane_of(outcome.system, records, plane.bound, plane.walls)
-        self.outcome = replace(outcome, records=records, plane=plane)
-        return self.outcome
+        return replace(outcome, records=records, plane=plane)
 
     def _take(self, done: int) -> None:
         """Take the periods up to `done`, and give their samples back."""
@@ -89,14 +75,13 @@ class CoordinateWatch:
             self._hand_over(q, first, min(first + together, done))
 
     def _hand_over(self, q: np.ndarray, begin: int, done: int) -> None:
-        """Hand some periods of the samples (n, modes) of the run to those that take them, and give these back."""
+        """Hand some periods of the samples (n, modes) of the run to what takes them, and give these back."""
         rows = slice(begin * self.each, done * self.each)
         self._first = rows.start if self._first < 0 else self._first
         # the first sample has none before it where the periods before were not sampled
         before = q[max(rows.start - 1, self._first)]
         padded = np.concatenate([before[None], q[rows], q[rows][-1:]])
-        for taker in self.takers:
-            taker.take(begin, padded, self.each)
+        self.taker.take(begin, padded, self.each)
         if not self.asked:
             for array, room in self._rooms:
                 _give_back(room, array.strides[0], rows.start - 1, rows.stop - 1)

@@ -24,30 +24,22 @@ _MISSED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Functionals:
-    """Functionals of n modal coordinates at s places, of c components.
+class Spots:
+    """Hot spots of a reduced model with n modes.
 
-    rows: (s, c, n) in their unit per modal coordinate; squares: (n,) squared angular frequencies.
+    rows: (s, 6, n) stresses, Pa, per modal coordinate; squares: (n,) squared angular frequencies; facts: of each, by
+    name (rom.recovery.hot_spots); speed: of rotation, rad/s.
     """
 
     rows: np.ndarray
     squares: np.ndarray
+    facts: dict[str, dict[str, Any]]
+    speed: float
 
     @cached_property
     def size(self) -> np.ndarray:
-        """(s, n) a norm of the components per modal coordinate."""
+        """(s, n) a norm of the stress per modal coordinate, Pa."""
         return np.sqrt((self.rows**2).sum(axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class Spots(Functionals):
-    """Hot spots of a reduced model with n modes: stresses, Pa.
-
-    facts: of each, by name (rom.recovery.hot_spots); speed: of rotation, rad/s.
-    """
-
-    facts: dict[str, dict[str, Any]]
-    speed: float
 
     @cached_property
     def materials(self) -> list[Fatigue | None]:
@@ -94,8 +86,8 @@ def known_spots(scene: Scene) -> Spots:
     return spots
 
 
-def samples_of(scene: Scene, system: System, spots: Functionals, asked: int = 0) -> int:
-    """Return the number of samples per period from which functionals are taken: a multiple of `asked`.
+def samples_of(scene: Scene, system: System, spots: Spots, asked: int = 0) -> int:
+    """Return the number of samples per period from which stresses are taken: a multiple of `asked`.
 
     An even one if possible, 16 per period of the highest harmonic at least, and so many that what impacts excite is
     missed by 1 % of the amplitude at most, but no more than 192. A mode misses at most its contribution, and
@@ -124,8 +116,8 @@ def _fits(scene: Scene, samples: int) -> bool:
     return True
 
 
-def _impact_shares(system: System, spots: Functionals) -> np.ndarray:
-    """Return functionals (k, s, n) of modes after an impact of each contact, over that of the mode nearest to order 1.
+def _impact_shares(system: System, spots: Spots) -> np.ndarray:
+    """Return the stress (k, s, n) of modes after an impact of each contact, over that of the mode nearest to order 1.
 
     That mode moves the contact's places with a velocity, which an elastic impact of the masses in contact reverses. A
     compliant contact takes half a period of these masses on its spring, and hardly excites what is faster.

@@ -23,17 +23,17 @@ _CHECKED = 8
 
 
 class StressTaker:
-    """Takes the stress of every period (coordinate_watch.Taker)."""
+    """Takes the stress of every period as coordinate_watch.CoordinateWatch hands it over."""
 
     def __init__(self, spots: Spots) -> None:
-        self.functionals, self.each = spots, 0
+        self.spots, self.each = spots, 0
         self._parts: list[tuple[int, PeriodStress]] = []
         self._checked = np.zeros((2, len(spots.rows)))
         self._histories = SpotHistories(spots.materials)
 
     def take(self, begin: int, coordinates: np.ndarray, each: int) -> None:
         """Take periods from number `begin` on: coordinates (p each + 2, n), with a sample more at both ends."""
-        self.each, stress = each, self.functionals.stress(coordinates)
+        self.each, stress = each, self.spots.stress(coordinates)
         found = period_stress(stress, each)
         self._parts.append((begin, found))
         self._histories.add(begin * each, stress[..., 1:-1])
@@ -52,12 +52,12 @@ class StressTaker:
             return None
         all_of, half = self._checked
         error = np.abs(half - all_of) / np.where(all_of > 0.0, all_of, 1.0)
-        found = spot_stresses(self.functionals, whole, linear_stresses(scene, self.functionals), self.each, error)
+        found = spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
         repeats, duration = response.classification != "non-periodic", len(whole.mean) / response.frequency
         counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(found))]
-        noise = linear_moments(scene, self.functionals) if isinstance(scene.excitation.waveform, Multisine) else {}
+        noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
         spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(found))]
-        materials = self.functionals.materials
+        materials = self.spots.materials
         return tuple(with_strength(*each, duration) for each in zip(found, materials, counted, spectra, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""Runs with what their modal coordinates tell: stress at hot spots, and the response of the sectors of a ring."""
+"""Runs with what a model tells beside its response: stress at hot spots, and the response of the sectors of a ring."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.strength.coordinate_watch import CoordinateWatch, Taker
-from vanedamp.coupling.strength.sector_watch import SectorTaker, sectors_of
+from vanedamp.coupling.strength.coordinate_watch import CoordinateWatch
 from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.coupling.strength.stress_watch import StressTaker
 
@@ -26,16 +25,8 @@ def watched(
 
     Arguments as in coupling.simulation.simulate.
     """
-    spots, sectors = spots_of(scene), sectors_of(scene)
+    spots = spots_of(scene)
     stress = None if spots is None else StressTaker(spots)
-    ring = None if sectors is None else SectorTaker(sectors)
-    takers: list[Taker] = [taker for taker in (stress, ring) if taker is not None]
-    if not takers:
-        return respond(scene, events, samples_per_period, start, progress)
-    watch = CoordinateWatch(takers)
-    response = respond(scene, events, samples_per_period, start, progress, watch)
-    if stress is not None:
-        response = replace(response, stress=stress.result(scene, response))
-    if ring is not None and watch.outcome is not None:
-        response = replace(response, sectors=ring.result(scene, response, watch.outcome))
-    return response
+    watch = None if stress is None else CoordinateWatch(stress)
+    response = respond(scene, events, samples_per_period, start, progress, watch, outputs=True)
+    return response if stress is None else replace(response, stress=stress.result(scene, response))

@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.system.body_loads import BodyLoads, binding, body_loads, centres
 from vanedamp.coupling.system.cavities import check_directions, surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
+from vanedamp.coupling.system.reduced_model_file import ring_in_file
 from vanedamp.coupling.system.resonance import force_amplitude, force_shapes
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.sectors import unrolled
@@ -84,6 +85,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         modes=n, bodies=len(bodies), contacts=len(contacts), mass=mass, stiffness=stiffness, damping=damping,
         scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0,
         squares=basis.stiffness.copy(), viscous=basis.damping.copy(), response=response, table=table,
+        outputs=_by_sector(scene, basis),
         frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
         delassus=(units["J"] / mass) @ units["J"].T,
         restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
@@ -112,6 +114,14 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
         "casing": casing, "grip": grip, "casing_spring": spring, "tangential": spring[jenkins],
         "elongation": elongation,
     }  # fmt: skip
+
+
+def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:
+    """Return the functionals (N, n) of the response in every sector of a ring; (0, n) for other structures."""
+    ring, name = ring_in_file(scene.structure), forced_label(scene).partition("@")[0]
+    sectors = range(0 if ring is None else ring.sectors)
+    rows = [interface_row(basis, f"{name}@{sector}", "excitation.at") for sector in sectors]
+    return np.reshape(rows, (len(rows), len(basis.stiffness)))
 
 
 def _excitation(

@@ -55,6 +55,7 @@ class LineSystem(NamedTuple):
     left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
     right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall
     moves_with_floor: np.ndarray  # (r,) whether a contact's gap is a difference of slips
+    outputs: np.ndarray  # (k, n) functionals of further outputs
 
     @property
     def of_structure(self) -> Part:
@@ -121,7 +122,7 @@ def line_system(system: System) -> LineSystem:
         restitution=rows(0.0, 0.0, system.restitution), restitution_at=system.restitution_at,
         free_travel=rows(np.inf, np.inf, system.play), left_body=np.r_[np.full(b + d, -1), left],
         right_body=np.r_[np.full(b + d, -1), right],
-        moves_with_floor=contact & on_bodies.any(axis=1) & alike,
+        moves_with_floor=contact & on_bodies.any(axis=1) & alike, outputs=system.outputs,
     )  # fmt: skip
 
 

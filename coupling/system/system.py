@@ -106,6 +106,8 @@ class System(NamedTuple):
     casing: np.ndarray  # (d, N) motion of the structure at each friction damper
     grip: np.ndarray  # (d,) friction force at slip of each friction damper, N; 0: none
     casing_spring: np.ndarray  # (d,) stiffness before its slider, N/m; inf: rigid
+    # (k, n) functionals of further outputs: the response in each sector of a ring
+    outputs: np.ndarray = np.zeros((0, 0))
 
     @property
     def of_structure(self) -> Part:

@@ -251,6 +251,10 @@ def _begin_subsystem(system, flows, st, scratch, s):
     st.offset[0] = 0.0
     for i in range(len(st.constant)):
         st.offset[0] += system.response[i] * st.constant[i]
+    for k in range(len(system.outputs)):
+        st.offset[1 + k] = 0.0
+        for i in range(len(st.constant)):
+            st.offset[1 + k] += system.outputs[k, i] * st.constant[i]
     st.counters[ACTIVE] = flows.modes[s]
     _select_active_modes(flows, st)
 

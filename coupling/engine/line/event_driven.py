@@ -55,7 +55,8 @@ def is_common(system: LineSystem, modes: int) -> bool:
 
     One mode, one body between two rigid walls, one harmonic.
     """
-    return system.modes == system.bodies == len(system.frequency) == 1 and len(system.delassus) == modes == 3
+    single = system.modes == system.bodies == len(system.frequency) == 1
+    return single and len(system.delassus) == modes == 3 and not len(system.outputs)
 
 
 class EngineRun(EventDrivenRun):

@@ -86,6 +86,7 @@ def fill(system, subsystems, k, flows, s, scratch):
     _take_modes(system, subsystems, k, flows, s, count, scratch)
     for h in range(e):
         _set_harmonic(system, subsystems, k, flows, s, h, scratch)
+    _set_outputs(system, flows, s, e + count)
     step = 0.125 * system.period
     for level in range(GRIDS):
         for j in range(e + count):
@@ -326,6 +327,17 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
         largest, held = max(largest, size), max(held, terms)
     flows.speed[s, h], flows.acceleration[s, h] = largest * omega, max(largest, held) * omega * omega
     _set_forces(system, subsystems, k, flows, s, h, scratch)
+
+
+@kernel
+def _set_outputs(system, flows, s, count):
+    """Set the functionals of the further outputs, of modes and harmonics alike."""
+    for k in range(len(system.outputs)):
+        for j in range(count):
+            total = 0.0j
+            for i in range(flows.support[s, j, 0], flows.support[s, j, 1]):
+                total += system.outputs[k, i] * flows.shape[s, j, i]
+            flows.outputs[s, k, j] = total
 
 
 @kernel

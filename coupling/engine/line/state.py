@@ -52,7 +52,7 @@ class State(NamedTuple):
     # set when a subsystem begins
     coordinates: Annotated[np.ndarray, "2n"]  # p and p' of the structure at that time
     constant: Annotated[np.ndarray, "n"]  # constant part of p
-    offset: Annotated[np.ndarray, "1"]  # of the response, m
+    offset: Annotated[np.ndarray, "values"]  # of the response, m, and of the further outputs
     slip_constant: Annotated[np.ndarray, "b"]  # constant part of the displacements of bodies on springs, m
     constant_force: Annotated[np.ndarray, "r"]  # constant part of a closed row's force, N
     free_acceleration: Annotated[np.ndarray, "r"]  # constant acceleration of each row by its free bodies, m/s^2
@@ -149,4 +149,5 @@ def _sizes(system: LineSystem, modes: int) -> dict[str, int]:
     r, n, b = len(system.delassus), system.modes, system.bodies
     return {
         "r": r, "k": 2 * r, "m": modes, "n": n, "b": b, "N": n + b, "counters": COUNTERS, "energies": len(ENERGIES),
+        "values": 1 + len(system.outputs),
     }  # fmt: skip

@@ -56,6 +56,7 @@ class Flows(NamedTuple):
     force: Annotated[np.ndarray, "s r m", complex]  # force of each closed row
     impulse: Annotated[np.ndarray, "s r m", complex]  # its antiderivative, for rows with springs
     response: Annotated[np.ndarray, "s m", complex]  # displacement of the response
+    outputs: Annotated[np.ndarray, "s k m", complex]  # further outputs
     momentum: Annotated[np.ndarray, "s m", complex]  # momentum of all bodies
     work: Annotated[np.ndarray, "s e m", complex]  # power of the conjugate loads of each harmonic
 
@@ -113,6 +114,7 @@ def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = most_modes(system) + e
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
+    sizes["k"] = len(system.outputs)
     return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})
 
 

@@ -545,6 +545,12 @@ def _begin_segment(system, flows, st):
         st.offset[0] += (system.table[h] * st.amplitude[h]).real
     for j in range(flows.modes[s]):
         st.offset[0] -= (flows.response[s, j] * st.amplitude[j]).real
+    for k in range(len(system.outputs)):
+        st.offset[1 + k] = 0.0
+        for i in range(system.modes):
+            st.offset[1 + k] += system.outputs[k, i] * st.q[i]
+        for j in range(flows.modes[s]):
+            st.offset[1 + k] -= (flows.outputs[s, k, j] * st.amplitude[j]).real
     for i in range(size):
         st.bend[i] = flows.bend[s, i]
         for k in range(size):

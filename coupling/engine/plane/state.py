@@ -42,7 +42,7 @@ class State(NamedTuple):
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics, those beyond the flow's are zero
     change: np.ndarray  # (2m,) real and imaginary parts of their changes in the segment (energy_forms)
-    offset: np.ndarray  # (1,) constant part of the response, m
+    offset: np.ndarray  # (1 + k,) constant part of the response, m, and of the further outputs
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
     force: np.ndarray  # (2u,) constant part of the forces, N
     # (2u,) self-stress of contacts that depend on each other, N: excess of their forces over the least ones
@@ -122,7 +122,7 @@ def new_state(system: System, modes: int, initial: Motion) -> State:
         rate=np.zeros(2 * u), scale=np.zeros(1), reach=np.abs(system.J).max(axis=0, initial=0.0),
         last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)),
-        amplitude=np.zeros(modes, complex), change=np.zeros(2 * modes), offset=np.zeros(1),
+        amplitude=np.zeros(modes, complex), change=np.zeros(2 * modes), offset=np.zeros(1 + len(system.outputs)),
         bend=np.zeros(size), force=np.zeros(2 * u),
         prestress=np.zeros(2 * u),
     )  # fmt: skip

@@ -74,6 +74,7 @@ class Flows(NamedTuple):
     coalescing: Annotated[np.ndarray, "s", bool]  # whether modes nearly coalesce: their quadratic forms are zero
 
     response: Annotated[np.ndarray, "s m", complex]
+    outputs: Annotated[np.ndarray, "s k m", complex]
     momentum: Annotated[np.ndarray, "s m", complex]
     work: Annotated[np.ndarray, "s e m", complex]
     driven: Annotated[np.ndarray, "s phases", int]
@@ -102,7 +103,8 @@ def empty_flows(system: System, capacity: int = 8) -> Flows:
     m = e + 2 * len(_stretched(system, np.vstack([system.J[:u][sprung], system.elongation])))
     return room(Flows, {
         "s": capacity, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
-        "grids": GRIDS, "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()), "pairs": m * (m + 3),
+        "grids": GRIDS, "k": len(system.outputs), "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()),
+        "pairs": m * (m + 3),
     })  # fmt: skip
 
 
@@ -125,6 +127,7 @@ def _fill_energy(flows: Flows, system: System, s: int) -> None:
     rate, motion, velocity = flows.eigenvalue[s, :m], flows.motion[s, :, :m], flows.velocity[s, :, :m]
     flows.response[s, :m] = system.response @ motion
     flows.response[s, :e] += system.table
+    flows.outputs[s, :, :m] = system.outputs @ motion[: system.outputs.shape[1]]
     flows.driven[s] = e
     flows.grid_factor[s, :, :m] = grid_factors(rate, system.period)
     forms = {

@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, OPEN, ROUND_OFF, Motion, Unforced
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH
-from vanedamp.coupling.response.recorder import cubic_extremum, note_step, record_section
+from vanedamp.coupling.response.recorder import cubic_extremum, note_outputs, note_step, record_section
 from vanedamp.coupling.response.records import (
     CONTACT,
     ENERGIES,
@@ -58,8 +58,9 @@ class Recorder:
         self.on_floor = (system.surface == FLOOR) & free.contact
         self._set_products()
         self.before = np.zeros(self.count)
-        #: time, values and rates of the watched quantities at the last point
+        #: time, values and rates of the watched quantities at the last point; coordinates and rates there
         self.last = 0.0, np.zeros(len(self.watched)), np.zeros(len(self.watched))
+        self.place = np.zeros((2, free.n))
 
     # -- integrals
 
@@ -153,6 +154,10 @@ class Recorder:
             tilt = self.records.tilt[self.period]
             tilt[body] = max(tilt[body], abs(value[i]), abs(extremum))
         self.last = t, value, rate
+        if self.records.outputs.shape[1]:
+            place = np.array([y[self.free.q], y[self.free.v]])
+            note_outputs(self.system, self.records, self.period, t - begun, *self.place, *place)
+            self.place = place
 
     def flight(self, duration: float) -> None:
         """Add the duration of an arc to the time that bodies have spent off the floor."""
@@ -245,4 +250,5 @@ class Recorder:
         record_section(system, self.records, self.period, q.copy(), y[free.v].copy(), springs, ledger)
         extended = free.extended(0.0, y[: free.size])
         self.last = 0.0, self.watched @ extended, self.speeds @ extended
+        self.place = np.array([q, y[free.v]])
         self.before = integrals.copy()

@@ -1,0 +1,69 @@
+"""Response of the sectors of a ring over a run, from its records."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.response.event_log import Rows
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.sector_response import SectorResponse
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
+from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import InputError
+
+
+def response_by_sector(
+    scene: Scene, system: System, records: Records, rows: Rows, window: slice
+) -> SectorResponse | None:
+    """Return the response of the sectors over some periods; None where a method has not noted it."""
+    found = records.outputs[window]
+    peak = found[..., 0]
+    if not found.size or not np.isfinite(peak).all():
+        return None
+    if len(records.swing):  # about the static deflection (static_deflection.about_mean)
+        static = found[..., 2].sum(axis=0) / (len(found) * system.period)
+        peak = np.maximum(peak - static, static - found[..., 1])
+    undamped, fixed = _linear(scene, system)
+    return SectorResponse(
+        peak.mean(axis=0), peak.max(axis=0), undamped, fixed, _impacts(scene, system, records, rows, window),
+        tuned=_tuned(scene),
+    )  # fmt: skip
+
+
+def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Return the amplitudes (N,) without bodies, and with every body fixed, m."""
+    if scene.excitation.signal is not None:
+        unknown = np.full(len(system.outputs), np.nan)
+        return unknown, unknown
+    free, fixed = (response.amplitudes(scene.frequency, system.outputs) for response in linear_responses(scene, system))
+    return free, fixed
+
+
+def _impacts(scene: Scene, system: System, records: Records, rows: Rows, window: slice) -> np.ndarray:
+    """Return the impacts per period (N,) of the bodies in each sector; nan if they are not counted."""
+    hits, found = records.hits[window], np.zeros(len(system.outputs))
+    if not hits.shape[1]:
+        return found * np.nan
+    owner, counts = sectors_of_bodies(scene, system), hits.mean(axis=0)
+    for row, (body, _, _) in enumerate(rows.places):
+        if not rows.without_body[row] and owner[body] >= 0:
+            found[owner[body]] += counts[row]
+    return found
+
+
+def sectors_of_bodies(scene: Scene, system: System) -> list[int]:
+    """Return the sector of each body, from the label of its floor; -1 where that names none."""
+    floors = [str(scene.cavity[cavity].labels()[2]).partition("@")[2].partition(".")[0] for cavity in system.cavity]
+    return [int(number) if number.isdecimal() else -1 for number in floors]
+
+
+def _tuned(scene: Scene) -> float | None:
+    """Return the amplitude of the tuned ring without bodies at its resonance, m; None without a force or damping."""
+    if scene.excitation.base_acceleration is not None or scene.excitation.signal is not None:
+        return None
+    try:
+        return excitation_force(scene) * chosen_resonance(scene).flexibility or None
+    except InputError:
+        return None
