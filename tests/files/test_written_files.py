@@ -28,6 +28,9 @@ OF_COMMANDS = {
         "solver", "warnings",
     },
     "ring-modes": {"mistuning", "warnings"},
+    "ring-sectors": {
+        "basis", "coordinates", "diameters", "estimate", "frequency_hz", "greatest_speed", "warnings",
+    },
     "sweep": {"designs", "headlines"},
 }  # fmt: skip
 IN_FILES = {
