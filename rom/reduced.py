@@ -5,18 +5,16 @@ Needs numpy, scipy and the record store only: users of another code start with `
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.files.display import Displayed
+from vanedamp.files.record import Array, Record, declared
 from vanedamp.modal.algebra import added_by_speed, symmetric_part
 from vanedamp.rom.checks import ReducedModelError, check_definite, check_mass, shaped, symmetric, unit
 from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
@@ -29,96 +27,74 @@ NORMAL, ROTATION = ".normal", ".rotation"
 
 #: natural frequencies that a model prints
 _SHOWN = 6
-_KIND = "reduced-model"
-# dimensions and units of the arrays, here and in the record
-_ARRAYS = {
-    "mass": (("row", "column"), "kg"),
-    "damping": (("row", "column"), "N s/m"),
-    "stiffness": (("row", "column"), "N/m"),
-    "selection": (("interface", "column"), "1"),
-    "directions": (("interface", "axis"), "1"),
-    "base_load": (("row", "axis"), "kg"),
-    "normals": (("interface", "axis"), "1"),
-    "positions": (("interface", "axis"), "m"),
-    "arms": (("interface",), "m"),
-    "recovery": (("dof", "column"), "1"),
-    "coordinates": (("node", "axis"), "m"),
-    "residual_flexibility": (("interface", "force"), "m/N"),
-    "output_rows": (("output", "column"), "1"),
-    "output_residual": (("output", "force"), "1"),
-    "residual_recovery": (("dof", "force"), "m/N"),
-    "centrifugal_stiffness": (("row", "column"), "kg"),
-    "higher_stiffness": (("power", "row", "column"), "N/m"),
-    "rotation_axis": (("axis",), "1"),
-    "rotation_point": (("axis",), "m"),
-}
-_SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility", "centrifugal_stiffness")
 _REQUIRED = ("mass", "damping", "stiffness", "selection", "directions", "base_load")
+# dimensions of symmetric matrices
+_SQUARE, _COMPLIANCE = ("row", "column"), ("interface", "force")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ReducedModel(Displayed):
+class ReducedModel(Record):
     """M q'' + C q' + K q = f in n generalised coordinates, of which k functionals are the labelled interface.
-
-    mass, damping, stiffness  (n, n) symmetric; M positive definite, K positive semidefinite
-    interface                 k labels, each once
-    selection                 (k, n) the displacement of interface coordinate j is selection[j] @ q, m
-    directions                (k, 3) unit directions of these displacements; zeros when unknown
-    normals                   (k, 3) unit normals, out of the material, of the facets they belong to; zeros where
-                              unknown, None: all unknown
-    positions                 (k, 3) m, the places whose motion these are; None: unknown
-    arms                      (k,) m, of interface coordinates that are rotations (rad) the radius of gyration of their
-                              patch, zeros for displacements; None: all are displacements
-    base_load                 (n, 3) kg, T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads
-                              the model with -base_load @ a, and q is then relative to the base; zeros when unknown
-    damping_ratio             of every mode, if C was made from one; None for any other C
-    fixed_interface_modes     the last coordinates are this many fixed-interface modes, by frequency: `truncated` can
-                              drop these
-    free_modes                the last coordinates are this many free-interface modes instead, uncoupled from the rest
-    blocks                    sizes of the blocks of quasi-static coordinates just before these modes
-    residual_flexibility      (k, k) m/N, additional interface displacement per unit interface force, u = selection q +
-                              G f: a massless boundary; None without
-    outputs, output_rows      p names, and the functionals (p, n) of these: stresses or displacements, own units
-    output_residual           (p, k) additional outputs per unit interface force, per N
-    provenance                where the numbers come from (JSON-able)
-    recovery, coordinates     (N, n) basis T with full displacements T q, dof = 3 * node + component, and the (N / 3, 3)
-                              positions of its nodes; None when not kept
-    residual_recovery         (N, k) m/N, additional displacements per unit interface force; with residual_flexibility
-    centrifugal_stiffness     (n, n) kg, what a squared speed (rad/s) adds to the stiffness; None: does not rotate
-    higher_stiffness          (p, n, n) N/m, what the 4th, 6th, ... power of the speed over the greatest adds; or None
-    rotation_axis             (3,) unit vector, with rotation_point (3,), m, the axis that it rotates about; or None
-    greatest_speed            rad/s, up to which the basis holds
 
     Raises ReducedModelError.
     """
 
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
-    interface: tuple[str, ...]
-    selection: np.ndarray
-    directions: np.ndarray
-    base_load: np.ndarray
+    KIND: ClassVar[str] = "reduced-model"
+    mass: Annotated[np.ndarray, Array(_SQUARE, "kg")]
+    """M, symmetric, positive definite"""
+    damping: Annotated[np.ndarray, Array(_SQUARE, "N s/m")]
+    """C, symmetric"""
+    stiffness: Annotated[np.ndarray, Array(_SQUARE, "N/m")]
+    """K, symmetric, positive semidefinite"""
+    interface: Annotated[tuple[str, ...], Array(("interface",), dtype=object)]
+    """labels, each once"""
+    selection: Annotated[np.ndarray, Array(("interface", "column"))]
+    """the displacement of interface coordinate j is selection[j] @ q, m"""
+    directions: Annotated[np.ndarray, Array(("interface", "axis"))]
+    """unit directions of these displacements; zeros when unknown"""
+    base_load: Annotated[np.ndarray, Array(("row", "axis"), "kg")]
+    """T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads the model with -base_load @ a,
+    and q is then relative to the base; zeros when unknown"""
     damping_ratio: float | None = None
+    """of every mode, if C was made from one; None for any other C"""
     fixed_interface_modes: int = 0
+    """the last coordinates are this many fixed-interface modes, by frequency: `truncated` can drop these"""
     free_modes: int = 0
-    blocks: tuple[int, ...] = ()
-    residual_flexibility: np.ndarray | None = None
-    outputs: tuple[str, ...] = ()
-    output_rows: np.ndarray | None = None
-    output_residual: np.ndarray | None = None
+    """the last coordinates are this many free-interface modes instead, uncoupled from the rest"""
+    blocks: Annotated[tuple[int, ...], Array(("block",), dtype=np.int64)] = ()
+    """sizes of the blocks of quasi-static coordinates just before these modes"""
+    residual_flexibility: Annotated[np.ndarray | None, Array(_COMPLIANCE, "m/N")] = None
+    """additional interface displacement per unit interface force, u = selection q + G f: a massless boundary; None
+    without"""
+    outputs: Annotated[tuple[str, ...], Array(("output",), dtype=object, name="output", json="outputs")] = ()
+    output_rows: Annotated[np.ndarray | None, Array(("output", "column"))] = None
+    """functionals of the outputs: stresses or displacements, own units"""
+    output_residual: Annotated[np.ndarray | None, Array(("output", "force"))] = None
+    """additional outputs per unit interface force, per N"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    recovery: np.ndarray | None = None
-    coordinates: np.ndarray | None = None
-    residual_recovery: np.ndarray | None = None
-    normals: np.ndarray | None = None
-    positions: np.ndarray | None = None
-    arms: np.ndarray | None = None
-    centrifugal_stiffness: np.ndarray | None = None
-    higher_stiffness: np.ndarray | None = None
-    rotation_axis: np.ndarray | None = None
-    rotation_point: np.ndarray | None = None
+    """where the numbers come from (JSON-able)"""
+    recovery: Annotated[np.ndarray | None, Array(("dof", "column"))] = None
+    """basis T with full displacements T q, dof = 3 * node + component; None when not kept"""
+    coordinates: Annotated[np.ndarray | None, Array(("node", "axis"), "m")] = None
+    """positions of the nodes of the basis"""
+    residual_recovery: Annotated[np.ndarray | None, Array(("dof", "force"), "m/N")] = None
+    """additional displacements per unit interface force; with residual_flexibility"""
+    normals: Annotated[np.ndarray | None, Array(("interface", "axis"))] = None
+    """unit normals, out of the material, of the facets of the interface; zeros where unknown, None: all unknown"""
+    positions: Annotated[np.ndarray | None, Array(("interface", "axis"), "m")] = None
+    """the places whose motion the interface is; None: unknown"""
+    arms: Annotated[np.ndarray | None, Array(("interface",), "m")] = None
+    """of interface coordinates that are rotations (rad) the radius of gyration of their patch, zeros for displacements;
+    None: all are displacements"""
+    centrifugal_stiffness: Annotated[np.ndarray | None, Array(_SQUARE, "kg")] = None
+    """what a squared speed (rad/s) adds to the stiffness; None: does not rotate"""
+    higher_stiffness: Annotated[np.ndarray | None, Array(("power", *_SQUARE), "N/m")] = None
+    """what the 4th, 6th, ... power of the speed over the greatest adds; or None"""
+    rotation_axis: Annotated[np.ndarray | None, Array(("axis",))] = None
+    """unit vector, with rotation_point the axis that it rotates about; or None"""
+    rotation_point: Annotated[np.ndarray | None, Array(("axis",), "m")] = None
     greatest_speed: float = 0.0
+    """up to which the basis holds [rad/s]"""
 
     def __post_init__(self) -> None:
         for name, value in _checked(self).items():
@@ -322,50 +298,29 @@ class ReducedModel(Displayed):
             raise ReducedModelError("outputs: this model has none; add them with rom.recovery.with_outputs")
         return _with_residual(self.output_rows @ q, self.output_residual, forces)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record that xarray opens."""
-        arrays = {name: (getattr(self, name), *layout) for name, layout in _ARRAYS.items()}
-        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
-        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
-        variables["axis"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",))
-        variables["natural_frequency"] = store.Variable(self.natural_frequencies_hz, ("mode",), "Hz")
-        if self.outputs:
-            variables["output"] = store.Variable(np.array(self.outputs, dtype=object), ("output",))
-        if self.blocks:
-            variables["blocks"] = store.Variable(np.array(self.blocks, np.int64), ("block",))
-        attributes: dict[str, Any] = {
-            "fixed_interface_modes": self.fixed_interface_modes,
-            "free_modes": self.free_modes,
-            "provenance": dict(self.provenance),
-        }
-        if self.damping_ratio is not None:
-            attributes["damping_ratio"] = self.damping_ratio
-        if self.greatest_speed:
-            attributes["greatest_speed"] = self.greatest_speed
-        store.save(path, _KIND, variables, attributes)
+    def labels(self) -> dict[str, Any]:
+        """Return the names of the axes."""
+        return {"axis": "xyz"}
+
+    def variables(self) -> dict[str, store.Variable]:
+        """Return the variables of the file, with the natural frequencies."""
+        return super().variables() | {"natural_frequency": store.Variable(self.natural_frequencies_hz, ("mode",), "Hz")}
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of the file; the greatest speed of a model that rotates."""
+        return {name: value for name, value in super().attributes().items() if name != "greatest_speed" or value}
 
     @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> ReducedModel:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Self:
+        """Return the model in the variables and attributes of a file. Raises files.store.StoreError."""
+        for name in ("fixed_interface_modes", "provenance"):
+            attributes[name]  # every version writes them
         for name in _REQUIRED:
             if np.iscomplexobj(values[name]):
                 raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
             if not np.all(np.isfinite(values[name])):
                 raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
-        arrays: dict[str, Any] = {name: values[name] if name in _REQUIRED else values.get(name) for name in _ARRAYS}
-        return cls(
-            **arrays,
-            interface=tuple(values["interface"]),
-            outputs=tuple(values.get("output", ())),
-            blocks=tuple(values.get("blocks", ())),
-            damping_ratio=attributes.get("damping_ratio"),
-            fixed_interface_modes=attributes["fixed_interface_modes"],
-            free_modes=attributes.get("free_modes", 0),
-            greatest_speed=attributes.get("greatest_speed", 0.0),
-            provenance=json.loads(attributes["provenance"]),
-        )
+        return super().of(values, attributes, path)
 
     @property
     def squares(self) -> np.ndarray:
@@ -414,10 +369,11 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
         "provenance": dict(model.provenance),
     }
     required = {*_REQUIRED, *(["coordinates"] if nodes else []), *(["output_rows"] if model.outputs else [])}
-    for name, (dims, _) in _ARRAYS.items():
-        given, shape = getattr(model, name), tuple(lengths[dimension] for dimension in dims)
-        if given is not None or name in required:
-            values[name] = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
+    for name, (_, layout) in declared(ReducedModel).items():
+        given = getattr(model, name)
+        if isinstance(layout, Array) and layout.dtype is float and (given is not None or name in required):
+            shape, mirrored = tuple(lengths[one] for one in layout.dims), layout.dims in (_SQUARE, _COMPLIANCE)
+            values[name] = symmetric(name, given, shape[0]) if mirrored else shaped(name, given, shape)
     check_mass(values["mass"])
     values["directions"] = unit(values["directions"])
     return values

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
@@ -13,6 +14,7 @@ from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
+from vanedamp.files.record import Array, Record, declared
 from vanedamp.files.reference import unit_in
 from vanedamp.studies import kinds
 
@@ -26,21 +28,55 @@ class Fields(Directive):
     def run(self) -> list[nodes.Node]:
         place, name = self.arguments[0].split(":")
         record = getattr(import_module(place), name)
-        texts = {
-            field: " ".join(" ".join(lines).split())
-            for (owner, field), lines in ModuleAnalyzer.for_module(record.__module__).find_attr_docs().items()
-            if owner == name
-        }
-        names = " ".join(self.content).split() or list(texts)
+        names = " ".join(self.content).split()
         if issubclass(record, Enum):
-            rows = [[_code(record[one].value), with_literals(texts[one])] for one in names]
+            texts = _texts(record)
+            rows = [[_code(record[one].value), with_literals(texts[one])] for one in names or texts]
             return [table_node(("Value", "Meaning"), rows, (25, 75))]
-        rows = []
-        for one in names:
-            unit = unit_in(texts[one]) or ""
-            meaning = texts[one].removesuffix(f"[{unit}]").rstrip()
-            rows.append([_code(one), [nodes.Text(unit)], with_literals(meaning)])
-        return [table_node(("Name", "Unit", "Meaning"), rows, (25, 10, 65))]
+        found = described(record, names)
+        header, widths = ["Name", "Unit", "Meaning"], [25, 10, 65]
+        if in_file := any(one.dims for one in found):
+            header, widths = ["Variable", "Dimensions", *header[1:]], [20, 15, 10, 55]
+        rows = [
+            [_code(one.name), *([[nodes.Text(one.dims)]] if in_file else []), [nodes.Text(one.unit)],
+             with_literals(one.meaning)]
+            for one in found
+        ]  # fmt: skip
+        return [table_node(header, rows, widths)]
+
+
+class Described(NamedTuple):
+    """A field of a record; one that is a variable of the file (files.record.Array) by its name and dimensions there."""
+
+    name: str
+    dims: str
+    unit: str
+    meaning: str
+
+
+def described(record: type, names: Sequence[str] = ()) -> list[Described]:
+    """Return the fields of a record: the unit of its annotation, else that at the end of the docstring after it."""
+    texts, found = _texts(record), []
+    layouts = declared(record) if issubclass(record, Record) else {}
+    for one in names or layouts or texts:
+        layout, text = layouts[one][1] if layouts else None, texts.get(one, "")
+        if isinstance(layout, Array) and not layout.attribute:
+            parts = ("_real", "_imaginary") if layout.dtype is complex else ("",)
+            own = ", ".join((layout.name or one) + part for part in parts)
+            found.append(Described(own, ", ".join(layout.dims), "" if layout.unit == "1" else layout.unit, text))
+        else:
+            unit = unit_in(text) or ""
+            found.append(Described(one, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
+    return found
+
+
+def _texts(record: type) -> dict[str, str]:
+    """Return the docstrings after the fields of a class."""
+    return {
+        field: " ".join(" ".join(lines).split())
+        for (owner, field), lines in ModuleAnalyzer.for_module(record.__module__).find_attr_docs().items()
+        if owner == record.__name__
+    }
 
 
 class ResultKinds(Directive):

@@ -17,9 +17,10 @@ class Modes(Record):
 
     KIND: ClassVar[str] = "modes"
     frequencies_hz: Annotated[np.ndarray, Array(("mode",), "Hz", name="frequency", json="frequency_hz")]
+    """natural frequencies, ascending"""
     shapes: Annotated[np.ndarray, Array(("mode", "dof"), "kg^-0.5", name="shape")]
-    """phi^T M phi = 1, zero at the fixed DOFs; the largest of the three participation factors (or else the largest
-    component) is positive"""
+    """x, y and z of every node in turn: phi^T M phi = 1, zero at the fixed DOFs; the largest of the three participation
+    factors (or else the largest component) is positive"""
     residuals: Annotated[np.ndarray, Array(("mode",), name="residual")]
     """|K phi - lambda M phi| / ((lambda - shift) |M phi|) over the free DOFs, with the small negative shift of the
     solver, so that rigid modes have a measure too"""

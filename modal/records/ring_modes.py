@@ -33,11 +33,12 @@ class RingModes(Record):
     families: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="family")]
     """order within the diameter, from 0"""
     frequencies_hz: Annotated[np.ndarray, Array(("mode",), "Hz", name="frequency", json="frequency_hz")]
+    """natural frequencies"""
     residuals: Annotated[np.ndarray, Array(("mode",), name="residual")]
     """as those of `modes.Modes`"""
     shapes: Annotated[np.ndarray, Array(("mode", "dof"), "kg^-0.5", dtype=complex, name="shape")]
-    """z on sector 0: the modal mass over the ring is 1, that is N z^H M z = 1 for h = 0 and N / 2 (real z), and
-    (N / 2) z^H M z = 1 else. Its largest component is real and positive"""
+    """z on sector 0, x, y and z of every node in turn. The modal mass over the ring is 1: N z^H M z = 1 for h = 0 and
+    N / 2 (real z), and (N / 2) z^H M z = 1 else. Its largest component is real and positive"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """of the matrices (JSON-able)"""
 

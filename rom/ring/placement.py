@@ -2,99 +2,81 @@
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Self
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any
 
 import numpy as np
 
-from vanedamp.files import store
+from vanedamp.files.record import Array, Record, declared
 from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.checks import shaped, symmetric, unit
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.ring.deviations import RingError
 
-#: dimensions and units of the arrays that reduced rings share, in the record, too
-SHARED = {
-    "axis": (("direction",), "1"),
-    "point": (("direction",), "m"),
-    "selection": (("interface", "coordinate"), "1"),
-    "directions": (("interface", "direction"), "1"),
-    "normals": (("interface", "direction"), "1"),
-    "positions": (("interface", "direction"), "m"),
-    "arms": (("interface",), "m"),
-    "base_load": (("coordinate", "direction"), "kg"),
-    "part_load": (("coordinate", "direction"), "kg"),
-}
+#: dimensions of a symmetric matrix of a ring
+SQUARE = ("coordinate", "column")
+_Load = Annotated[np.ndarray, Array(("coordinate", "direction"), "kg")]
+_Vectors = Annotated[np.ndarray, Array(("interface", "direction"))]
 
 
-class Ring:
-    """What reduced rings share: sectors about an axis, and the interface of sector 0 (see RingModel).
-
-    A kind of them names its record, its arrays (as SHARED, which are among them), the symmetric and the optional ones,
-    and its numbers with their types.
-    """
-
-    _kind: ClassVar[str]
-    _arrays: ClassVar[Mapping[str, tuple[tuple[str, ...], str]]]
-    _symmetric: ClassVar[tuple[str, ...]]
-    _optional: ClassVar[tuple[str, ...]] = ()
-    _numbers: ClassVar[Mapping[str, Callable[[Any], Any]]]
+@dataclass(frozen=True, eq=False, repr=False)
+class Ring(Record):
+    """What reduced rings share: N sectors about an axis; sector j is sector 0 turned by 2 pi j / N."""
 
     sectors: int
-    axis: np.ndarray
-    point: np.ndarray
-    interface: tuple[str, ...]
-    directions: np.ndarray
-    normals: np.ndarray
-    positions: np.ndarray
-    arms: np.ndarray
+    """N"""
+    axis: Annotated[np.ndarray, Array(("direction",))]
+    """unit vector"""
+    point: Annotated[np.ndarray, Array(("direction",), "m")]
+    """of the axis"""
+    modes: int
+    """number of natural modes of the ring that `model` keeps"""
+    interface: Annotated[tuple[str, ...], Array(("interface",), dtype=object)]
+    """labels in a sector"""
+    selection: Annotated[np.ndarray, Array(("interface", "coordinate"))]
+    """displacements of the interface of sector 0"""
+    directions: _Vectors
+    """this and the next three: as in ReducedModel, of sector 0"""
+    normals: _Vectors
+    positions: Annotated[np.ndarray, Array(("interface", "direction"), "m")]
+    arms: Annotated[np.ndarray, Array(("interface",), "m")]
+    base_load: _Load
+    """of sector 0, by an acceleration of the base along x, y, z of its frame"""
+    part_load: _Load
+    """what the part that deviates has of it"""
     damping_ratio: float
-    provenance: Mapping[str, Any]
+    """of every mode"""
+    provenance: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    """where the numbers come from (JSON-able); "estimate": of the error"""
 
-    def _settle(self, lengths: Mapping[str, int]) -> None:
-        """Bring all fields into final form; lengths: of the dimensions "coordinate" and others that are not shared.
-
-        Raises RingError for an empty interface, and ReducedModelError.
-        """
-        lengths = {"interface": len(self.interface), "direction": 3, "column": lengths["coordinate"], **lengths}
-        for name, (dims, _) in self._arrays.items():
-            given = getattr(self, name)
-            if given is not None or name not in self._optional:
-                shape = tuple(lengths[dimension] for dimension in dims)
-                found = symmetric(name, given, shape[0]) if name in self._symmetric else shaped(name, given, shape)
-                object.__setattr__(self, name, found)
-        object.__setattr__(self, "directions", unit(self.directions))
+    def __post_init__(self) -> None:
+        """Bring all fields into final form. Raises RingError for an empty interface, and ReducedModelError."""
         object.__setattr__(self, "interface", tuple(str(label) for label in self.interface))
         object.__setattr__(self, "provenance", dict(self.provenance))
+        lengths = {"interface": len(self.interface), "direction": 3, **self._lengths()}
+        lengths["column"] = lengths["coordinate"]
+        for item in fields(self):
+            name, layout, given = item.name, declared(type(self))[item.name][1], getattr(self, item.name)
+            if isinstance(layout, Array) and name != "interface" and (given is not None or item.default is not None):
+                shape = tuple(lengths[dimension] for dimension in layout.dims)
+                found = symmetric(name, given, shape[0]) if layout.dims == SQUARE else shaped(name, given, shape)
+                object.__setattr__(self, name, found)
+        object.__setattr__(self, "directions", unit(self.directions))
+        super().__post_init__()
         if not self.interface:
             raise RingError("interface: empty; a reduced ring needs a coordinate that loads can act on")
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record that xarray opens."""
-        arrays = {name: (getattr(self, name), *layout) for name, layout in self._arrays.items()}
-        variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
-        variables["interface"] = store.Variable(np.array(self.interface, dtype=object), ("interface",))
-        variables["direction"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("direction",))
-        attributes = {name: getattr(self, name) for name in self._numbers}
-        store.save(path, self._kind, variables, attributes | {"provenance": dict(self.provenance)})
+    def _lengths(self) -> dict[str, int]:
+        """Return the length of the dimension "coordinate", and of others that are not shared."""
+        raise NotImplementedError
 
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, cls._kind)
-        fields: dict[str, Any] = {
-            name: values[name] for name in cls._arrays if name in values or name not in cls._optional
-        }
-        fields |= {name: of(attributes[name]) for name, of in cls._numbers.items()}
-        return cls(
-            **fields | {"interface": tuple(values["interface"]), "provenance": json.loads(attributes["provenance"])}
-        )
+    def labels(self) -> dict[str, Any]:
+        """Return the names of the axes."""
+        return {"direction": "xyz"}
 
     @property
-    def labels(self) -> tuple[str, ...]:
+    def sector_labels(self) -> tuple[str, ...]:
         """The N k labels, sector by sector."""
         return tuple(sector_label(label, sector) for sector in range(self.sectors) for label in self.interface)
 
@@ -137,7 +119,7 @@ class Ring:
             "labels": list(self.interface),
         }  # fmt: skip
         return {
-            "interface": self.labels,
+            "interface": self.sector_labels,
             "directions": turned(self.directions),
             "normals": turned(self.normals),
             "positions": self.point + turned(self.positions - self.point),

@@ -2,91 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from scipy import linalg
 
-from vanedamp.files import store
-from vanedamp.files.display import Displayed
+from vanedamp.files.record import Array
 from vanedamp.modal.algebra import added_by_speed, symmetric_part, turns
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SHARED, Ring
+from vanedamp.rom.ring.placement import SQUARE, Ring
 from vanedamp.rom.ring.waves import Waves
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingModel(Ring, Displayed):
+class RingModel(Ring):
     """A reduced ring of N equal sectors: n real waves of modal mass 1, and one sector's fields in them.
 
-    The first `modes` waves are natural modes of the tuned ring at standstill; the others add the static response to
-    the interface's forces and to the forces of deviations. rom.ring.waves.Waves says how sectors see the waves.
-
-    sectors, axis, point   N; (3,) unit vector and (3,) m: the axis; sector j is sector 0 turned by 2 pi j / N
-    diameters              (n,) nodal diameters; pairs of waves are adjacent
-    squares                (n,) squared angular frequencies of the tuned ring at standstill
-    modes                  number of natural modes, whole pairs; `reduce_ring` sorts them by frequency
-    interface              k labels in a sector
-    selection              (k, n) their displacements in sector 0; directions, normals, positions, arms: as in
-                           ReducedModel, of sector 0
-    base_load              (n, 3) kg, of sector 0, by an acceleration of the base along x, y, z of its frame
-    part_load              (n, 3) kg, what the part that deviates has of it
-    stiffness, mass        (n, n) of the part of a sector that deviates, in sector 0's fields
-    damping_ratio          of every mode
-    centrifugal_stiffness  (n, n) kg, of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate
-    higher_stiffness       (p, n, n) N/m, of the whole ring: as in ReducedModel
-    greatest_speed         rad/s, up to which the waves hold
-    provenance             where the numbers come from (JSON-able); "estimate": of the error
-
-    Raises RingError or rom.checks.ReducedModelError.
+    The first `modes` waves are natural modes of the tuned ring at standstill, whole pairs, which `reduce_ring` sorts by
+    frequency; the others add the static response to the interface's forces and to the forces of deviations.
+    rom.ring.waves.Waves says how sectors see the waves. Raises RingError or rom.checks.ReducedModelError.
     """
 
-    _kind = "ring-model"
-    _arrays = SHARED | {
-        "diameters": (("coordinate",), "1"),
-        "squares": (("coordinate",), "rad^2/s^2"),
-        "stiffness": (("coordinate", "column"), "N/m"),
-        "mass": (("coordinate", "column"), "kg"),
-        "centrifugal_stiffness": (("coordinate", "column"), "kg"),
-        "higher_stiffness": (("power", "coordinate", "column"), "N/m"),
-    }
-    _symmetric = ("stiffness", "mass", "centrifugal_stiffness")
-    _optional = ("centrifugal_stiffness", "higher_stiffness")
-    _numbers: ClassVar[dict[str, Any]] = {"sectors": int, "modes": int, "damping_ratio": float, "greatest_speed": float}
-
-    sectors: int
-    axis: np.ndarray
-    point: np.ndarray
-    diameters: np.ndarray
-    squares: np.ndarray
-    modes: int
-    interface: tuple[str, ...]
-    selection: np.ndarray
-    directions: np.ndarray
-    normals: np.ndarray
-    positions: np.ndarray
-    arms: np.ndarray
-    base_load: np.ndarray
-    part_load: np.ndarray
-    stiffness: np.ndarray
-    mass: np.ndarray
-    damping_ratio: float
-    centrifugal_stiffness: np.ndarray | None = None
-    higher_stiffness: np.ndarray | None = None
+    KIND: ClassVar[str] = "ring-model"
+    diameters: Annotated[np.ndarray, Array(("coordinate",), dtype=np.int64)]
+    """nodal diameters of the waves; pairs of waves are adjacent"""
+    squares: Annotated[np.ndarray, Array(("coordinate",), "rad^2/s^2")]
+    """squared angular frequencies of the tuned ring at standstill"""
+    stiffness: Annotated[np.ndarray, Array(SQUARE, "N/m")]
+    """of the part of a sector that deviates, in sector 0's fields"""
+    mass: Annotated[np.ndarray, Array(SQUARE, "kg")]
+    """of that part"""
+    centrifugal_stiffness: Annotated[np.ndarray | None, Array(SQUARE, "kg")] = None
+    """of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate"""
+    higher_stiffness: Annotated[np.ndarray | None, Array(("power", *SQUARE), "N/m")] = None
+    """of the whole ring: as in ReducedModel"""
     greatest_speed: float = 0.0
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """up to which the waves hold [rad/s]"""
 
     def __post_init__(self) -> None:
-        higher = () if self.higher_stiffness is None else self.higher_stiffness
-        self._settle({"coordinate": len(self.squares), "power": len(higher)})
-        object.__setattr__(self, "diameters", store.frozen(self.diameters, np.int64))
+        super().__post_init__()
         _check_waves(self)
+
+    def _lengths(self) -> dict[str, int]:
+        higher = () if self.higher_stiffness is None else self.higher_stiffness
+        return {"coordinate": len(self.squares), "power": len(higher)}
 
     @property
     def size(self) -> int:

@@ -3,82 +3,59 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
-from vanedamp.files.display import Displayed
+from vanedamp.files.record import Array
 from vanedamp.modal.algebra import symmetric_part, turns
 from vanedamp.rom.bases.projection import lowest_modes, superlu
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SHARED, Ring
+from vanedamp.rom.ring.placement import SQUARE, Ring
 from vanedamp.rom.ring.ring_model import RingModel
+
+_Stiffness = Annotated[np.ndarray, Array(SQUARE, "N/m")]
+_Mass = Annotated[np.ndarray, Array(SQUARE, "kg")]
+_Stretch = Annotated[np.ndarray, Array(("spring", "coordinate"))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SectorRing(Ring, Displayed):
+class SectorRing(Ring):
     """A ring of N equal sectors by component modes of one; matrices of the whole ring are sparse.
 
     The s coordinates of a sector are f motions of its face low, the same f of its face high, which are the next
-    sector's first, and inner motions. Fields that RingModel has, too, mean the same in them.
-
-    faces                          f
-    modes                          number of natural modes of the ring that `model` keeps
-    stiffness, mass                (s, s) of a sector; part_stiffness, part_mass: of the part that deviates
-    spring_high, spring_low        (p, s) stretch of springs between neighbours: spring_high q_j - spring_low q_(j+1)
-    spring_stiffness               (p,) N/m
-    selection                      (k, s); base_load, part_load (s, 3) kg
-
-    Raises RingError or rom.checks.ReducedModelError.
+    sector's first, and inner motions. Raises RingError or rom.checks.ReducedModelError.
     """
 
-    _kind = "ring-sectors"
-    _arrays = SHARED | {
-        "stiffness": (("coordinate", "column"), "N/m"),
-        "mass": (("coordinate", "column"), "kg"),
-        "part_stiffness": (("coordinate", "column"), "N/m"),
-        "part_mass": (("coordinate", "column"), "kg"),
-        "spring_high": (("spring", "coordinate"), "1"),
-        "spring_low": (("spring", "coordinate"), "1"),
-        "spring_stiffness": (("spring",), "N/m"),
-    }
-    _symmetric = ("stiffness", "mass", "part_stiffness", "part_mass")
-    _numbers: ClassVar[dict[str, Any]] = {"sectors": int, "modes": int, "faces": int, "damping_ratio": float}
-
-    sectors: int
-    axis: np.ndarray
-    point: np.ndarray
+    KIND: ClassVar[str] = "ring-sectors"
     faces: int
-    modes: int
-    stiffness: np.ndarray
-    mass: np.ndarray
-    part_stiffness: np.ndarray
-    part_mass: np.ndarray
-    spring_high: np.ndarray
-    spring_low: np.ndarray
-    spring_stiffness: np.ndarray
-    interface: tuple[str, ...]
-    selection: np.ndarray
-    directions: np.ndarray
-    normals: np.ndarray
-    positions: np.ndarray
-    arms: np.ndarray
-    base_load: np.ndarray
-    part_load: np.ndarray
-    damping_ratio: float
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """f"""
+    stiffness: _Stiffness
+    """of a sector"""
+    mass: _Mass
+    """of a sector"""
+    part_stiffness: _Stiffness
+    """of the part that deviates"""
+    part_mass: _Mass
+    """of the part that deviates"""
+    spring_high: _Stretch
+    """with the next: stretch of springs between neighbours, spring_high q_j - spring_low q_(j+1)"""
+    spring_low: _Stretch
+    spring_stiffness: Annotated[np.ndarray, Array(("spring",), "N/m")]
 
     def __post_init__(self) -> None:
-        self._settle({"coordinate": len(self.mass), "spring": len(self.spring_stiffness)})
+        super().__post_init__()
         if not 0 <= 2 * self.faces <= len(self.mass) or not 0 < self.modes <= self.size:
             raise RingError(f"faces: {self.faces} motions of a face and {self.modes} modes do not fit the sector")
+
+    def _lengths(self) -> dict[str, int]:
+        return {"coordinate": len(self.mass), "spring": len(self.spring_stiffness)}
 
     @property
     def size(self) -> int:
@@ -207,4 +184,4 @@ class SectorRing(Ring, Displayed):
 
 def load_ring(path: str | os.PathLike[str]) -> RingModel | SectorRing:
     """Read a reduced ring of either basis. Raises files.store.StoreError."""
-    return SectorRing.load(path) if store.kind_of(path) == SectorRing._kind else RingModel.load(path)
+    return SectorRing.load(path) if store.kind_of(path) == SectorRing.KIND else RingModel.load(path)

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK, changed
+from vanedamp.files.store import finite
 from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.frf import Frf
-from vanedamp.modal.measurements import write_frf, write_shapes
+from vanedamp.modal.measurements import read_frf, write_frf, write_shapes
+from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -113,6 +115,15 @@ def test_the_record_holds_the_tuning(measured, result):
         assert list(file["part"].asstr()) == ["material.default", "support.root"]
         assert file["factor"][0] == pytest.approx(YOUNG / 2.1e11, rel=1e-3)
         assert json.loads(file.attrs["excitation"])["force"] == pytest.approx(result["excitation"]["force"])
+        assert file["response_real"].attrs["units"] == file["fitted_imaginary"].attrs["units"] == "m/(N s^2)"
+    record = CalibrationRecord.load(folder / "calibration.h5")
+    told = finite(record.to_json())
+    assert told == told | {key: value for key, value in result.items() if key in told}
+    assert result.keys() - told.keys() == {"status", "tuning", "wall_time_s"}
+    assert record.target_hz.tolist() == result["tuning"]["target_hz"]
+    measured = read_frf(folder / "tip.csv", "accelerance")
+    inside = np.isin(measured.frequencies_hz, record.line)
+    np.testing.assert_array_equal(record.response, measured.values[:, inside])
 
 
 def test_a_case_without_measurements_is_calibrated_as_it_is(measured, capsys):

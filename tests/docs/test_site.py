@@ -2,6 +2,7 @@
 
 import ast
 import json
+import pkgutil
 import re
 import subprocess
 import sys
@@ -16,6 +17,7 @@ pytest.importorskip("sphinx", reason="needs the extra docs")
 pytest.importorskip("myst_parser", reason="needs the extra docs")
 
 from docs._ext import commands, pages, python_api, toml_keys
+from docs._ext.fields import described
 from docs.check_site import faults
 from tests.tools.input_files import SCENE
 from tests.tools.processes import PATIENCE, ROOT, environment
@@ -27,8 +29,9 @@ from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
 from vanedamp.coupling.sweep.record import PEAKS
 from vanedamp.coupling.sweep.worker import IN_PLANE, MEASURES
 from vanedamp.files.reference import options
+from vanedamp.files.store import load_any
 from vanedamp.studies.commands import COMMANDS
-from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.file_kinds import KINDS, RESULT_KINDS
 
 DOCS = ROOT / "docs"
 CHROMIUM = Path("/usr/bin/chromium")
@@ -142,6 +145,18 @@ def test_fields_of_results_are_described():
             getattr(record, "__dataclass_fields__", record.__members__ if record is Status else ())
         )
         assert all(isinstance(after, ast.Expr) for _, after in fields), record
+
+
+@pytest.mark.parametrize("name", ["modes", "life", "calibration", "optimisation", "mistuning"])
+def test_fields_have_the_dimensions_and_units_of_the_file(name):
+    kind, variables, _ = load_any(ROOT / "tests" / "files" / "written" / f"{name}.h5")
+    found = [one for one in described(pkgutil.resolve_name(RESULT_KINDS[kind].record)) if one.dims]
+    written = [(one, field) for field in found for one in field.name.split(", ") if one in variables]
+    assert len(written) > 2
+    for one, field in written:
+        assert (field.dims, field.unit or "1") == (", ".join(variables[one].dims), variables[one].units) or (
+            name == "calibration" and one.startswith(("response", "fitted"))  # of the quantity
+        ), one
 
 
 def test_results_of_sweeps_are_listed():

@@ -29,8 +29,14 @@ OF_COMMANDS = {
         "cavity", "effective_mass", "fatigue", "first_bending", "first_bending_number", "movable_mass", "rigid",
         "solver", "warnings",
     },
+    "reduced-model": {
+        "basis", "estimate", "fatigue", "frequency_hz", "hot_spot_modes", "hot_spots", "modes", "warnings",
+    },
     "ring-modes": {"mistuning", "warnings"},
     "response": {"event_list"},
+    "ring-sectors": {
+        "basis", "coordinates", "diameters", "estimate", "frequency_hz", "greatest_speed", "warnings",
+    },
     "sweep": {"designs", "headlines"},
 }  # fmt: skip
 IN_FILES = {

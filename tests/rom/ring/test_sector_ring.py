@@ -88,7 +88,7 @@ def test_record(tmp_path: Path):
     again = load_ring(tmp_path / "ring.h5")
     assert isinstance(again, SectorRing)
     np.testing.assert_array_equal(again.model().squares, ring.model().squares)
-    assert again.labels == ring.labels and again.provenance["basis"] == "sectors"
+    assert again.sector_labels == ring.sector_labels and again.provenance["basis"] == "sectors"
 
 
 @pytest.mark.parametrize(("basis", "families"), [("modes", 1), ("modes", 3), ("sectors", 3)])
