@@ -94,21 +94,17 @@ def _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows):
 @kernel
 def _integrate_amplitudes(flows, st, scratch, s, tau, count):
     """Set scratch.total to the integrals of the amplitudes over [0, tau], by real and imaginary parts in turns."""
-    e = flows.driven.shape[1] - 1
+    total = scratch.total
     for j in range(count):
         rate = flows.eigenvalue[s, j]
-        # of a driven mode, whose rate is no slower than its harmonic's, the harmonic's part is not to be added twice
-        if j < flows.driven[s, e] and j >= e:
-            h = 0
-            while j >= flows.driven[s, h + 1]:
-                h += 1
-            phase = complex(scratch.total[2 * h], scratch.total[2 * h + 1])
-            integral = (scratch.gain[j] - flows.load[s, j] * phase) / rate
-        elif abs(rate) * tau < SLOW:
-            integral = st.amplitude[j] * _slow_integral(rate, tau)
-        else:
-            integral = scratch.gain[j] / rate
-        scratch.total[2 * j], scratch.total[2 * j + 1] = integral.real, integral.imag
+        slow = abs(rate) * tau < SLOW
+        integral = st.amplitude[j] * _slow_integral(rate, tau) if slow else scratch.gain[j] / rate
+        total[2 * j], total[2 * j + 1] = integral.real, integral.imag
+    for h in range(flows.driven.shape[1] - 1):
+        phase = complex(total[2 * h], total[2 * h + 1])
+        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):  # c' = rate c + load phase
+            integral = (scratch.gain[j] - flows.load[s, j] * phase) / flows.eigenvalue[s, j]
+            total[2 * j], total[2 * j + 1] = integral.real, integral.imag
 
 
 @summing
