@@ -129,7 +129,9 @@ def test_a_wave_whose_opposite_sectors_have_events_at_one_instant(tmp_path):
     whole = scene.replace({"orbit.wave": False})
     lost = find_orbit(whole, response.final)
     assert lost.status == "derivative_undetermined" and "wave = true" in repr(lost)
-    with pytest.raises(InputError, match=r"no derivative: events meet at one instant.* wave = true finds the travelling"):
+    with pytest.raises(
+        InputError, match=r"no derivative: events meet at one instant.* wave = true finds the travelling"
+    ):
         orbits(whole)
 
 
