@@ -316,10 +316,10 @@ class Derivative:
         rests = rests and (not event.after.any() or bool(closed[event.struck].all()))
         # sliders come to rest at several contacts in any order, and a chatter ends in any
         free = (rests and bool(np.all(self.system.tilt < 0))) or self._last_flights(before, guards)
-        part = np.zeros(M.shape[1], bool) if free else self._part(M, guards, shifts, new.start)
-        if part[self._start.counts].any():
+        apart = np.zeros(M.shape[1], bool) if free else self._apart(M, guards, shifts, new.start)
+        if apart[self._start.counts].any():
             self.worsen(PassageStatus.COINCIDENT)
-        if rests and (free or part.any()):  # nothing is left of gaps and speeds
+        if rests and (free or apart.any()):  # nothing is left of gaps and speeds
             moved = self._constraints.held(closed, np.zeros(len(new.state), bool), z)(unmoved)
         if before.segment.open_force.any() and event.what in _FORCES:
             raise Untrusted  # of forces that the laws leave open the engine has chosen one
@@ -337,16 +337,16 @@ class Derivative:
         self.completed |= last
         return last
 
-    def _part(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> np.ndarray:
+    def _apart(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> np.ndarray:
         """Return of which neighbouring motions (k + P,) another event at the instant of one takes place apart."""
-        part, events = np.zeros(M.shape[1], bool), [(guard, shifts[guard.part]) for guard in guards[1:]]
+        apart, events = np.zeros(M.shape[1], bool), [(guard, shifts[guard.part]) for guard in guards[1:]]
         if time - self._last[0] <= _INSTANT * self.system.period:
             events += [(guard, self._last[1][guard.part]) for guard in guards[:1] if guard.part in self._last[1]]
         for guard, shift in events:
             at_event, later = guard.along(M), guard.rate * shift
             terms = np.abs(at_event) + np.abs(later)
-            part |= np.abs(at_event + later) > np.maximum(_ONE_INSTANT * terms, _NOTHING * guard.scale)
-        return part
+            apart |= np.abs(at_event + later) > np.maximum(_ONE_INSTANT * terms, _NOTHING * guard.scale)
+        return apart
 
     def _closings(self, before: Before, new: Segment, closing: list[int]) -> np.ndarray:
         """Return the derivative after contacts that yield have begun at one instant, each by its own gap."""
