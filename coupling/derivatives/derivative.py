@@ -32,13 +32,15 @@ _CAUGHT = 1e-11
 #: derivative by a number, relative to number and coordinate, to which round-off is relative at least
 _LEAST_TURN = 1e-2
 #: largest motion of rows at rest by the derivative, relative to its terms
-_STILL = 1e-7
+_STILL = 1e-6
 #: an event is tangential if its function would come back from beyond zero within this fraction of its scale
-_TANGENTIAL = 1e-12
+TANGENTIAL = 1e-12
 #: what reaches its bound without a jump is the same on both sides but for this part of its terms: at forces, others
 _CONTINUOUS, _ROUND_OFF = 1e-9, 1e-12
 #: a derivative that does not matter; a difference by which shifts of events may differ that are one
 _NOTHING, _ONE_INSTANT = 1e-9, 1e-6
+#: flights of a chatter whose order does not matter: times the period, and their speeds, relative to the fastest
+_LAST_FLIGHT, _LAST_SPEED = 1e-6, 1e-3
 #: times this close, relative to a period: of an event and the passage's start or end; of two events at one instant
 _SIMULTANEOUS, _INSTANT = 1e-12, 1e-15
 _FORCES = (codes.PARTS, codes.AT_LOW, codes.AT_HIGH)
@@ -48,7 +50,7 @@ class Guard(NamedTuple):
     """An event function right before its event: functional (2N,) of u, its rate and second derivative in time, scale.
 
     own: (P,) derivatives by numbers of the scene, where the motion stays; part: number of the part of the system that
-    it belongs to (Dynamics.part).
+    it belongs to (Dynamics.part); flight: time since the unit last took part in an event, s.
     """
 
     gradient: np.ndarray
@@ -57,6 +59,7 @@ class Guard(NamedTuple):
     bend: float
     scale: float
     part: int
+    flight: float
 
     def along(self, M: np.ndarray) -> np.ndarray:
         """Return its derivative (k + P,) along with that of the motion, M (2N, k + P)."""
@@ -68,7 +71,9 @@ class Guard(NamedTuple):
     def tangential(self) -> bool:
         """Whether it vanishes, to round-off, only to come back."""
         comes_back = self.rate <= 0.0 <= self.bend
-        return comes_back and self.rate**2 <= 2.0 * _TANGENTIAL * self.scale * abs(self.bend)
+        # the last flights of a chatter are as steep as the first ones for their height
+        height = min(self.scale, 0.5 * abs(self.bend) * self.flight**2)
+        return comes_back and self.rate**2 <= 2.0 * TANGENTIAL * height * abs(self.bend)
 
 
 class Before(NamedTuple):
@@ -109,6 +114,8 @@ class Derivative:
         #: the last event that matters: its time, and how derivatives shift it (k + P,), by parts of the system
         self._last: tuple[float, dict[int, np.ndarray]] = (-np.inf, {})
         self.shift = np.zeros(len(self._scale) + self._none.shape[1])
+        #: (u,) when each unit last took part in an event, s
+        self._took_part = np.full(len(self.system.rest), -np.inf)
 
     @property
     def _none(self) -> np.ndarray:
@@ -148,7 +155,14 @@ class Derivative:
             M = self._saltation(before, new, flow, z, jump, kick, guards)
         self._check_still(new, M, z)
         self._check_idle(new, M, z)
+        self._took_part[before.segment.state != new.state] = new.start
+        self._took_part[[event.unit, *event.struck]] = new.start
         return M
+
+    def neared(self, segment: Segment, least: float) -> None:
+        """Note an event that did not happen in a segment, by a margin that would make it tangential if it did."""
+        if least <= TANGENTIAL and segment.duration > _LAST_FLIGHT * self.system.period:
+            self.worsen(PassageStatus.GRAZING)
 
     def end(self, before: Before, final: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives of the state at the end of periods, `final` (k,): by the start (k, k), by numbers (k, P).
@@ -161,6 +175,7 @@ class Derivative:
             return np.full((k, k), np.nan), np.full((k, self._none.shape[1]), np.nan)
         if periods * period - self._last[0] <= _SIMULTANEOUS * period:
             self.worsen(PassageStatus.COINCIDENT)  # an event at the very end
+        self._check_idle(before.segment, before.M, before.z)
         return self.reached(before, periods)
 
     def reached(self, before: Before, periods: float) -> tuple[np.ndarray, np.ndarray]:
@@ -214,7 +229,8 @@ class Derivative:
             own = own + self.numbers.harmonics(self.dynamics, time) @ functional
         touched = np.flatnonzero(gradient)
         part = int(self.dynamics.part[touched[0] % len(self.dynamics.root)]) if len(touched) else -1
-        return Guard(gradient, own, rate if met is None else met, bend, scale, part)
+        flight = before.segment.start + before.segment.duration - self._took_part[r]
+        return Guard(gradient, own, rate if met is None else met, bend, scale, part, flight)
 
     def _jump(self, before: Before, new: Segment, z: np.ndarray) -> tuple[Affine, np.ndarray]:
         """Return the derivative of u after an event by u before, at one time, and the jump (N,) of w; z: (K,) after.
@@ -295,12 +311,16 @@ class Derivative:
             return moved
         if any(guard.tangential for guard in guards):
             self.worsen(PassageStatus.GRAZING)
-        ends = event.what == codes.CLOSES and len(guards) > 1 and not event.after.any()
-        if ends and np.all(self.system.tilt < 0):
-            # sliders that come to rest at several contacts: nothing is left of gaps and speeds, in any order
-            moved = self._constraints.held(self._start.closed(new), np.zeros(len(new.state), bool), z)(unmoved)
-        elif self._meets(M, guards, shifts, new.start):
+        closed = self._start.closed(new)
+        rests = event.what == codes.CLOSES and len(guards) > 1
+        rests = rests and (not event.after.any() or bool(closed[event.struck].all()))
+        # sliders come to rest at several contacts in any order, and a chatter ends in any
+        free = (rests and bool(np.all(self.system.tilt < 0))) or self._last_flights(before, guards)
+        apart = np.zeros(M.shape[1], bool) if free else self._apart(M, guards, shifts, new.start)
+        if apart[self._start.counts].any():
             self.worsen(PassageStatus.COINCIDENT)
+        if rests and (free or apart.any()):  # nothing is left of gaps and speeds
+            moved = self._constraints.held(closed, np.zeros(len(new.state), bool), z)(unmoved)
         if before.segment.open_force.any() and event.what in _FORCES:
             raise Untrusted  # of forces that the laws leave open the engine has chosen one
         self._last = new.start, shifts
@@ -310,17 +330,23 @@ class Derivative:
         """Return the largest entry of a derivative (2N, k + P) in units of the sizes of states."""
         return float(np.abs(self.dynamics.to_state @ M / self._scale[:, None]).max(initial=0.0))
 
-    def _meets(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> bool:
-        """Return whether another event takes place at the instant of one, but not in neighbouring motions."""
-        events = [(guard, shifts[guard.part]) for guard in guards[1:]]
+    def _last_flights(self, before: Before, guards: list[Guard]) -> bool:
+        """Return whether contacts that meet end flights of a chatter that the engine leaves out."""
+        flight, speed = _LAST_FLIGHT * self.system.period, _LAST_SPEED * before.segment.speed
+        last = len(guards) > 1 and all(each.flight <= flight and abs(each.rate) <= speed for each in guards)
+        self.completed |= last
+        return last
+
+    def _apart(self, M: np.ndarray, guards: list[Guard], shifts: dict[int, np.ndarray], time: float) -> np.ndarray:
+        """Return of which neighbouring motions (k + P,) another event at the instant of one takes place apart."""
+        apart, events = np.zeros(M.shape[1], bool), [(guard, shifts[guard.part]) for guard in guards[1:]]
         if time - self._last[0] <= _INSTANT * self.system.period:
             events += [(guard, self._last[1][guard.part]) for guard in guards[:1] if guard.part in self._last[1]]
         for guard, shift in events:
             at_event, later = guard.along(M), guard.rate * shift
             terms = np.abs(at_event) + np.abs(later)
-            if np.any(np.abs(at_event + later) > np.maximum(_ONE_INSTANT * terms, _NOTHING * guard.scale)):
-                return True
-        return False
+            apart |= np.abs(at_event + later) > np.maximum(_ONE_INSTANT * terms, _NOTHING * guard.scale)
+        return apart
 
     def _closings(self, before: Before, new: Segment, closing: list[int]) -> np.ndarray:
         """Return the derivative after contacts that yield have begun at one instant, each by its own gap."""
@@ -376,6 +402,7 @@ class Derivative:
         carried = self._constraints.begun(segment.state, presses(segment.state), z)(M)
         for what, size in (("gap", 1.0), ("speed", self.system.omega)):
             functional = getattr(dynamics, what)[idle, :k]
-            opened = np.abs(functional @ carried + self._own(what, idle, z)).max(axis=1)
+            opened = np.abs(functional @ carried + self._own(what, idle, z))[:, self._start.counts]
+            opened = opened.max(axis=1, initial=0.0)
             if np.any(opened > _NOTHING * size * self.system.play[idle]):
                 self.worsen(PassageStatus.GRAZING)

@@ -30,7 +30,8 @@ class Start:
         self, dynamics: Dynamics, state: np.ndarray, numbers: Numbers | None = None, turns: np.ndarray | None = None,
         given: bool = False,
     ) -> None:  # fmt: skip
-        self._fixed = given
+        #: columns (k + P,) of derivatives whose motions may make a kink: only those by numbers if the start is given
+        self.counts = slice(len(state) if given else 0, None)
         #: derivative (2N, P) by numbers before units that are at rest stop what these would move
         self.unheld = np.zeros((dynamics.one, 0))
         self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
@@ -67,7 +68,7 @@ class Start:
             w = given[dynamics.rates]
             jump = impact(self.system, w / dynamics.root, event, segment.speed, self._numbers)
             M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
-        if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z):
+        if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z, M):
             status = PassageStatus.GRAZING
         self.unheld = M[:, k:]
         M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
@@ -118,10 +119,14 @@ class Start:
         slides = (flow.way != 0.0) & ~flow.slips_held & flow.rubs
         faster = flow.way * (self.dynamics.speed[u:] @ flow.X @ z) > 0.0  # one that stops at once has been at rest
         slips = slides & faster & (np.abs(system.J[u:] @ segment.v) <= _STILL * segment.speed)
-        if self._fixed:
+        if self.counts.start:
             parts &= self._turned("gap", np.arange(u), z, M)
             slips &= self._turned("speed", u + np.arange(u), z, M)
         return bool(np.any(parts | slips))
+
+    def _opens(self, r: int, z: np.ndarray, M: np.ndarray) -> bool:
+        """Return whether motions that count open a contact at the start."""
+        return not self.counts.start or bool(self._turned("gap", np.array([r]), z, M).any())
 
     def _turned(self, what: str, rows: np.ndarray, z: np.ndarray, M: np.ndarray) -> np.ndarray:
         """Return whether numbers change some functionals (m,), "gap" or "speed", at the start."""
@@ -131,24 +136,26 @@ class Start:
             turned = turned + (getattr(self._numbers.parts, what)[:, rows] @ z).T
         return np.asarray(np.abs(turned).max(axis=1, initial=0.0) > _NEAR * np.abs(functional) @ self.dynamics.typical)
 
-    def _loose(self, segment: Segment, flow: Flow, z: np.ndarray) -> bool:
+    def _loose(self, segment: Segment, flow: Flow, z: np.ndarray, M: np.ndarray) -> bool:
         """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.
 
-        A body that friction and a wall hold at once is kept at the wall by what friction could not hold.
+        A body that friction and a contact hold at once needs the contact for what its friction could not hold. M: as in
+        _begins_at_event, and where friction could hold all, only what opens the contact counts.
         """
         system, units, unit = self.system, len(segment.state), np.arange(len(segment.state))
         force = flow.forces @ z
         noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical
         closed = (unit < system.contacts) & np.isinf(system.spring) & presses(segment.state)
+        touched = system.J[:units, system.along] != 0.0  # (u, bodies)
         floors = (unit >= system.contacts) & (system.surface == FLOOR)
-        along = np.where(floors, np.r_[system.along, 0][np.where(floors, system.body, -1)], 0)
-        touched = system.J[:units, along] * floors  # (u, u): of each contact by the body of each floor
         holds = floors & np.isin(segment.state, (STICK, HELD))
         for r in np.flatnonzero(closed & (system.friction == 0.0)):
-            beside = holds & (touched[r] != 0.0)
-            press = force[r] + force[units:][beside] @ touched[r, beside]
-            if press <= (1.0 + _NEAR) * system.limit[beside].sum() + noise[r]:
+            room = [system.limit[own].sum() - force[r] - force[units:][own].sum() * system.J[r, system.along[body]]
+                    for body in np.flatnonzero(touched[r]) for own in (holds & (system.body == body),)]  # fmt: skip
+            least, edge = min(room, default=-force[r]), noise[r] + _NEAR * system.limit[holds].max(initial=0.0)
+            if least >= -edge and (least <= edge or self._opens(r, z, M)):
                 return True
         stuck = flow.stuck & (unit >= system.contacts) & (unit < self.dynamics.jenkins.start)
         at_bound = stuck & (np.abs(force[units:]) >= (1.0 - _NEAR) * system.limit)
-        return bool(np.any(at_bound & ~np.any(touched[closed] != 0.0, axis=0)))
+        beside = [np.any(touched[closed, system.body[r]]) if floors[r] else False for r in unit]
+        return bool(np.any(at_bound & ~np.array(beside, bool)))

@@ -114,6 +114,7 @@ class PassageWalk:
                 least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
                 if least < self._clearance[0]:
                     self._clearance = least, self._names.possible(unit, what)
+                self.derivative.neared(segment, least)
             before = self._followed(Before(segment, segment.event, flow, z, M), segment.duration, self._watch)
         return before
 

@@ -19,9 +19,9 @@ from vanedamp.coupling.orbits.newton import (
     OrbitStatus,
     Point,
     Problem,
-    at_parameter,
     corrected,
     point_of,
+    reached,
     with_symmetry,
 )
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
@@ -92,7 +92,7 @@ class Continuation:
             return
         head, step, failed = self.head, self.step, self.step
         while step >= self.table.min_step:
-            point = self._reach(head, step)
+            point = reached(self.problem, head, step)
             if point is None:
                 failed, step = step, step / 4
                 continue
@@ -109,20 +109,6 @@ class Continuation:
         self._cross(failed)
 
     # -- smooth pieces
-
-    def _reach(self, head: Point, step: float) -> Point | None:
-        """Return the point at an arclength from another, at most the end of the range; None if there is none."""
-        orbit = corrected(self.problem, head, step)
-        if orbit is None:
-            return None
-        y = self.problem.pack(orbit.state, orbit.parameter)
-        edge = 1.0 if y[-1] > 1.0 else 0.0
-        if not 0.0 <= y[-1] <= 1.0 and 0.0 <= head.y[-1] <= 1.0:
-            share = (edge - head.y[-1]) / (y[-1] - head.y[-1])
-            start = head.y + share * (y - head.y)
-            start[-1] = edge
-            orbit = at_parameter(self.problem, start, head.slope) or orbit
-        return point_of(self.problem, orbit, head.tangent)
 
     def _accept(self, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""

@@ -12,7 +12,7 @@ from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space
-from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
+from vanedamp.coupling.orbits.newton import WAVE, OrbitStatus, Problem, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.orbits.waves import find_wave
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -28,7 +28,8 @@ _SAME = 1e-3
 _MEANING = {
     OrbitStatus.NOT_CONVERGED: "Newton's method does not converge",
     OrbitStatus.FORBIDDEN: "every step of Newton's method leads to another sequence of events, which forbids the orbit",
-    OrbitStatus.STOPPED: "the engine does not come to the end of the period, or its derivative is undetermined",
+    OrbitStatus.STOPPED: "the engine does not come to the end of the period",
+    OrbitStatus.UNDETERMINED: "the motion has no derivative: events meet at one instant, or laws leave forces open",
 }
 
 
@@ -143,6 +144,8 @@ class Diagram:
             if orbit.status is OrbitStatus.OK:
                 return Continuation.begin(problem, self.table, orbit, row), list(failed)
             failed[_MEANING[orbit.status]] = None
+            if orbit.status is OrbitStatus.UNDETERMINED and problem.map.travelling is not None:
+                failed[WAVE] = None
         return None, list(failed)
 
     @property

@@ -28,6 +28,8 @@ from vanedamp.files.toml_input import InputError
 
 #: measures of an orbit and their units
 MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
+#: what to do where sectors have events at one instant
+WAVE = "[orbit] wave = true finds the travelling wave of a tuned ring"
 #: coordinates of a state that are printed one by one
 _PRINTED = 12
 #: scaled length of a Newton step after which the orbit is known to round-off, because its square is
@@ -49,13 +51,15 @@ _MAPS, _PASSAGES = 3, 16
 class OrbitStatus(StrEnum):
     """How the search for an orbit ended.
 
-    FORBIDDEN: the orbits that Newton's method heads for have another sequence of events than it assumes.
+    FORBIDDEN: the orbits that Newton's method heads for have another sequence of events than it assumes; UNDETERMINED:
+    the motion comes to its end, but has no derivative there, as where sectors of a ring have events at one instant.
     """
 
     OK = "ok"
     NOT_CONVERGED = "not_converged"
     FORBIDDEN = "sequence_forbidden"
     STOPPED = "engine_stopped"
+    UNDETERMINED = "derivative_undetermined"
 
 
 class Section(NamedTuple):
@@ -96,6 +100,8 @@ class Orbit(Displayed):
         values = {name: getattr(self, name) for name in names} | {"state": self.state}
         if self.map is None:
             return values
+        if self.status is OrbitStatus.UNDETERMINED and self.map.travelling is not None:
+            values["hint"] = WAVE
         values["parameter"] = f"{self.map.parameter} = {self.parameter:.6g} {unit_of(self.map.parameter)}".removesuffix(
             " 1"
         )
@@ -311,7 +317,11 @@ def solve(
     if passage is None:
         state, periods = start[:-1] * problem.weight, problem.map.periods
         parameter, nothing = problem.parameter(start), Passage.stopped(np.full(problem.size, np.nan), periods)
-        return Orbit(OrbitStatus.STOPPED, parameter, state, periods, problem.map.scale, nothing, math.nan, 0)
+        status, motion = OrbitStatus.STOPPED, problem.motion(start)
+        if motion is not None:
+            status = OrbitStatus.UNDETERMINED
+        known = None if motion is None else problem.at(parameter)
+        return Orbit(status, parameter, state, periods, problem.map.scale, nothing, math.nan, 0, map=known)
     residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
     scale = problem.map.scale
     for count in range(1, iterations + 1):  # noqa: B007
@@ -346,6 +356,21 @@ def solve(
 def corrected(problem: Problem, head: Point, step: float) -> Orbit | None:
     """Return the orbit in the plane normal to the tangent, at a distance along it; None if there is none near."""
     return near(problem, head.y + step * head.tangent, head.tangent, head.slope, abs(step))
+
+
+def reached(problem: Problem, head: Point, step: float) -> Point | None:
+    """Return the point at an arclength from another, at most the end of the range; None if there is none."""
+    orbit = corrected(problem, head, step)
+    if orbit is None:
+        return None
+    y = problem.pack(orbit.state, orbit.parameter)
+    edge = 1.0 if y[-1] > 1.0 else 0.0
+    if not 0.0 <= y[-1] <= 1.0 and 0.0 <= head.y[-1] <= 1.0:
+        share = (edge - head.y[-1]) / (y[-1] - head.y[-1])
+        start = head.y + share * (y - head.y)
+        start[-1] = edge
+        orbit = at_parameter(problem, start, head.slope) or orbit
+    return point_of(problem, orbit, head.tangent)
 
 
 def near(problem: Problem, predicted: np.ndarray, row: np.ndarray, slope: np.ndarray, distance: float) -> Orbit | None:

@@ -28,6 +28,7 @@ from vanedamp.coupling.orbits.newton import (
     least_squares,
     near,
     point_of,
+    reached,
 )
 
 #: note on a body that reaches a wall and has free travel on the other side
@@ -68,7 +69,8 @@ class OtherSide:
     def past_the_start(self, last: Point) -> tuple[Point, list[Located]] | None:
         """Return an orbit beyond the last one, where an event passes the start, and the bifurcations on the way.
 
-        The branch is followed from where no event is near. None where no event passes the start.
+        The branch is followed from where no event is near, to the end of the range at most. None where no event passes
+        the start.
         """
         periods = last.orbit.periods
         times = self.problem.at(last.orbit.parameter).times(last.orbit.passage)
@@ -84,11 +86,10 @@ class OtherSide:
             return None
         found, step = list[Located](), self.step
         for _ in range(_STEPS):
-            orbit = corrected(there, head, step)
-            if orbit is None:
+            point = reached(there, head, step)
+            if point is None:
                 step /= 4
                 continue
-            point = point_of(there, orbit, head.tangent)
             for each in bifurcations(there, head, point):
                 moved = self._state(there, each.orbit.state, each.orbit.parameter, periods - later)
                 if moved is not None:
@@ -100,7 +101,7 @@ class OtherSide:
             )
             passed = len(set(before)) > 1
             head = point
-            if passed:
+            if passed or not 0.0 < point.y[-1] < 1.0:
                 back = self._moved(there, point, self.problem, periods - later)
                 return None if back is None else (back, found)
         return None

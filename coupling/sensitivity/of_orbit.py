@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import matrix_balance, svd
 
+from vanedamp.coupling.derivatives.derivative import TANGENTIAL
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
@@ -18,8 +19,12 @@ from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, Sensit
 
 #: round-off of a period map, relative, and error of an orbit's derivatives, relative, beyond which it is at a fold
 _ROUND_OFF, _UNCERTAIN = 1e-13, 1e-6
+#: singular values, relative to the largest, of directions that are known to be neutral
+_NEUTRAL = 1e-8
 #: part of a derivative that no move of the orbit makes up for, relative: neutral orbits that numbers would drive away
 _DRIVEN = 1e-7
+#: of passages that have a derivative on one side
+_ONE_SIDED = (PassageStatus.GRAZING, PassageStatus.COINCIDENT)
 _FOLD = "the orbit is at a fold or another point where it meets others"
 #: imbalance of the energies' derivatives, relative to the largest of a number, and of all and the energies
 _OPEN, _NOTHING = 1e-6, 1e-9
@@ -32,7 +37,7 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     section, periods = orbit.section, orbit.periods
     assert section.map is not None
     motion = _motion(section.map, paths, orbit.scale)
-    turns = _moved(orbit, motion)
+    turns, known = _moved(orbit, motion)
     state = section.state
     if section.later:
         left = periods - section.later
@@ -40,9 +45,12 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
         state, turns = orbit.state, rest.by_number
         motion = _motion(orbit.map, paths, orbit.scale)
     measures = Measures(motion.dynamics, motion.numbers, 0, **options)
-    status = motion.passed(state, turns, periods, measures).status
+    # of the motions beside this one only those by the numbers count
+    passage = motion.passed(state, turns, periods, measures, True)
     # an event or a contact at rest at the very start or end is no kink of the motion, as its section tells
-    check(PassageStatus.OK if section.later and status in (PassageStatus.GRAZING, PassageStatus.COINCIDENT) else status)
+    check(PassageStatus.OK if section.later and passage.status in _ONE_SIDED else passage.status)
+    if known is not PassageStatus.OK and not _same(passage.by_number, turns, orbit.scale):
+        check(known)
     _check_energies(measures)
     return record(motion, measures, periods, state, turns)
 
@@ -52,14 +60,22 @@ def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
     return Motion(period_map.scene, paths, speed=period_map.speed, scale=scale, begin=period_map.begin)
 
 
-def _moved(orbit: Orbit, motion: Motion) -> np.ndarray:
-    """Return how numbers move the state (k, P) of an orbit's section.
+def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:
+    """Return whether derivatives (k, P) of a state are the same, within what is certain of an orbit's."""
+    off, size = (np.abs(each / scale[:, None]).max(axis=0, initial=0.0) for each in (turns - other, other))
+    return bool(np.all(off <= _UNCERTAIN * size))
 
-    Raises NoDerivative where it does not depend smoothly on them.
+
+def _moved(orbit: Orbit, motion: Motion) -> tuple[np.ndarray, PassageStatus]:
+    """Return how numbers move the state (k, P) of an orbit's section, and how its passage ended.
+
+    One with kinks beside it, whose derivative holds on one side, may have none along the numbers. Raises NoDerivative
+    where the state does not depend smoothly on them.
     """
     state, still = orbit.section.state, np.zeros((len(orbit.state), len(motion.numbers)))
     passage = motion.passed(state, still, orbit.periods)
-    check(passage.status)
+    if passage.status not in _ONE_SIDED or not passage.serves(True) or passage.clearance[0] <= TANGENTIAL:
+        check(passage.status)
     equations = _Equations(passage, motion, orbit)
     if int((~equations.kept).sum()) > orbit.neutral:
         raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
@@ -68,11 +84,11 @@ def _moved(orbit: Orbit, motion: Motion) -> np.ndarray:
         # the orbit is known to round-off over the smallest singular value: the derivatives of one as far away differ
         moved = state + equations.farthest()
         other = motion.passed(moved, still, orbit.periods)
-        off = np.abs(_Equations(other, motion, orbit).solved() - turns) / equations.scale[:, None]
-        size = np.abs(turns / equations.scale[:, None]).max(axis=0, initial=0.0)
-        if other.sequence != passage.sequence or not np.all(off.max(axis=0, initial=0.0) <= _UNCERTAIN * size):
+        if not other.serves(True) or other.sequence != passage.sequence:
             raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
-    return turns
+        if not _same(_Equations(other, motion, orbit).solved(), turns, equations.scale):
+            raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
+    return turns, passage.status
 
 
 class _Equations:
@@ -85,7 +101,9 @@ class _Equations:
         self.right = passage.by_number * numbers.size / self.scale[:, None]
         self.left, self.sizes, self.rows = svd(np.eye(len(D)) - passage.scaled(self.scale))
         self._reach = max(1.0, float(self.sizes.max(initial=0.0)))
-        self.kept = self.sizes > NULL * self._reach
+        # of the directions in which the orbit may be moved, round-off of a long sequence of events leaves more
+        most = np.where(np.arange(len(D)) < len(D) - orbit.neutral, NULL, _NEUTRAL)
+        self.kept = self.sizes > most * self._reach
         self._state = np.abs(orbit.section.state / self.scale).max(initial=1.0)
 
     @property

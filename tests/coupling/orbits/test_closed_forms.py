@@ -344,6 +344,27 @@ def test_a_branch_of_a_ball_doubles_and_turns_where_holmes_has_it(restitution, p
         assert np.count_nonzero(branch.stable == after) <= 2
 
 
+def test_a_branch_ends_at_the_end_of_its_range_just_after_an_impact_passes_the_start():
+    restitution = 0.5
+    begins, doubles = beginning(restitution), doubling(restitution)
+    orbit, passes = (
+        BouncingBall(restitution, 0.5 * (begins + doubles)),
+        BouncingBall(restitution, 0.6 * doubles + 0.4 * begins),
+    )
+    data, unit = bouncing(orbit)[0], 10.0 / (2 * math.pi) ** 2
+    position, velocity = orbit.at(passes.phase / (2 * math.pi)) - [10.0, 0.0]
+    data = data.replace({
+        "damper.0.position": position, "damper.0.velocity": velocity, "time": {"periods": 1, "transient": 0},
+        "excitation.harmonic": [{"order": 1, "amplitude": 1.0, "phase": math.degrees(passes.phase)}],
+    })  # fmt: skip
+    table = {"parameter": "structure.displacement_amplitude", "from": unit * orbit.acceleration, "step": 0.05}
+    end = BouncingBall(restitution, 1.003 * passes.acceleration)
+    (branch,) = orbits(data.replace({"orbit": table | {"to": unit * end.acceleration}})).branches
+    assert "at the start of the period" in branch.special[0].note
+    assert branch.parameter[-1] == unit * end.acceleration and branch.end == "the end of the parameter's range"
+    assert branch.multipliers[-1].sum().real == pytest.approx(end.trace, abs=1e-8)
+
+
 def test_the_branch_without_contact_grazes_where_its_amplitude_is_the_gap():
     table = {"parameter": "excitation.force", "from": 0.05, "to": 0.2, "start": "linear", "max_points": 40}
     (branch,) = orbits(stopped(0.05).replace({"orbit": table})).branches

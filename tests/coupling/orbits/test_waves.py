@@ -126,6 +126,13 @@ def test_a_wave_whose_opposite_sectors_have_events_at_one_instant(tmp_path):
     reached = wave.map.state_of(response.final)
     assert np.abs(wave.state - reached).max() < 1e-4 * np.abs(reached).max()
     assert wave.amplitude_mean == pytest.approx(response.amplitude_mean, rel=1e-4)
+    whole = scene.replace({"orbit.wave": False})
+    lost = find_orbit(whole, response.final)
+    assert lost.status == "derivative_undetermined" and "wave = true" in repr(lost)
+    with pytest.raises(
+        InputError, match=r"no derivative: events meet at one instant.* wave = true finds the travelling"
+    ):
+        orbits(whole)
 
 
 def test_mistuned_rings_and_loads_in_phase_have_no_wave():
