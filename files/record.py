@@ -141,13 +141,13 @@ class Record(Displayed):
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the file: numbers and texts as they are, other data as JSON.
 
-        None and optional tables without an entry are left out.
+        None and optional tables without an entry are left out, but for the provenance.
         """
         optional = _optional(type(self))
         found = {
             name: json.dumps(value) if isinstance(value, list) else value
             for name, value in self.plain().items()
-            if value is not None and (value != {} or name not in optional)
+            if value is not None and (value != {} or name not in optional or name == "provenance")
         }
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
