@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,18 +29,39 @@ _ONE_SIDED = (PassageStatus.GRAZING, PassageStatus.COINCIDENT)
 _FOLD = "the orbit is at a fold or another point where it meets others"
 #: imbalance of the energies' derivatives, relative to the largest of a number, and of all and the energies
 _OPEN, _NOTHING = 1e-6, 1e-9
+#: change of a figure over its size, by a move of the orbit by a size of its coordinates, that is round-off
+_DEPENDS = 1e-6
 
 
 def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     """Return the derivatives of an orbit. Raises NoDerivative, InputError and NotSmooth."""
     if orbit.status is not OrbitStatus.OK or orbit.map is None:
         raise NoDerivative(SensitivityStatus.STOPPED, f"no orbit was found: {orbit.status.value}")
-    section, periods = orbit.section, orbit.periods
-    assert section.map is not None
-    motion = _motion(section.map, paths, orbit.scale)
-    turns, known = _moved(orbit, motion)
-    state = section.state
+    assert orbit.section.map is not None
+    motion = _motion(orbit.section.map, paths, orbit.scale)
+    turns, known, neutral = _moved(orbit, motion)
+    found = _followed(orbit, motion, turns, paths, options, known)
+    count, left_open = len(motion.numbers), set[str]()
+    for first in range(0, len(neutral), count):
+        aside = neutral[first : first + count]
+        shift = np.zeros_like(turns)
+        shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
+        other = _followed(orbit, motion, turns + shift, paths, options)
+        left_open |= {name for name in found.values if _depends(found, other, name, motion.numbers.size)}
+    return _without(found, left_open) if left_open else found
+
+
+def _followed(
+    orbit: Orbit, motion: Motion, turns: np.ndarray, paths: Paths, options: dict[str, Any],
+    known: PassageStatus | None = None,
+) -> Sensitivity:  # fmt: skip
+    """Return the derivatives along an orbit whose section numbers turn by (k, P).
+
+    known: how the section's passage ended, to be judged; None: of another orbit that numbers leave open.
+    """
+    section, periods, state = orbit.section, orbit.periods, orbit.section.state
     if section.later:
+        assert orbit.map is not None
         left = periods - section.later
         rest = motion.passed(state, turns, math.ceil(left), part=left)
         state, turns = orbit.state, rest.by_number
@@ -49,10 +71,28 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     passage = motion.passed(state, turns, periods, measures, True)
     # an event or a contact at rest at the very start or end is no kink of the motion, as its section tells
     check(PassageStatus.OK if section.later and passage.status in _ONE_SIDED else passage.status)
-    if known is not PassageStatus.OK and not _same(passage.by_number, turns, orbit.scale):
-        check(known)
-    _check_energies(measures)
+    if known is not None:
+        if known is not PassageStatus.OK and not _same(passage.by_number, turns, orbit.scale):
+            check(known)
+        _check_energies(measures)
     return record(motion, measures, periods, state, turns)
+
+
+def _depends(found: Sensitivity, other: Sensitivity, name: str, size: np.ndarray) -> bool:
+    """Return whether a figure differs between orbits that numbers leave open."""
+    off = np.abs(other.derivatives[name] - found.derivatives[name]) * size
+    most = max(abs(value) for key, value in found.values.items() if key.partition(".")[0] == name.partition(".")[0])
+    return bool(np.any(off > _DEPENDS * most))
+
+
+def _without(found: Sensitivity, names: set[str]) -> Sensitivity:
+    """Return the record without the derivatives of some figures."""
+    nothing = np.full(len(found.paths), np.nan)
+    note = f"no derivatives of {', '.join(sorted(names))}: they depend on where a body rests, which numbers leave open"
+    return replace(
+        found, derivatives=dict(found.derivatives) | dict.fromkeys(names, nothing),
+        note="; ".join(filter(None, (found.note, note))),
+    )  # fmt: skip
 
 
 def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
@@ -66,8 +106,8 @@ def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:
     return bool(np.all(off <= _UNCERTAIN * size))
 
 
-def _moved(orbit: Orbit, motion: Motion) -> tuple[np.ndarray, PassageStatus]:
-    """Return how numbers move the state (k, P) of an orbit's section, and how its passage ended.
+def _moved(orbit: Orbit, motion: Motion) -> tuple[np.ndarray, PassageStatus, np.ndarray]:
+    """Return how numbers move the state (k, P) of an orbit's section, how its passage ended, and open moves (n, k).
 
     One with kinks beside it, whose derivative holds on one side, may have none along the numbers. Raises NoDerivative
     where the state does not depend smoothly on them.
@@ -88,7 +128,7 @@ def _moved(orbit: Orbit, motion: Motion) -> tuple[np.ndarray, PassageStatus]:
             raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
         if not _same(_Equations(other, motion, orbit).solved(), turns, equations.scale):
             raise NoDerivative(SensitivityStatus.FOLD, _FOLD)
-    return turns, passage.status
+    return turns, passage.status, equations.neutral
 
 
 class _Equations:
@@ -110,6 +150,11 @@ class _Equations:
     def condition(self) -> float:
         """Ratio of the largest and the smallest singular value that is none of a neutral direction."""
         return self._reach / float(self.sizes[self.kept].min(initial=np.inf))
+
+    @property
+    def neutral(self) -> np.ndarray:
+        """Directions (n, k) in which the orbit may be moved, by a size of the coordinates."""
+        return np.asarray(self.rows[~self.kept] * self.scale)
 
     def farthest(self) -> np.ndarray:
         """Return the move (k,) of the state that round-off of the map leaves open most."""

@@ -290,3 +290,18 @@ def test_derivatives_next_to_a_fold(away, status):
         )  # fmt: skip
         exact = 2 * math.pi * (8 * one - two) / (12 * step)
         assert np.abs(found.impact_speed_derivative[:, 0]) == pytest.approx([abs(exact)] * 2, rel=1e-4)
+
+
+def test_a_stuck_friction_damper_leaves_the_mean_position_open():
+    """X is F over the dynamic stiffness with the damper's spring; the largest |x| has the offset at which it rests."""
+    stuck = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.05},
+        excitation={"frequency": 12.0, "force": 1.0}, initial={"displacement": 3e-5, "velocity": 0.0},
+        friction_damper=[{"normal_force": 100.0, "friction": 0.5, "stiffness": 1e3}],
+        time={"periods": 200, "transient": 150}, orbit={"periods": 1},
+    )  # fmt: skip
+    found = vd.sensitivity(vd.find_orbit(stuck, vd.simulate(stuck).final), ["excitation.force"])
+    omega = 24.0 * np.pi
+    X = 1.0 / abs(1.1e4 - omega**2 + 1j * 2.0 * 0.05 * 100.0 * omega)
+    assert found.status == "ok" and found.derivatives["amplitude_harmonic"] == pytest.approx([X], rel=1e-9)
+    assert np.isnan(found.derivatives["amplitude_max"]) and "amplitude_max" in found.note and "rests" in found.note
