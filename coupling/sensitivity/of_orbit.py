@@ -17,6 +17,7 @@ from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.files.store import frozen
 
 #: round-off of a period map, relative, and error of an orbit's derivatives, relative, beyond which it is at a fold
 _ROUND_OFF, _UNCERTAIN = 1e-13, 1e-6
@@ -41,14 +42,13 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     motion = _motion(orbit.section.map, paths, orbit.scale)
     turns, known, neutral = _moved(orbit, motion)
     found = _followed(orbit, motion, turns, paths, options, known)
-    count, left_open = len(motion.numbers), set[str]()
+    count = len(motion.numbers)
     for first in range(0, len(neutral), count):
         aside = neutral[first : first + count]
         shift = np.zeros_like(turns)
         shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
-        other = _followed(orbit, motion, turns + shift, paths, options)
-        left_open |= {name for name in found.values if _depends(found, other, name, motion.numbers.size)}
-    return _without(found, left_open) if left_open else found
+        found = _without_open(found, _followed(orbit, motion, turns + shift, paths, options), motion.numbers.size)
+    return found
 
 
 def _followed(
@@ -78,21 +78,30 @@ def _followed(
     return record(motion, measures, periods, state, turns)
 
 
-def _depends(found: Sensitivity, other: Sensitivity, name: str, size: np.ndarray) -> bool:
-    """Return whether a figure differs between orbits that numbers leave open."""
-    off = np.abs(other.derivatives[name] - found.derivatives[name]) * size
-    most = max(abs(value) for key, value in found.values.items() if key.partition(".")[0] == name.partition(".")[0])
-    return bool(np.any(off > _DEPENDS * most))
+def _without_open(found: Sensitivity, other: Sensitivity, size: np.ndarray) -> Sensitivity:
+    """Return the record without what differs along another orbit that numbers leave open."""
 
+    def kept(turns: np.ndarray, others: np.ndarray, most: float) -> np.ndarray:
+        return frozen(np.where(np.abs(others - turns) * size > _DEPENDS * most, np.nan, turns))
 
-def _without(found: Sensitivity, names: set[str]) -> Sensitivity:
-    """Return the record without the derivatives of some figures."""
-    nothing = np.full(len(found.paths), np.nan)
-    note = f"no derivatives of {', '.join(sorted(names))}: they depend on where a body rests, which numbers leave open"
-    return replace(
-        found, derivatives=dict(found.derivatives) | dict.fromkeys(names, nothing),
-        note="; ".join(filter(None, (found.note, note))),
-    )  # fmt: skip
+    largest = {name: abs(value) for name, value in found.values.items()}
+    largest["energy"] = max(value for name, value in largest.items() if name.startswith("energy."))
+    figures = {
+        name: kept(turns, other.derivatives[name], largest["energy" if name.startswith("energy.") else name])
+        for name, turns in found.derivatives.items()
+    }
+    series: dict[str, Any] = {
+        f"{name}_derivative": kept(
+            getattr(found, f"{name}_derivative"), getattr(other, f"{name}_derivative"),
+            float(np.abs(getattr(found, name)).max(initial=0.0)),
+        )
+        for name in ("peak", "impact_time", "impact_speed", "motion")
+        if getattr(found, f"{name}_derivative").shape == getattr(other, f"{name}_derivative").shape
+    }  # fmt: skip
+    names = [name for name, turns in figures.items() if np.isnan(turns).any()]
+    note = f"no derivatives of {', '.join(names)}: they depend on where a body rests, which numbers leave open"
+    notes = [found.note, *([note] if names and note not in found.note else [])]
+    return replace(found, derivatives=figures, note="; ".join(filter(None, notes)), **series)
 
 
 def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:

@@ -188,6 +188,8 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
         exact = reference.derivative[name]
         if found.note and name in ("peak", "amplitude_mean", "amplitude_max"):
             continue  # two summits of one height: on one side
+        if "rests" in found.note and np.isnan(claim).any():
+            continue  # there is an orbit for each place of rest
         if name.startswith("impact"):
             if not len(ours):  # compliant contacts have none
                 continue
