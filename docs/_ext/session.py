@@ -115,7 +115,14 @@ class File(_Run):
         name, append = self.arguments[0], "append" in self.options
         self.session().write(name, self.text, append)
         caption = nodes.caption("", "", nodes.literal("", name), *([nodes.Text(", at its end")] if append else []))
-        return [nodes.container("", caption, self.block(self.text, "toml" if name.endswith(".toml") else "text", "file"), literal_block=True)]
+        return [
+            nodes.container(
+                "",
+                caption,
+                self.block(self.text, "toml" if name.endswith(".toml") else "text", "file"),
+                literal_block=True,
+            )
+        ]
 
 
 class Shell(_Run):

@@ -692,7 +692,7 @@ def test_results_in_memory(results, tmp_path):
     assert loadmat(tmp_path / "response.mat")["displacement"].ravel() == pytest.approx(response.displacement, rel=0)
     with pytest.raises(vd.InputError, match="Response: does not say what was run"):
         vd.export(
-            replace(response, coordinates=np.ones((len(response.time), 1))), tmp_path / "out.vtkhdf",
+            replace(response, scene=None, coordinates=np.ones((len(response.time), 1))), tmp_path / "out.vtkhdf",
             mesh=results / "modes.h5",
         )  # fmt: skip
     with pytest.raises(vd.InputError, match="expected a result or its file, not dict"):

@@ -30,8 +30,9 @@ from vanedamp.coupling.sweep.record import PEAKS
 from vanedamp.coupling.sweep.worker import IN_PLANE, MEASURES
 from vanedamp.files.reference import options
 from vanedamp.files.store import load_any
+from vanedamp.studies import kinds
 from vanedamp.studies.commands import COMMANDS
-from vanedamp.studies.file_kinds import KINDS, RESULT_KINDS
+from vanedamp.studies.file_kinds import KINDS
 
 DOCS = ROOT / "docs"
 CHROMIUM = Path("/usr/bin/chromium")
@@ -150,7 +151,7 @@ def test_fields_of_results_are_described():
 @pytest.mark.parametrize("name", ["modes", "life", "calibration", "optimisation", "mistuning"])
 def test_fields_have_the_dimensions_and_units_of_the_file(name):
     kind, variables, _ = load_any(ROOT / "tests" / "files" / "written" / f"{name}.h5")
-    found = [one for one in described(pkgutil.resolve_name(RESULT_KINDS[kind].record)) if one.dims]
+    found = [one for one in described(pkgutil.resolve_name(kinds.kind(kind).RECORD)) if one.dims]
     written = [(one, field) for field in found for one in field.name.split(", ") if one in variables]
     assert len(written) > 2
     for one, field in written:

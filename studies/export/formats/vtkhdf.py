@@ -97,9 +97,7 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
         raise InputError(f"--periods: expected at least 1, not {last}")
     provenance = record.attributes.get("provenance") or {}
     if "scene" not in provenance:
-        raise InputError(
-            f'{record.file}: does not say what was run; `vanedamp run -o` and save(path, {{"scene": ...}}) do'
-        )
+        raise InputError(f"{record.file}: does not say what was run, as files of earlier versions; run the scene again")
     scene = validate(Scene, provenance["scene"], record.file)
     structure = _chosen(scene.structure, record.attributes.get("estimate"))
     assert isinstance(structure, Rom)
