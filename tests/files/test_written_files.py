@@ -94,7 +94,12 @@ def test_what_is_read_is_written_again(name, tmp_path):
     for key, made in again.items():
         assert (tuple(made.dims), made.units) == (tuple(variables[key].dims), variables[key].units), key
         assert made.values.dtype == variables[key].values.dtype, key
-        np.testing.assert_array_equal(made.values, variables[key].values, key)
+        kept = variables[key].values
+        if made.values.dtype.kind in "fc":  # some come from others, by arithmetic
+            largest = np.abs(kept[np.isfinite(kept)]).max(initial=0.0)
+            np.testing.assert_allclose(made.values, kept, rtol=1e-9, atol=1e-12 * largest, err_msg=key)
+        else:
+            np.testing.assert_array_equal(made.values, kept, key)
     same(named, {key: attributes[key] for key in named})
 
 
