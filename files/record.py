@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from functools import cache
 from typing import (
     TYPE_CHECKING,
@@ -128,14 +128,14 @@ class Record(Displayed):
             dim: store.Variable(np.array(list(names), object), (dim,)) for dim, names in self.labels().items()
         }
 
-    def plain(self) -> dict[str, Any]:
-        """Return the fields that are neither arrays nor rows, as plain data."""
+    def plain(self, names: Container[str] | None = None) -> dict[str, Any]:
+        """Return the fields that are neither arrays nor rows, as plain data. names: of those wanted; None: all."""
         return {
             name: layout.encode(getattr(self, name))
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
-            if not isinstance(layout, Array | Rows | Own)
+            if not isinstance(layout, Array | Rows | Own) and (names is None or name in names)
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -157,16 +157,20 @@ class Record(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Return the record as plain data, arrays as nested lists."""
-        found = self.plain()
-        found.pop("provenance", None)
+        wanted = self.IN_JSON
+        if wanted is None:
+            wanted = tuple(name for name in declared(type(self)) if name != "provenance")
+        found = self.plain(wanted)
         for name, (_, layout) in declared(type(self)).items():
             value = getattr(self, name)
+            if name not in wanted:
+                continue
             if isinstance(layout, Array) and value is not None:
                 for part, values in _parts(np.asarray(value)).items():
                     found[(layout.json or layout.name or name) + part] = values.tolist()
             elif isinstance(layout, Rows):
                 found[name] = [dataclasses.asdict(row) for row in value]
-        return {name: found[name] for name in self.IN_JSON or found} | self.derived()
+        return found | self.derived()
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as."""
