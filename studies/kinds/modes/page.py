@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 
 from vanedamp.files.store import load as load_record
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.records.modes import Modes
 from vanedamp.studies.hot_spots import level_warnings
 from vanedamp.studies.kinds.modes import NAME
 from vanedamp.studies.report.mode_chart import mode_figure, mode_rows, small_surface
@@ -37,8 +38,10 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
     return [_analysis(file, result.record, page) for file, result in results.items()]
 
 
-def figure(record: tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
+def figure(record: Modes | tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
     """Draw the modes of a file, which has the mesh. Raises InputError for a mesh with too large a surface."""
+    if isinstance(record, Modes):
+        raise InputError("plot: there is no figure of a Modes; pass a result, or its file")
     values, attributes = record
     surface = small_surface(values)
     if surface is None:

@@ -85,6 +85,12 @@ def test_run_shows_its_history():
         vd.plot(vd.simulate(scene))
 
 
+def test_modes_without_their_mesh_have_no_figure():
+    modes = vd.Modes(np.ones(1), np.ones((1, 3)), np.zeros(1))
+    with pytest.raises(InputError, match="no figure of a Modes; pass a result, or its file"):
+        vd.plot(modes)
+
+
 #: the examples, made shorter
 SHORTER = {
     "ramp": {"ramp.rate": [5000.0], "ramp.both": False, "time.periods": 30, "time.transient": 20},
