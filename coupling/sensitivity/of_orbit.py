@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -42,13 +43,13 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     motion = _motion(orbit.section.map, paths, orbit.scale)
     turns, known, neutral = _moved(orbit, motion)
     found = _followed(orbit, motion, turns, paths, options, known)
-    count = len(motion.numbers)
+    count, others = len(motion.numbers), list[Sensitivity]()
     for first in range(0, len(neutral), count):
         aside = neutral[first : first + count]
         shift = np.zeros_like(turns)
         shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
-        found = _without_open(found, _followed(orbit, motion, turns + shift, paths, options), motion.numbers.size)
-    return found
+        others.append(_followed(orbit, motion, turns + shift, paths, options))
+    return _without_open(found, others, motion.numbers.size) if others else found
 
 
 def _followed(
@@ -78,30 +79,33 @@ def _followed(
     return record(motion, measures, periods, state, turns)
 
 
-def _without_open(found: Sensitivity, other: Sensitivity, size: np.ndarray) -> Sensitivity:
-    """Return the record without what differs along another orbit that numbers leave open."""
+def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.ndarray) -> Sensitivity:
+    """Return the record without derivatives, by any number, of what differs along orbits that numbers leave open."""
 
-    def kept(turns: np.ndarray, others: np.ndarray, most: float) -> np.ndarray:
-        return frozen(np.where(np.abs(others - turns) * size > _DEPENDS * most, np.nan, turns))
+    def is_open(turns: np.ndarray, of_others: Iterable[np.ndarray], most: float) -> np.ndarray:
+        """Return of which results (..., 1)."""
+        differ = [np.abs(each - turns) * size > _DEPENDS * most for each in of_others if each.shape == turns.shape]
+        return np.any(differ, axis=0).any(axis=-1, keepdims=True) if differ else np.zeros((*turns.shape[:-1], 1), bool)
 
     largest = {name: abs(value) for name, value in found.values.items()}
-    largest["energy"] = max(value for name, value in largest.items() if name.startswith("energy."))
-    figures = {
-        name: kept(turns, other.derivatives[name], largest["energy" if name.startswith("energy.") else name])
-        for name, turns in found.derivatives.items()
-    }
-    series: dict[str, Any] = {
-        f"{name}_derivative": kept(
-            getattr(found, f"{name}_derivative"), getattr(other, f"{name}_derivative"),
-            float(np.abs(getattr(found, name)).max(initial=0.0)),
-        )
-        for name in ("peak", "impact_time", "impact_speed", "motion")
-        if getattr(found, f"{name}_derivative").shape == getattr(other, f"{name}_derivative").shape
-    }  # fmt: skip
-    names = [name for name, turns in figures.items() if np.isnan(turns).any()]
+    energy = max(value for name, value in largest.items() if name.startswith("energy."))
+    names = [
+        name for name, turns in found.derivatives.items()
+        if is_open(turns, (each.derivatives[name] for each in others),
+                   energy if name.startswith("energy.") else largest[name]).any()
+    ]  # fmt: skip
+    series = dict[str, Any]()
+    for name in ("peak", "impact_time", "impact_speed", "motion"):
+        key, most = f"{name}_derivative", float(np.abs(getattr(found, name)).max(initial=0.0))
+        turns = getattr(found, key)
+        off = is_open(turns, (getattr(each, key) for each in others), most)
+        series[key] = frozen(np.where(off, np.nan, turns))
     note = f"no derivatives of {', '.join(names)}: they depend on where a body rests, which numbers leave open"
-    notes = [found.note, *([note] if names and note not in found.note else [])]
-    return replace(found, derivatives=figures, note="; ".join(filter(None, notes)), **series)
+    nothing = frozen(np.full(len(found.paths), np.nan))
+    return replace(
+        found, derivatives=dict(found.derivatives) | dict.fromkeys(names, nothing), **series,
+        note="; ".join(filter(None, (found.note, note if names else ""))),
+    )  # fmt: skip
 
 
 def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
