@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy import linalg, sparse
@@ -39,6 +40,11 @@ class Chain:
         """Return the squared angular frequencies of nodal diameters, tuned."""
         angles = 2 * np.pi / self.sectors * np.asarray(diameters)
         return (self.stiffness + 2 * self.coupling * (1 - np.cos(angles))) / self.mass
+
+    def saved(self, folder: Path) -> str:
+        """Write the reduced ring to a folder, and return its file."""
+        self.ring().save(folder / "ring.h5")
+        return str(folder / "ring.h5")
 
     @property
     def diameters(self) -> np.ndarray:

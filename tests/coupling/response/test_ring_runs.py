@@ -26,9 +26,7 @@ RESONANCE = float(np.sqrt(CHAIN.squares([2])[0]) / (2 * np.pi))
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("ring") / "ring.h5"
-    CHAIN.ring().save(path)
-    return str(path)
+    return CHAIN.saved(tmp_path_factory.mktemp("ring"))
 
 
 def scene(file, **changes):

@@ -21,9 +21,7 @@ CHAIN = Chain(sectors=6)
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("ring") / "ring.h5"
-    CHAIN.ring().save(path)
-    return str(path)
+    return CHAIN.saved(tmp_path_factory.mktemp("ring"))
 
 
 def scene(file, **changes):
