@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy import sparse
@@ -19,7 +19,6 @@ from vanedamp.files.display import Displayed
 from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.sparse_indices import SparseError, within_shape
 
-_KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
 _ASYMMETRY = 1e-10
 
@@ -80,6 +79,7 @@ class SystemMatrices(Displayed):
                    higher degree, for the iterative solver; None: unknown, as after `load`
     """
 
+    KIND: ClassVar[str] = "system-matrices"
     stiffness: sparse.csr_array
     mass: sparse.csr_array
     coordinates: np.ndarray
@@ -181,13 +181,15 @@ class SystemMatrices(Displayed):
             variables[name] = store.Variable(matrix.data, (f"{name}_entry",), units)
             variables[f"{name}_column"] = store.Variable(matrix.indices, (f"{name}_entry",))
             variables[f"{name}_row_start"] = store.Variable(matrix.indptr, ("row_edge",))
-        store.save(path, _KIND, variables, {"damping_ratio": self.damping_ratio, "provenance": dict(self.provenance)})
+        store.save(
+            path, self.KIND, variables, {"damping_ratio": self.damping_ratio, "provenance": dict(self.provenance)}
+        )
 
     @classmethod
     @store.reader
     def load(cls, path: str | os.PathLike[str]) -> SystemMatrices:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, _KIND)
+        values, attributes = store.load(path, cls.KIND)
         offsets = values["patch_offset"]
         normals = values.get("patch_normal", np.zeros((len(offsets) - 1, 3)))
         patches = {

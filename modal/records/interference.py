@@ -12,7 +12,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Interference(Plotted):
     crossings      of the orders and the modes of the diagram
     """
 
+    KIND: ClassVar[str] = RingModes.KIND
     modes: RingModes
     orders: tuple[int, ...]
     speed: float | None = None
@@ -166,7 +167,7 @@ class Interference(Plotted):
     def load(cls, path: str | os.PathLike[str]) -> Interference:
         """Read the record of a ring's modes. Raises files.store.StoreError."""
         modes = RingModes.load(path)
-        values, attributes = store.load(path, "ring-modes")
+        values, attributes = store.load(path, cls.KIND)
         return cls.of(
             modes,
             values["engine_order"].tolist() if "engine_order" in values else None,

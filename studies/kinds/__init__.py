@@ -26,7 +26,7 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Iterator
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Protocol
 
 from vanedamp.studies.facts import Fact, Found
 
@@ -57,12 +57,6 @@ def kind(name: str) -> Kind | None:
 def of_command(command: str) -> Kind | None:
     """Return the kind that a command writes; None where there is none."""
     return kind(command) or next((one for one in map(_loaded, names()) if command in one.COMMANDS), None)
-
-
-def of_record(record: Any) -> str | None:
-    """Return the name of the kind of a record; None where there is none."""
-    own = {one.__name__ for one in type(record).__mro__}
-    return next((name for name in names() if _loaded(name).RECORD.rpartition(".")[2] in own), None)
 
 
 def _loaded(name: str) -> Kind:

@@ -13,7 +13,6 @@ from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
-from vanedamp.studies import kinds
 from vanedamp.studies.report.results import collect, sections
 from vanedamp.studies.report.time_history import History
 
@@ -37,10 +36,10 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
         result = History.of(result, scene)
     if isinstance(result, RingModes):
         result = Interference.of(result)
-    name = "response" if isinstance(result, History) else kinds.of_record(result)
-    if name is None:
+    kind = getattr(result, "KIND", None)
+    if kind not in sections():
         raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
-    return _drawn(name, result, type(result).__name__)
+    return _drawn(str(kind), result, type(result).__name__)
 
 
 def _of_file(path: str | Path) -> go.Figure:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import plotly.graph_objects as go
@@ -44,6 +44,7 @@ class History:
     scene         what was run, of a ring written out by sector; None if the file does not say, or its ring is gone
     """
 
+    KIND: ClassVar[str] = Response.KIND
     time: np.ndarray
     displacement: np.ndarray
     bodies: np.ndarray
