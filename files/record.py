@@ -7,8 +7,8 @@
         amplitude: Annotated[np.ndarray, Array(("time", "body"), "m")]
         status: str
 
-A field is an array (Array), a tuple of small records of one class, whose fields are columns (Rows), or plain data that
-pydantic knows: an attribute of the file.
+A field is an array (Array), arrays by name (Columns), a tuple of small records of one class, whose fields are columns
+(Rows), or plain data that pydantic knows: an attribute of the file.
 """
 
 from __future__ import annotations
@@ -67,6 +67,17 @@ class Rows(NamedTuple):
     dim: str
 
 
+class Columns(NamedTuple):
+    """A mapping of arrays by name, a variable each: of a table that knows unit, further dims and dtype of every name.
+
+    known: returns the table; dims: first dimensions of all of them; prefix: of names in the file.
+    """
+
+    known: Callable[[], Mapping[str, Any]]
+    dims: tuple[str, ...] = ()
+    prefix: str = ""
+
+
 class Own(NamedTuple):
     """A field that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`."""
 
@@ -82,6 +93,9 @@ class Coded(NamedTuple):
 
     encode: Callable[[Any], Any]
     decode: Callable[[Any, str], Any]
+
+
+Layout = Array | Columns | Rows | Own | Coded | None
 
 
 def empty() -> np.ndarray:
@@ -109,6 +123,15 @@ class Record(Displayed):
         """Return the names along dimensions that have some, by dimension."""
         return {}
 
+    def dimensions(self) -> dict[str, tuple[str, ...]]:
+        """Return what dimensions of declared fields stand for, such as those of a grid, by name."""
+        return {}
+
+    def dims(self, declared: tuple[str, ...]) -> tuple[str, ...]:
+        """Return dimensions as the file names them."""
+        own = self.dimensions()
+        return tuple(dim for name in declared for dim in own.get(name, (name,)))
+
     def derived(self) -> dict[str, Any]:
         """Return what JSON has besides the fields, or in place of one."""
         return {}
@@ -121,7 +144,12 @@ class Record(Displayed):
             if isinstance(layout, Array) and not layout.attribute and not _missing(value, name in optional):
                 stored = np.asarray(value, np.int8 if layout.dtype is bool else layout.dtype)
                 for part, values in _parts(stored).items():
-                    found[(layout.name or name) + part] = store.Variable(values, layout.dims, layout.unit)
+                    found[(layout.name or name) + part] = store.Variable(values, self.dims(layout.dims), layout.unit)
+            elif isinstance(layout, Columns):
+                for each, values in value.items():
+                    one = layout.known()[each]
+                    dims = self.dims((*layout.dims, *one.dims))
+                    found[layout.prefix + each] = store.Variable(values, dims, one.unit)
             elif isinstance(layout, Rows):
                 found |= row_variables(value, get_args(kind)[0], layout.dim)
         return found | {
@@ -135,7 +163,7 @@ class Record(Displayed):
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
-            if not isinstance(layout, Array | Rows | Own) and (names is None or name in names)
+            if not isinstance(layout, Array | Columns | Rows | Own) and (names is None or name in names)
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -168,6 +196,8 @@ class Record(Displayed):
             if isinstance(layout, Array) and value is not None:
                 for part, values in _parts(np.asarray(value)).items():
                     found[(layout.json or layout.name or name) + part] = values.tolist()
+            elif isinstance(layout, Columns):
+                found |= {layout.prefix + each: values.tolist() for each, values in value.items()}
             elif isinstance(layout, Rows):
                 found[name] = [dataclasses.asdict(row) for row in value]
         return found | self.derived()
@@ -211,6 +241,12 @@ class Record(Displayed):
                     given[field] = held[f"{name}_real"] + 1j * held[f"{name}_imaginary"]
                 else:
                     given[field] = tuple(np.asarray(held[name]).tolist()) if _is_tuple(kind) else held[name]
+            elif isinstance(layout, Columns):
+                given[field] = {
+                    name: store.frozen(values[layout.prefix + name], one.dtype)
+                    for name, one in layout.known().items()
+                    if layout.prefix + name in values
+                }
             elif isinstance(layout, Rows):
                 given[field] = rows_of(values, get_args(kind)[0], layout.dim)
             elif not isinstance(layout, Own) and (field in attributes or field not in optional):
@@ -221,18 +257,18 @@ class Record(Displayed):
         return given
 
 
-def declared(cls: Any) -> Mapping[str, tuple[Any, Array | Rows | Own | Coded | None]]:
+def declared(cls: Any) -> Mapping[str, tuple[Any, Layout]]:
     """Return type and layout of every field of a record; None: plain data."""
     return _declared(cls)
 
 
 @cache
-def _declared(cls: type) -> dict[str, tuple[Any, Array | Rows | Own | Coded | None]]:
-    found: dict[str, tuple[Any, Array | Rows | Own | Coded | None]] = {}
+def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
+    found: dict[str, tuple[Any, Layout]] = {}
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, Array | Rows | Own | Coded)), None)
+        layout = next((note for note in notes if isinstance(note, Array | Columns | Rows | Own | Coded)), None)
         found[item.name] = (kind, layout)
     return found
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
-from vanedamp.coupling.ensembles.record import AT_POINTS, STRENGTH, WEAR, Ensemble, complete
+from vanedamp.coupling.ensembles.record import PEAK, REDUCTION, Ensemble, complete, kept
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene, loaded
-from vanedamp.coupling.sweep.further import stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.sweep import run_all, warnings_in
-from vanedamp.coupling.sweep.worker import COLUMNS, MEASURES, SweepTable, parts_of
+from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.files.store import frozen
 
 
@@ -38,11 +38,12 @@ def ensemble(
 
 def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -> Ensemble:
     shape, grid = (points.count, *points.grid.shape), points.grid
-    found = {name: frozen(finished.values[:, COLUMNS.index(name)].reshape(shape)) for name in MEASURES}
-    found |= _further(points, finished, shape)
+    arrays = {name: values for name, values in finished.arrays(shape).items() if name in kept()}
+    found = {name: _worst(values, len(table()[name].dims)) for name, values in arrays.items()}
+    found = {name: values for name, values in found.items() if not table()[name].dims or np.isfinite(values).any()}
     status = finished.text("status").reshape(shape)
     ok = status == "ok"
-    results = {name: np.where(ok, found[name], np.nan) for name in AT_POINTS if name in found}
+    results = {name: np.where(ok, found[name], np.nan) for name in found if table()[name].spread}
     of_curves = _of_curves(points, results)
     # indices of all results at every point of a grid would take far longer than the runs
     told = {"amplitude_mean_dynamic": results["amplitude_mean_dynamic"]} if grid.axes else results
@@ -62,17 +63,13 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
     )
 
 
-def _further(points: Members, finished: SweepTable, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
-    """Return strength, at the worst hot spot, and wear of all points, where the scene has any."""
-    parts = {name: finished.values[:, columns] for name, columns in parts_of(points.base).items()}
-    stress, wear = dict(stresses_of(parts["stress"], shape)), dict(wear_of(parts["wear"], shape))
-    worst = {name: np.fmax.reduce(stress[name], axis=-1) for name in STRENGTH if name in stress}
-    found = worst | {name: wear[name] for name in WEAR if name in wear}
-    return {name: frozen(values) for name, values in found.items() if np.isfinite(values).any()}
+def _worst(values: np.ndarray, dims: int) -> np.ndarray:
+    """Return the largest of a quantity over its own dimensions, if it has any; nan where none is known."""
+    return frozen(np.fmax.reduce(values, axis=tuple(range(-dims, 0)))) if dims else values
 
 
 def _of_curves(points: Members, results: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the highest mean, m, the reduction, and the highest strength and wear of every curve of every sample."""
+    """Return the highest mean, m, the reduction, and the highest of limited quantities of all curves."""
     swept, _ = resonance_axis(points.base, points.grid.axes)
     along = () if swept is None else (1 + list(points.grid.axes).index(swept),)
 
@@ -85,5 +82,5 @@ def _of_curves(points: Members, results: Mapping[str, np.ndarray]) -> dict[str, 
     undamped = points.peaks().get("undamped_peak", highest("amplitude_undamped"))
     usable = (undamped > 0.0) & np.isfinite(undamped)
     reduction = 1.0 - np.divide(peak, undamped, out=np.full(peak.shape, np.nan), where=usable)
-    further = {f"peak_{name}": highest(name) for name in (STRENGTH | WEAR) if name in results}
-    return {"peak_amplitude": peak, "reduction": reduction, **further}
+    further = {f"peak_{name}": highest(name) for name in results if table()[name].limited}
+    return {PEAK: peak, REDUCTION: reduction, **further}

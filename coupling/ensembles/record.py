@@ -4,69 +4,82 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.further import STRESSES, WEARS
 from vanedamp.coupling.sweep.grid import resonance_axis
-from vanedamp.coupling.sweep.worker import MEASURES
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Own, Record
+from vanedamp.files.record import Array, Columns, Own, Record
 from vanedamp.files.store import Variable, frozen
 
-#: of models with hot spots, of their worst one, and of scenes with [wear], and their units
-STRENGTH = {name: STRESSES[name] for name in ("stress_von_mises", "utilisation", "damage_per_hour")}
-WEAR = {name: WEARS[name] for name in ("wear_depth_rate", "wear_volume_rate")}
-#: results whose spread is told, and their units: at every point of the grid, and of the whole curve along its frequency
-AT_POINTS = {
-    "amplitude_mean": "m", "amplitude_mean_dynamic": "m", "amplitude_max": "m", "amplitude_undamped": "m",
-    "impacts_per_period": "1", "attached_mass_fraction": "1", **STRENGTH, **WEAR,
-}  # fmt: skip
-OF_CURVES = {
-    "peak_amplitude": "m", "reduction": "1", **{f"peak_{name}": unit for name, unit in (STRENGTH | WEAR).items()},
-}  # fmt: skip
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
 
 #: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
+PEAK, REDUCTION = "peak_amplitude", "reduction"
+
+
+class Spread(NamedTuple):
+    """A result of all samples: its unit, and whether points have it ("grid") or curves ("curves")."""
+
+    unit: str
+    dims: tuple[str, ...] = ()
+    dtype: type = float
+
+
+def kept() -> dict[str, Spread]:
+    """Return what is kept of all samples, by name: of hot spots that of the worst."""
+    found = {name: one for name, one in table().items() if not one.text and (one.spread or not one.dims)}
+    return {name: Spread(one.unit) for name, one in found.items()}
+
+
+def spreads() -> dict[str, Spread]:
+    """Return the results whose spread is told: at every point of the grid, and of the whole curve along its frequency.
+
+    Of a curve: the highest mean, m, as amplitude_mean_dynamic; what the bodies take of the maximum without bodies; and
+    the highest stress, wear and so on.
+    """
+    at_points = {name: Spread(one.unit, ("grid",)) for name, one in table().items() if one.spread}
+    limited = {f"peak_{name}": Spread(one.unit, ("curves",)) for name, one in table().items() if one.limited}
+    return at_points | {PEAK: Spread("m", ("curves",)), REDUCTION: Spread("1", ("curves",))} | limited
+
+
+def _fractions() -> dict[str, Spread]:
+    return {name: one._replace(unit="1") for name, one in spreads().items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(Record, Plotted):
-    """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers.
-
-    scene     the scene with its ranges
-    axes      dotted path -> values, of its [sweep] table; empty for a run at one frequency
-    samples   dotted path -> (s,) values of each range
-    members   by the names of coupling.sweep.worker.MEASURES, (s, *grid) results of all points, nan where none is; and
-              by those of STRENGTH and WEAR, at the worst hot spot and of all contacts, where the scene has any
-    status    (s, *grid) of every point, as in a Sweep
-    quantile  (5, ...) quantiles QUANTILES over the samples by the names of AT_POINTS, over the grid, and of OF_CURVES,
-              over its axes other than the frequency or the speed: `peak_amplitude`, the highest mean of a curve (m, as
-              amplitude_mean_dynamic), `reduction`, what the bodies take of the maximum without bodies, and the
-              highest strength and wear; of points that are ok
-    indices   (4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a
-              number causes by itself, and with others, and half widths of their 95 % confidence intervals; nan where
-              nothing spreads
-    provenance  versions and further data of the caller (JSON-able)
-    """
+    """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers."""
 
     KIND: ClassVar[str] = "ensemble"
     IN_JSON = ()
     scene: SceneField
+    """with its ranges"""
     axes: Annotated[Mapping[str, np.ndarray], Own()]
+    """dotted path -> values, of its [sweep] table; empty for a run at one frequency"""
     samples: Annotated[Mapping[str, np.ndarray], Own()]
-    members: Annotated[Mapping[str, np.ndarray], Own()]
-    status: Annotated[np.ndarray, Own()]
-    quantile: Annotated[Mapping[str, np.ndarray], Own()]
-    indices: Annotated[Mapping[str, np.ndarray], Own()]
+    """dotted path -> (s,) values of each range"""
+    members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
+    """(s, *grid) quantities of all points (docs/quantities.md), of hot spots that of the worst; nan where none is"""
+    status: Annotated[np.ndarray, Array(("sample", "grid"), dtype=object)]
+    """of every point, as in a Sweep"""
+    quantile: Annotated[Mapping[str, np.ndarray], Columns(spreads, ("quantile",), "quantile_")]
+    """(5, ...) quantiles QUANTILES over the samples of points that are ok: of quantities over the grid, and over its
+    axes other than the frequency or the speed of a curve: `peak_amplitude`, its highest mean [m], `reduction`, what the
+    bodies take of the maximum without bodies, and the highest stress, wear and so on"""
+    indices: Annotated[Mapping[str, np.ndarray], Columns(_fractions, ("index", "number"), "indices_")]
+    """(4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a number
+    causes by itself, and with others, and half widths of their 95 % confidence intervals; nan where nothing spreads"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    """versions and further data of the caller (JSON-able)"""
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -124,7 +137,8 @@ class Ensemble(Record, Plotted):
     def derived(self) -> dict[str, Any]:
         """Return axes, ranges, quantiles and indices; the file has all members."""
         own = {path: values.tolist() for path, values in self.axes.items()}
-        units = {path: unit_of(path) for path in (*self.axes, *self.samples)} | AT_POINTS | OF_CURVES
+        units = {path: unit_of(path) for path in (*self.axes, *self.samples)}
+        units |= {name: one.unit for name, one in spreads().items()}
         return {
             "axes": own, "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
             "samples": len(self.status), "points_not_ok": self.not_ok, "quantiles": list(QUANTILES),
@@ -137,28 +151,21 @@ class Ensemble(Record, Plotted):
             "sentences": list(self.sentences()),
         }  # fmt: skip
 
+    def labels(self) -> dict[str, Any]:
+        """Return the names along dimensions that have some."""
+        return {"number": self.numbers, "index": INDICES}
+
+    def dimensions(self) -> dict[str, tuple[str, ...]]:
+        """Return the dimensions of the grid, and of its curves: the axes' paths with _ for dots."""
+        return {"grid": tuple(map(_dimension, self.axes)), "curves": tuple(map(_dimension, self.curves))}
+
     def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file. Dimensions are the axes' paths with _ for dots."""
-        grid = tuple(_dimension(path) for path in self.axes)
-        curves = tuple(_dimension(path) for path in self.curves)
-        dims = dict.fromkeys(AT_POINTS, grid) | dict.fromkeys(OF_CURVES, curves)
-        units = AT_POINTS | OF_CURVES
-        found = {
-            "number": Variable(np.array(self.numbers, object), ("number",)),
-            "quantile": Variable(np.array(QUANTILES), ("quantile",)),
-            "index": Variable(np.array(INDICES, object), ("index",)),
-            "status": Variable(self.status, ("sample", *grid)),
-        }
+        """Return the variables of a file."""
+        found = super().variables() | {"quantile": Variable(np.array(QUANTILES), ("quantile",))}
         for path, values in self.axes.items():
             found[_dimension(path)] = Variable(values, (_dimension(path),), unit_of(path))
         for path, values in self.samples.items():
             found[f"sample_{_dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
-        for name, values in self.members.items():
-            found[name] = Variable(values, ("sample", *grid), (MEASURES | AT_POINTS)[name])
-        for name, values in self.quantile.items():
-            found[f"quantile_{name}"] = Variable(values, ("quantile", *dims[name]), units[name])
-        for name, values in self.indices.items():
-            found[f"indices_{name}"] = Variable(values, ("index", "number", *dims[name]))
         return found
 
     def attributes(self) -> dict[str, Any]:
@@ -168,17 +175,11 @@ class Ensemble(Record, Plotted):
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
         """Return the record in the variables and attributes of a file."""
-        given = cls.given(values, attributes, path)
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
-        own = (*AT_POINTS, *OF_CURVES)
         return cls(
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
             samples={number: frozen(values[f"sample_{_dimension(number)}"]) for number in values["number"]},
-            members={name: frozen(values[name]) for name in (*MEASURES, *STRENGTH, *WEAR) if name in values},
-            status=frozen(values["status"], object),
-            quantile={name: frozen(values[key]) for name in own if (key := f"quantile_{name}") in values},
-            indices={name: frozen(values[key]) for name in own if (key := f"indices_{name}") in values},
-            **given,
+            **cls.given(values, attributes, path),
         )
 
 

@@ -40,6 +40,13 @@ _ZERO = 0.02
 _NEUTRAL = 1e-9
 
 
+#: plain data of a motion that has no exponent, because its run ended early
+NO_EXPONENT: dict[str, Any] = {
+    "status": PassageStatus.STOPPED.value, "motion": "undecided", "exponent": math.nan, "confidence": math.nan,
+    "exponent_per_period": math.nan, "exponents": [],
+}  # fmt: skip
+
+
 class Motion(StrEnum):
     """What the largest exponent says of a motion."""
 

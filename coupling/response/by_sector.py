@@ -6,11 +6,12 @@ import numpy as np
 
 from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.sector_response import SectorResponse
+from vanedamp.coupling.response.sector_response import BY_SECTOR, SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
 from vanedamp.coupling.system.system import System
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
@@ -26,10 +27,9 @@ def response_by_sector(
         static = found[..., 2].sum(axis=0) / (len(found) * system.period)
         peak = np.maximum(peak - static, static - found[..., 1])
     undamped, fixed = _linear(scene, system)
-    return SectorResponse(
-        peak.mean(axis=0), peak.max(axis=0), undamped, fixed, _impacts(scene, system, records, rows, window),
-        tuned=_tuned(scene),
-    )  # fmt: skip
+    impacts = _impacts(scene, system, records, rows, window)
+    own = map(frozen, (peak.mean(axis=0), peak.max(axis=0), undamped, fixed, impacts))
+    return SectorResponse(dict(zip(BY_SECTOR, own, strict=True)), tuned=_tuned(scene))
 
 
 def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:

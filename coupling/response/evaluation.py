@@ -6,18 +6,19 @@ Every method leaves the same records, so that results of different methods have 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.quantities.quantity import evaluated
+from vanedamp.coupling.quantities.sums import SUMS, nothing_known, sources_of
 from vanedamp.coupling.response.by_sector import response_by_sector
 from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import Rows, events_of, impact_energies
 from vanedamp.coupling.response.figures import (
-    FIGURES,
     NO_CONTACT,
     NON_PERIODIC,
     STUCK,
@@ -27,7 +28,7 @@ from vanedamp.coupling.response.figures import (
     measured_of,
 )
 from vanedamp.coupling.response.plane import Plane
-from vanedamp.coupling.response.records import ENERGIES, Records
+from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
@@ -35,8 +36,10 @@ from vanedamp.coupling.response.steadiness import judge, run_ends
 from vanedamp.coupling.response.steady_state import transient_length
 from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
+from vanedamp.files.store import frozen
 
 #: periods between two checks of whether the response is steady
 _CHUNK = 100
@@ -184,20 +187,19 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
     """Return the response of a run that began at `started` (time.perf_counter). events: keep the list of events."""
     system, records, done, status = run.system, run.records, run.periods, ended.status
     first = min(ended.transient, max(done - 1, 0))
-    row = np.empty(len(FIGURES))
+    row = np.empty(len(SUMS))
     confidence = np.nan if ended.confidence is None else ended.confidence
     kind = measure(measured_of(scene, system), records, first, done, confidence, row)
     if status is Status.DIVERGED:  # numbers up to the largest double, of no meaning
-        row[[name != "impacts_per_period" for name in FIGURES]] = np.nan
-    figures: dict[str, Any] = dict(zip(FIGURES, row.tolist(), strict=True))
-    energy = {name: figures.pop(name) for name in ENERGIES}
-    for name in ("amplitude_mean_confidence", "attached_mass_fraction"):
-        figures[name] = None if np.isnan(figures[name]) else figures[name]
-    status = closed_status(status, figures["energy_residual"], figures.pop("contact_gain"), run.open_ledger)
+        nothing_known(row)
+    sums = sources_of(row)
+    energy = {name: float(value) for name, value in sums["energy"].items()}
+    status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
     extent: dict[str, Any] = {}
     if run.plane is not None:
-        extent, tilted = _in_plane(run.plane, slice(first, done), max(done - first, 1) * system.period)
-        status = Status.TILTED if tilted and status in _USABLE else status
+        in_plane = _in_plane(run.plane, slice(first, done))
+        status = Status.TILTED if _tilted(in_plane, run.plane.bound) and status in _USABLE else status
+        sums |= in_plane
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     if scene.wear is not None and records.worn.shape[1]:  # a ring-down does not count it
@@ -215,8 +217,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
         transient=first,
         counters=run.counters,
         event_list=events_of(run.rows, run.log) if events else [],
-        penetration=run.penetration,
-        **figures,
+        quantities=_known(evaluated(sums | {"overlap": run.penetration} | _linear(scene, system)), status),
         **_series(system, records, done),
         **extent,
     )
@@ -281,19 +282,39 @@ def _series(system: System, records: Records, done: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any], bool]:
-    """Return the results of planar bodies over the evaluated periods, and whether they tilt too far."""
-    tilt = plane.tilt[window].max(axis=0, initial=0.0)
-    neglected = plane.neglected * tilt**2
-    parts = {"tilt_max": tilt, "lift_share": plane.lifted[window].sum(axis=0) / span, "linearisation": neglected}
-    slider = np.isnan(plane.neglected)
-    figures: dict[str, Any] = {
-        name: tuple(None if slider[body] else float(value) for body, value in enumerate(values))
-        for name, values in parts.items()
+def _in_plane(plane: Plane, window: slice) -> dict[str, np.ndarray]:
+    """Return what quantities need of planar bodies (b,), over the evaluated periods; nan for sliders."""
+    slider = np.where(np.isnan(plane.neglected), np.nan, 1.0)
+    return {
+        "tilt": slider * plane.tilt[window].max(axis=0, initial=0.0),
+        "lifted": slider * plane.lifted[window].sum(axis=0),
+        "walls": plane.walls[window].sum(axis=0),
+        "neglected": plane.neglected,
     }
-    walls = plane.walls[window]  # none in a run that ended at once
-    figures["wall_impacts"] = tuple((walls.sum(axis=0) / max(len(walls), 1)).tolist())
-    return figures, bool(np.any(neglected[~slider] > plane.bound))
+
+
+def _tilted(in_plane: Mapping[str, np.ndarray], bound: float) -> bool:
+    """Return whether bodies tilt too far."""
+    return bool(np.any(in_plane["neglected"] * in_plane["tilt"] ** 2 > bound))
+
+
+def _linear(scene: Scene, system: System) -> dict[str, float]:
+    """Return the amplitudes without bodies, and with every body fixed in its cavity, m; nan under noise."""
+    known = scene.excitation.signal is None
+    at = np.array([scene.frequency])
+    both = [float(one.amplitude(at)[0]) for one in linear_responses(scene, system)] if known else [np.nan, np.nan]
+    return dict(zip(("undamped", "fixed"), both, strict=True))
+
+
+def _known(found: Mapping[str, Any], status: Status) -> dict[str, Any]:
+    """Return quantities as plain data, None for what is not known of a motion; of one that has diverged, nan."""
+
+    def plain(value: Any) -> Any:
+        if np.ndim(value):
+            return frozen(value)
+        return None if np.isnan(value) and status is not Status.DIVERGED else float(value)
+
+    return {name: plain(value) for name, value in found.items()}
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:

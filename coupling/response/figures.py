@@ -1,4 +1,4 @@
-"""The figures of a run from its records: amplitudes, energies, classification, attached mass."""
+"""The sums of a run from its records (quantities.sums), and its class of motion."""
 
 from __future__ import annotations
 
@@ -9,23 +9,18 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.jit import strict, strict_entry
 from vanedamp.coupling.numerics.compiler.record import record_with
+from vanedamp.coupling.quantities.sums import ENERGIES, SUMS
 from vanedamp.coupling.response.at_rest import at_rest
-from vanedamp.coupling.response.records import CONTACT, ENERGIES, EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS
+from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS
 from vanedamp.coupling.response.static_deflection import distance, static_deflection
 from vanedamp.coupling.response.steady_state import confidence_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
-#: the row of figures of a run: fields of a Response (nan: not known), contact_gain and its energies behind them
-FIGURES = (
-    "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "static_deflection", "amplitude_max_dynamic",
-    "amplitude_mean_dynamic", "amplitude_rms", "amplitude_harmonic", "phase", "impacts_per_period", "energy_residual",
-    "attached_mass_fraction", "contact_gain", *ENERGIES,
-)  # fmt: skip
 (
-    MAX, MEAN, CONFIDENCE, STATIC, MAX_DYNAMIC, MEAN_DYNAMIC, RMS, HARMONIC, PHASE, IMPACTS, RESIDUAL, ATTACHED, GAIN,
-    ENERGY,
-) = range(14)  # fmt: skip
+    PERIODS, SPAN, OMEGA, PEAK, PEAKS, CONFIDENCE, STATIC, DISTANCE, DISTANCES, SQUARE, CHANGE, IMPACTS, UNBALANCED,
+    MADE, CARRIED, HARMONIC, _, MOMENTUM, _, LOAD, _, ENERGY, *_,
+) = range(len(SUMS))  # fmt: skip
 #: classes of motion: the number of excitation periods after which it repeats, or
 NON_PERIODIC, NO_CONTACT, STUCK = 0, -1, -2
 
@@ -82,49 +77,44 @@ def measured_of(scene: Scene, system: System) -> Measured:
 
 
 @strict_entry
-def measure(measured, records, first, done, confidence, figures):
-    """Set the row of figures (len(FIGURES),) of the periods from `first` to `done`; return the class of motion.
+def measure(measured, records, first, done, confidence, sums):
+    """Set the row of sums (len(SUMS),) of the periods from `first` to `done`; return the class of motion.
 
     confidence: of the mean, m; nan: that of the window.
     """
     omega, period = measured.clock[0], measured.clock[1]
     count = done - first
-    span = max(count, 1) * period
-    peak, dynamic, peaks, dynamics, square, impacts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     harmonic, momentum = 0j, 0j
     static = static_deflection(records, first, done, period)
+    sums[:] = 0.0
     for i in range(first, done):
         own = distance(records, i, static)
-        peak, dynamic = max(peak, records.peak[i]), max(dynamic, own)
-        peaks += records.peak[i]
-        dynamics += own
-        square += records.square[i]
-        impacts += records.impacts[i]
+        sums[PEAK], sums[DISTANCE] = max(sums[PEAK], records.peak[i]), max(sums[DISTANCE], own)
+        sums[PEAKS] += records.peak[i]
+        sums[DISTANCES] += own
+        sums[SQUARE] += records.square[i]
+        sums[IMPACTS] += records.impacts[i]
         harmonic += records.harmonic[i]
         momentum += records.momentum[i]
-    harmonic *= 2.0 / span
     if math.isnan(confidence):
         confidence = confidence_of(records.peak, first, done, np.inf)
-    figures[MAX], figures[MEAN], figures[CONFIDENCE] = peak, peaks / max(count, 1), confidence
-    figures[STATIC], figures[MAX_DYNAMIC], figures[MEAN_DYNAMIC] = static, dynamic, dynamics / max(count, 1)
-    figures[RMS] = math.sqrt(max(square / span, 0.0))
-    # 0.0 - x is no -0.0
-    figures[HARMONIC] = math.hypot(harmonic.real, harmonic.imag)
-    figures[PHASE] = math.atan2(harmonic.real, 0.0 - harmonic.imag)
-    figures[IMPACTS] = impacts / max(count, 1)
+    sums[PERIODS], sums[SPAN], sums[OMEGA] = max(count, 1), period, omega
+    sums[CONFIDENCE], sums[STATIC] = confidence, static
+    sums[HARMONIC], sums[HARMONIC + 1] = harmonic.real, harmonic.imag
+    sums[MOMENTUM], sums[MOMENTUM + 1] = momentum.real, momentum.imag
+    sums[CHANGE] = records.section[done, 2] - records.section[first, 2]
     for entry in range(len(ENERGIES)):
-        figures[ENERGY + entry] = records.ledger[done, entry] - records.ledger[first, entry]
+        sums[ENERGY + entry] = records.ledger[done, entry] - records.ledger[first, entry]
     exchanged = lent_energy(measured.load, measured.along, measured.squares, measured.mass, measured.frequency, omega)
     for i in range(done + 1):
         exchanged = max(exchanged, records.collided[i])
-    figures[RESIDUAL] = imbalance(records.ledger, records.parts, done, exchanged)
-    figures[GAIN] = contact_gain(records.ledger, records.parts, first, done, exchanged)
-    change = records.section[done, 2] - records.section[first, 2]
-    figures[ATTACHED] = _attached(measured, change, momentum, harmonic, count, span)
+    sums[UNBALANCED] = imbalance(records.ledger, records.parts, done, exchanged)
+    sums[MADE] = contact_gain(records.ledger, records.parts, first, done, exchanged)
+    _carry(measured, harmonic, count, sums)
     _set_scale(measured, records.section, first, done)
-    if impacts > 0.0:
+    if sums[IMPACTS] > 0.0:
         return repetition(records.section, first, done, measured.scale)
-    friction = figures[ENERGY + FRICTION] > 0.0
+    friction = sums[ENERGY + FRICTION] > 0.0
     return STUCK if not friction and at_rest(measured, records.section, first, done) else NO_CONTACT
 
 
@@ -237,23 +227,19 @@ def _set_scale(measured, section, first, done):
 
 
 @strict
-def _attached(measured, change, momentum, harmonic, count, span):
-    """Return the attached mass over the bodies' mass, Re(F / (omega^2 X)) / sum m; F: all contact forces on it.
+def _carry(measured, harmonic, count, sums):
+    """Set the loads on the bodies and their mass; nan where no attached mass is felt.
 
-    Of several harmonics, order 1 counts; nan where it is not excited.
+    A structure that does not move feels none: its harmonic is 0, or the remainder of a decayed start. Of several
+    harmonics, order 1 counts; nothing is known where it is not excited.
     """
-    omega, load, total = measured.clock[0], measured.load, 0.0
-    square = harmonic.real * harmonic.real + harmonic.imag * harmonic.imag
-    # a structure that does not move feels no mass: its harmonic is 0, or the remainder of a decayed start
-    small = math.hypot(harmonic.real, harmonic.imag) <= math.sqrt(_TINY)
-    if len(measured.along) == 0 or small or count == 0 or (measured.orders and _without_first(measured)):
-        return np.nan
-    force = 2.0 / span * complex(change - omega * momentum.imag, omega * momentum.real)
+    small = 2.0 / (sums[PERIODS] * sums[SPAN]) * math.hypot(harmonic.real, harmonic.imag) <= math.sqrt(_TINY)
     for i in measured.along:
-        force -= load[0, i]
-        total += measured.mass[i]
-    felt = force.real * harmonic.real + force.imag * harmonic.imag
-    return -felt / (omega * omega * square) / total
+        sums[LOAD] += measured.load[0, i].real
+        sums[LOAD + 1] += measured.load[0, i].imag
+        sums[CARRIED] += measured.mass[i]
+    if len(measured.along) == 0 or small or count == 0 or (measured.orders and _without_first(measured)):
+        sums[CARRIED] = np.nan
 
 
 @strict

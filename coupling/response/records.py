@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
+from vanedamp.coupling.quantities.sums import ENERGIES
 from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
-#: entries of the energy balance, J
-ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
+#: entries of the energy balance
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
 
 

@@ -11,22 +11,21 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
 from vanedamp.coupling.response.contact_strength import ContactStrength
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
-from vanedamp.coupling.response.spot_stress import variables as stress_variables
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Array, Own, Record
-from vanedamp.files.store import Variable
+from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import validate
+from vanedamp.rom.recovery import COMPONENTS
 
 #: attributes of a file that are tables
 _NESTED = ("wear", "contact_strength", "stress", "strength", "sectors")
-#: results of each planar body
-_OF_BODIES = ("tilt_max", "lift_share", "linearisation", "wall_impacts")
 
 
 class Status(StrEnum):
@@ -140,50 +139,32 @@ class PlanarSamples(NamedTuple):
         return cls(**arrays, contacts=tuple(zip(*places, strict=True)))
 
 
-#: units of the results of a response that have one
-UNITS = {
-    "frequency": "Hz", "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m",
-    "static_deflection": "m", "amplitude_max_dynamic": "m", "amplitude_mean_dynamic": "m",
-    "amplitude_rms": "m", "amplitude_harmonic": "m", "phase": "rad", "wall_time_s": "s",
-}  # fmt: skip
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Record, Plotted):
-    """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods."""
+class Response(Measured, Record, Plotted):
+    """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods.
+
+    All quantities that it has are attributes of it, too (docs/quantities.md); None: it has none.
+    """
 
     KIND: ClassVar[str] = "response"
     IN_JSON = (
-        "status", "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "static_deflection",
-        "amplitude_max_dynamic", "amplitude_mean_dynamic", "amplitude_rms", "amplitude_harmonic", "phase",
-        "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
-        "wall_time_s", "periods", "transient", "counters", "penetration", "warnings",
-    )  # fmt: skip
+        "status",
+        "frequency",
+        "events",
+        "classification",
+        "energy",
+        "wall_time_s",
+        "periods",
+        "transient",
+        "counters",
+        "warnings",
+    )
     status: Status
     """how the run ended"""
     frequency: float
     """frequency of the excitation [Hz]"""
-    amplitude_max: float
-    """largest displacement, without its sign, at `excitation.at` [m]"""
-    amplitude_mean: float
-    """mean of the largest displacements of the periods [m]"""
-    amplitude_mean_confidence: float | None
-    """half width of the 95 % confidence interval of that mean; None if there are too few periods [m]"""
-    static_deflection: float
-    """displacement that static loads of the bodies hold, their weight or centrifugal pull: the mean position of the
-    motion; 0 without such loads [m]"""
-    amplitude_max_dynamic: float
-    """largest distance from the static deflection [m]"""
-    amplitude_mean_dynamic: float
-    """mean of the periods' largest distances from the static deflection, to be compared with linear amplitudes [m]"""
-    amplitude_rms: float
-    """root mean square of the displacement [m]"""
-    amplitude_harmonic: float
-    """amplitude X of its part X sin(2 pi f t + phase) at the excitation's frequency, order 1 [m]"""
-    phase: float
-    """phase of that part [rad]"""
-    impacts_per_period: float
-    """mean number of impacts in a period"""
+    quantities: Annotated[Mapping[str, Any], Own()]
+    """quantities by name, of sums over the evaluated periods; None: not known"""
     events: int
     """entries of `event_list` over the whole run, listed or not: contacts that hit, stick, slip, detach or come to rest
     (methods other than "exact": impacts); `solver.max_events` bounds `counters.changes`, or the impacts of methods with
@@ -193,10 +174,6 @@ class Response(Record, Plotted):
     energy: dict[str, float]
     """over the evaluated time: work of the `excitation`; `viscous`, `friction`, `impact` and `contact` loss; change of
     what is `stored` [J]"""
-    energy_residual: float
-    """imbalance of the whole run's ledger relative to its largest term [-]"""
-    attached_mass_fraction: float | None
-    """fraction of the bodies' mass that the structure feels at that frequency; None without bodies or motion [-]"""
     wall_time_s: float
     """time that the run took [s]"""
     periods: int
@@ -221,8 +198,6 @@ class Response(Record, Plotted):
     """(n,) displacement at `excitation.at` [m]"""
     body_displacement: Annotated[np.ndarray, Own()]
     """(n, bodies) displacements of the bodies relative to their cavities [m]"""
-    penetration: float = 0.0
-    """deepest overlap of bodies and rigid walls, relative to the free travel; 0 for the exact engine [-]"""
     estimate: dict[str, Any] | None = None
     """estimate of the error of a reduced model whose number of modes was chosen automatically"""
     final: Annotated[RestartState | None, Own()] = None
@@ -233,15 +208,6 @@ class Response(Record, Plotted):
     moved_start: dict[str, Any] | None = None
     """of a second run, whose bodies begin about 1e-9 of their gap aside: status, mean amplitude and its confidence, as
     `amplitude_mean_dynamic`, and whether it `agrees`; None if it was not asked for, and without impacts of bodies"""
-    tilt_max: Annotated[tuple[float | None, ...] | None, Own()] = None
-    """largest tilt of each body in its cavity; None for sliders, and without bodies in the plane [rad]"""
-    lift_share: Annotated[tuple[float | None, ...] | None, Own()] = None
-    """fraction of the time that each body is off its floor [-]"""
-    linearisation: Annotated[tuple[float | None, ...] | None, Own()] = None
-    """what small tilts neglect over the smallest play, for each body [-]"""
-    wall_impacts: Annotated[tuple[float, ...] | None, Own()] = None
-    """mean number of impacts on its walls in a period, for each body of a scene in the plane; the others hit floors,
-    ceilings and each other [-]"""
     in_plane: Annotated[PlanarSamples | None, Own()] = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
@@ -265,27 +231,49 @@ class Response(Record, Plotted):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """versions and further data of the caller (JSON-able)"""
 
+    def __getattr__(self, name: str) -> Any:
+        """Return a quantity: of those that are kept, or from the parts that it needs."""
+        if not name.startswith("_") and name not in self.quantities and name in table():
+            one = table()[name]
+            return one.of(self.__dict__) if one.exists(self.__dict__) else None
+        return super().__getattr__(name)
+
+    @property
+    def _plain(self) -> dict[str, Any]:
+        """The quantities with a number for the whole run, for each body, or by names, that it has."""
+        known = {
+            name: getattr(self, name)
+            for name, one in table().items()
+            if one.dims in ((), ("damper",)) or (one.dims and labels(one.dims[0]) and len(one.dims) == 1)
+        }
+        return {name: value for name, value in known.items() if value is not None or name in self.quantities}
+
     def shown(self) -> dict[str, Any]:
         """Return the values that are printed, by name."""
-        return {name: value for name, value in super().shown().items() if name not in ("scene", "provenance")}
+        left_out = ("quantities", "scene", "provenance")
+        found = {name: value for name, value in super().shown().items() if name not in left_out}
+        first = {name: found.pop(name) for name in ("status", "frequency")}
+        return first | self._plain | found
 
     def printed_units(self) -> dict[str, str]:
         """Return the units of the results that have one, by name."""
-        return UNITS
+        return units()
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
+        found = super().to_json()
+        found = {name: found.pop(name) for name in ("status", "frequency", *self._plain)} | found
         if not events:
-            return super().to_json()
+            return found
         fields = self._event_fields()
         listed = [{name: getattr(event, name) for name in fields} for event in self.event_list]
-        return super().to_json() | {"event_list": listed}
+        return found | {"event_list": listed}
 
     def derived(self) -> dict[str, Any]:
         """Return what only some runs have."""
-        names = (*_OF_BODIES, "moved_start", "estimate", "advice")
+        names = ("moved_start", "estimate", "advice")
         data: dict[str, Any] = {name: value for name in names if (value := getattr(self, name)) is not None}
-        data |= {name: list(data[name]) for name in _OF_BODIES if name in data}
+        data |= {name: _listed(table()[name], value) for name, value in self._plain.items()}
         if self.wear is not None:
             data["wear"] = [contact.to_json() for contact in self.wear]
         if self.stress is not None:
@@ -313,10 +301,12 @@ class Response(Record, Plotted):
             found["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
         if self.in_plane is not None:
             found |= self.in_plane.variables()
+        for name, one in table().items():
+            if one.dims[:1] in (("hot_spot",), ("sector",)) and (value := getattr(self, name)) is not None:
+                found[name] = Variable(value, one.dims, one.unit)
         if self.stress:
-            found |= stress_variables(self.stress)
-        if self.sectors is not None:
-            found |= self.sectors.variables()
+            found["hot_spot"] = Variable(np.array([spot.name for spot in self.stress], object), ("hot_spot",))
+            found["stress_component"] = Variable(np.array(COMPONENTS, object), ("stress_component",))
         return found | (self._event_variables() if self.event_list else {})
 
     def attributes(self) -> dict[str, Any]:
@@ -324,8 +314,7 @@ class Response(Record, Plotted):
         own = self.derived()
         for name in own.keys() & {"wear", "contact_strength"}:
             own[name] = json.dumps(own[name])
-        for name in own.keys() & _OF_BODIES:
-            own[name] = np.array(own[name], float)  # None, of sliders, is nan
+        own |= {name: value for name, value in self._plain.items() if value is not None}
         return super().attributes() | own | {"provenance": self._made(), "warnings": list(self.warnings)}
 
     @classmethod
@@ -334,15 +323,15 @@ class Response(Record, Plotted):
         given = cls.given(values, attributes, path)
         scene = given["provenance"].pop("scene", None)
         kept = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
-        for name in attributes.keys() & set(_OF_BODIES):
-            numbers = np.asarray(attributes[name], float).tolist()
-            given[name] = tuple(None if np.isnan(number) else number for number in numbers)
+        own = {name: attributes[name] for name, one in table().items() if name in attributes}
+        own = {name: value for name, value in own.items() if not table()[name].exists(cls.__dataclass_fields__)}
         of_events = {name.removeprefix("event_"): values[name] for name in values if name.startswith("event_")}
         columns = zip(*(column.tolist() for column in of_events.values()), strict=True)
         unknown: dict[str, Any] = (
             {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}
         )  # of earlier files
         return cls(
+            quantities={name: float(value) if np.ndim(value) == 0 else frozen(value) for name, value in own.items()},
             event_list=[Event(**dict(zip(of_events, row, strict=True)), **unknown) for row in columns],
             time=values.get("time", np.zeros(0)), displacement=values.get("displacement", np.zeros(0)),
             body_displacement=values.get("body_displacement", np.zeros((0, 0))), in_plane=PlanarSamples.of(values),
@@ -371,3 +360,17 @@ class Response(Record, Plotted):
         """Return the names of the fields of events; some apply to planar bodies only."""
         planar = {"corner", "tangential_impulse", "loss"}
         return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
+
+
+def units() -> dict[str, str]:
+    """Return the units of the results of a run that have one, by name."""
+    own = {name: one.unit for name, one in table().items() if one.unit != "1"}
+    return {"frequency": "Hz", "wall_time_s": "s"} | own
+
+
+def _listed(one: Quantity, value: Any) -> Any:
+    """Return a quantity as plain data: by name along a dimension that has some."""
+    if np.ndim(value) == 0:
+        return value
+    plain = [None if np.isnan(number) else number for number in np.asarray(value).tolist()]
+    return dict(zip(labels(one.dims[0]), plain, strict=True)) if labels(one.dims[0]) else plain

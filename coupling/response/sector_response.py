@@ -8,65 +8,47 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.files.store import Variable, frozen
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, family
+from vanedamp.coupling.quantities.sectors import OF_SECTORS
+from vanedamp.files.store import frozen
 from vanedamp.modal.algebra import first_largest
 
-#: results of each sector and their units, (N,) each
-BY_SECTOR = {
-    "amplitude_mean": "m", "amplitude_max": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
-    "impacts_per_period": "1",
-}  # fmt: skip
-#: results of the whole ring and their units
-OF_RING = {"amplification": "1", "localisation": "1"}
+#: what each sector has, by the names of a run's
+BY_SECTOR = tuple(one.name for one in OF_SECTORS)
 
 
 @dataclass(frozen=True, eq=False)
-class SectorResponse:
-    """Response of N sectors of a ring over the evaluated periods of a run: amplitudes of `excitation.at` in each.
+class SectorResponse(Measured):
+    """Response of N sectors of a ring over the evaluated periods of a run.
 
-    amplitude_mean, amplitude_max           (N,) m, mean and largest of the periods' largest distances from the static
-                                            deflection
-    amplitude_undamped, amplitude_fixed     (N,) m, of the linear ring without bodies, and with every body fixed to its
-                                            floor; nan for an excitation that is no sum of sines
-    impacts_per_period                      (N,) of the sector's bodies; nan for a method that does not count them
-    sampling_error                          0: amplitudes come from no samples
-    tuned                                   m, of the tuned ring without bodies at its resonance near the excitation,
-                                            at `excitation.at`; None: not known
+    quantities      (N,) by BY_SECTOR, attributes as well: mean and largest of the periods' largest distances of
+                    `excitation.at` from the static deflection, m; amplitudes of the linear ring without bodies, and
+                    with every body fixed to its floor, nan for an excitation that is no sum of sines; impacts per
+                    period of the sector's bodies, nan for a method that does not count them
+    sampling_error  0: amplitudes come from no samples
+    tuned           m, of the tuned ring without bodies at its resonance near the excitation, at `excitation.at`; None:
+                    not known
     """
 
-    amplitude_mean: np.ndarray
-    amplitude_max: np.ndarray
-    amplitude_undamped: np.ndarray
-    amplitude_fixed: np.ndarray
-    impacts_per_period: np.ndarray
+    quantities: Mapping[str, np.ndarray]
     sampling_error: float = 0.0
     tuned: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in BY_SECTOR:
-            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @classmethod
     def of(cls, values: Mapping[str, Any], data: Mapping[str, Any]) -> SectorResponse:
         """Return the record in the variables of a file, and in what `to_json` gives."""
-        arrays = {name: values[f"sector_{name}"] for name in BY_SECTOR}
-        return cls(**arrays, sampling_error=data.get("sampling_error", 0.0), tuned=data["tuned"])
+        arrays = {name: frozen(values[f"sector_{name}"]) for name in BY_SECTOR}
+        return cls(arrays, sampling_error=data.get("sampling_error", 0.0), tuned=data["tuned"])
 
     @property
     def largest(self) -> int:
         """Number of the sector with the largest mean amplitude; of equal ones the first."""
         return first_largest(self.amplitude_mean)
 
-    @property
-    def amplification(self) -> float | None:
-        """Largest mean amplitude over that of the tuned ring without bodies in resonance; None: not known."""
-        return None if self.tuned is None else float(self.amplitude_mean.max()) / self.tuned
-
-    @property
-    def localisation(self) -> float | None:
-        """Largest mean amplitude over the root mean square of all sectors, 1 to the root of N; None at rest."""
-        square = float(np.sqrt((self.amplitude_mean**2).mean()))
-        return float(self.amplitude_mean.max()) / square if square > 0.0 else None
+    def __getattr__(self, name: str) -> Any:
+        """Return what each sector has, or the whole ring by them."""
+        ring = _of_ring()
+        return ring[name].formula(self) if name in ring else super().__getattr__(name)
 
     @property
     def sentence(self) -> str:
@@ -87,8 +69,9 @@ class SectorResponse:
         data: dict[str, Any] = {
             name: [None if np.isnan(value) else float(value) for value in getattr(self, name)] for name in BY_SECTOR
         }
-        return data | {name: getattr(self, name) for name in ("largest", "tuned", "sampling_error", *OF_RING)}
+        return data | {name: getattr(self, name) for name in ("largest", "tuned", "sampling_error", *_of_ring())}
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        return {f"sector_{name}": Variable(getattr(self, name), ("sector",), unit) for name, unit in BY_SECTOR.items()}
+
+def _of_ring() -> dict[str, Quantity]:
+    """Return the quantities of the whole ring, by those of its sectors."""
+    return {one.name: one for one in family("sectors") if not one.dims}

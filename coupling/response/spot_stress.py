@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.quantities.stress import LINEAR, MEASURES, SCALARS
 from vanedamp.files.store import Variable
 from vanedamp.rom.recovery import COMPONENTS
 
-#: stresses with an amplitude: the components, signed von Mises stress, and the principal stress of largest magnitude
-SCALARS = ("von_mises", "principal")
-MEASURES = (*COMPONENTS, *SCALARS)
-#: linear curves that a stress is compared with: without bodies, and with every body fixed to its floor
-LINEAR = ("undamped", "fixed")
+__all__ = ["LINEAR", "MEASURES", "SCALARS", "SpotStress", "named", "stress_axes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,24 +119,3 @@ def stress_axes(names: Sequence[str]) -> dict[str, Variable]:
         "hot_spot": Variable(np.array(list(names), object), ("hot_spot",)),
         "stress_measure": Variable(np.array(MEASURES, object), ("stress_measure",)),
     }
-
-
-def variables(spots: Sequence[SpotStress]) -> dict[str, Variable]:
-    """Return the variables of a file for the spots of a run, Pa."""
-    unknown = np.full(6, np.nan)
-    components = {
-        "stress_amplitude": [list(spot.amplitude.values()) for spot in spots],
-        "stress_mean": [spot.mean for spot in spots],
-        "stress_static": [unknown if spot.static is None else spot.static for spot in spots],
-    }
-    found = {
-        "hot_spot": Variable(np.array([spot.name for spot in spots], object), ("hot_spot",)),
-        "stress_component": Variable(np.array(COMPONENTS, object), ("stress_component",)),
-    }
-    found |= {
-        name: Variable(np.array(values, float), ("hot_spot", "stress_component"), "Pa")
-        for name, values in components.items()
-    }
-    for name in (*SCALARS, *(f"{name}_max" for name in SCALARS)):
-        found[f"stress_{name}"] = Variable(np.array([getattr(spot, name) for spot in spots]), ("hot_spot",), "Pa")
-    return found

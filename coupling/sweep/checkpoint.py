@@ -12,7 +12,8 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, width_of
+from vanedamp.coupling.sweep.row import Row
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
 
@@ -22,7 +23,7 @@ class Checkpoint(SceneCheckpoint):
 
     def __init__(self, path: str | Path | None, scene: Scene, size: int, provenance: Mapping[str, Any]) -> None:
         """Take up the file's points. Raises InputError for a file of another sweep, or one that cannot be read."""
-        self.finished = SweepTable(size, width_of(scene))
+        self.finished = SweepTable(size, Row(scene))
         super().__init__(path, "sweep-checkpoint", scene, provenance)
         if (found := self.read()) is not None:
             self._take(str(path), found[0])
@@ -49,7 +50,7 @@ class Checkpoint(SceneCheckpoint):
 
     def _take(self, path: str, variables: Mapping[str, Any]) -> None:
         values, codes, done = (variables[name] for name in ("values", "codes", "point"))
-        if len(values) != self.finished.values.shape[1]:
+        if (len(values), codes.shape[1]) != (self.finished.row.width, len(self.finished.row.texts)):
             raise InputError(
                 f"{path}: the checkpoint of another version of the software, which kept other measures; nothing was "
                 "done to it: move it away, or delete it to start again"

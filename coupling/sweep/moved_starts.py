@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.response.moved_start import Mean, as_one, moved, neighbours
-from vanedamp.coupling.sweep.further import bodies_of, sections_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.schedule import run_tasks
-from vanedamp.coupling.sweep.worker import COLUMNS, SweepTable, parts_of, width_of
+from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.coupling.system.sectors import unrolled
 
 #: measures of a second run that are kept
@@ -42,8 +42,7 @@ def with_moved_starts(grid: Grid, sweep: Sweep, executor: Executor | None) -> Sw
     base = replace(grid.base, sweep={"sections": _SECTIONS} if rows else {})
     table = _run(PointList(base, [*aside, *again], grid.choices), executor)
     found, notes = _compared(sweep, peaks, points, table)
-    values = table.values[len(peaks) :, parts_of(base)["sections"]]
-    sections = dict(sections_of(values, (len(rows),), bodies_of(base)))
+    sections = {name: values[len(peaks) :] for name, values in table.arrays((len(table.done),)).items()}
     for place, number in enumerate(rows):
         motion = (sections[name][place] for name in ("section_slip", "section_slip_velocity"))
         notes += [f"at {_named(points[number])}: {note}" for note in as_one(unrolled(scenes[number]), *motion)]
@@ -70,7 +69,7 @@ def _begun(point: Mapping[str, Any], positions: Sequence[float]) -> dict[str, An
 
 
 def _run(points: PointList, executor: Executor | None) -> SweepTable:
-    table = SweepTable(points.size, width_of(points.base))
+    table = SweepTable(points.size, Row(points.base))
     for task, rest, result in run_tasks(points, table, executor):
         table.add(task, result, bool(rest))
     return table
@@ -82,7 +81,7 @@ def _compared(
     """Return the results of the second runs, and warnings of those that do not agree with the first."""
     found, notes, status = [], [], table.text("status")
     for number, (peak, point) in enumerate(zip(peaks, points, strict=True)):
-        kept = {name: float(table.values[number, COLUMNS.index(name)]) for name in _KEPT}
+        kept = {name: float(table.row.value(table.values[number], name)) for name in _KEPT}
         one = Mean("ok", *(float(getattr(sweep, name).flat[peak]) for name in _KEPT[:2]))
         other = Mean(str(status[number]), *(kept[name] for name in _KEPT[:2]))
         agrees = one.agrees(other, 2 * sweep.scene.time.tolerance)

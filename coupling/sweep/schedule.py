@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.sweep.grid import PointSet
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.worker import (
     SweepError,
     SweepTable,
@@ -18,7 +19,6 @@ from vanedamp.coupling.sweep.worker import (
     broken,
     run_points,
     tasks_of,
-    width_of,
 )
 
 #: s that a task takes at least, unless few points are left: long enough that handing it out costs nothing
@@ -144,9 +144,9 @@ def _one_by_one(grid: PointSet, task: Task, lost: Future[TaskResult], executor: 
         error = future.exception()
         if error is not None:
             _raise_sweep_error(future)
-            if executor is not None and _handed_out(executor, width_of, grid.base).exception() is not None:
+            if executor is not None and _handed_out(executor, Row, grid.base).exception() is not None:
                 raise SweepError(f"the workers end as they begin ({error}); run the same again to go on") from error
-        results.append(future.result() if error is None else broken(error, width_of(grid.base)))
+        results.append(future.result() if error is None else broken(error, Row(grid.base)))
         state = state if results[-1].final is None else results[-1].final
     texts = [text for result in results for text in result.texts]
     return TaskResult(np.concatenate([result.values for result in results]), texts, state if task.linked else None)

@@ -15,31 +15,22 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import wall_warnings
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.further import bodies_of, exponents_of, sections_of, sectors_of, stresses_of, wear_of
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.moved_starts import with_moved_starts
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
+from vanedamp.coupling.sweep.row import TEXTS, Row
 from vanedamp.coupling.sweep.schedule import run_tasks
-from vanedamp.coupling.sweep.worker import (
-    COLUMNS,
-    IN_PLANE,
-    LOSSES,
-    MEASURES,
-    OF_A_POINT,
-    TEXTS,
-    SweepTable,
-    parts_of,
-    width_of,
-)
+from vanedamp.coupling.sweep.worker import OF_A_POINT, SweepTable
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
-from vanedamp.files.store import frozen, read_only
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
 
 #: takes the number of points of a list that are done
@@ -102,7 +93,7 @@ def run_list(
     progress: called with the number of points done; finished: takes the results as they come.
     """
     listed = PointList(base, points)
-    finished = SweepTable(listed.size, width_of(base)) if finished is None else finished
+    finished = SweepTable(listed.size, Row(base)) if finished is None else finished
     for task, rest, result in run_tasks(listed, finished, executor):
         finished.add(task, result, bool(rest))
         if progress is not None:
@@ -112,26 +103,16 @@ def run_list(
 
 def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     """Return the record of a grid whose points are all finished."""
-    columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
-    parts = {name: finished.values[:, columns] for name, columns in parts_of(grid.base).items()}
-    of_bodies = parts["in_plane"]
-    of_bodies = of_bodies.reshape(*grid.shape, len(IN_PLANE), of_bodies.shape[1] // len(IN_PLANE))
+    found = finished.arrays(grid.shape)
     return Sweep(
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
-        energy_share=read_only(finished.values[:, len(MEASURES) : len(COLUMNS)].reshape(*grid.shape, len(LOSSES))),
-        **{name: read_only(columns[name]) for name in MEASURES},
+        quantities=found,
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
-        in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
-        exponents=dict(exponents_of(parts["exponents"], grid.shape)),
-        sections=dict(sections_of(parts["sections"], grid.shape, bodies_of(grid.base))),
-        stress=dict(stresses_of(parts["stress"], grid.shape)),
-        wear=dict(wear_of(parts["wear"], grid.shape)),
-        sectors=dict(sectors_of(parts["sectors"], grid.shape)),
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
-        | warnings_in(grid, columns["penetration"])
+        | warnings_in(grid, found["penetration"])
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),
     )
@@ -177,8 +158,7 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
 
 def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
     """Return the peaks of both linear curves by the names of PEAKS."""
-    values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
-    return dict(zip(PEAKS, values, strict=True))
+    return {name: table()[name].of({"undamped_top": undamped, "fixed_top": fixed}) for name in PEAKS}
 
 
 def warm_up(scene: Scene | None = None) -> None:

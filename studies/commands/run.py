@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from vanedamp.coupling.exponents.lyapunov import lyapunov
-from vanedamp.coupling.response.response import UNITS, Response, Status
+from vanedamp.coupling.response.response import Response, Status, units
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
@@ -40,9 +40,10 @@ def run(arguments: Namespace, scene: Scene) -> None:
         response = replace(response, lyapunov=_exponents(scene, arguments.exponents, response))
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
+    of = units()
     lines = [
-        f"{name:26} {_format(value, response.amplitude_max if UNITS.get(name) == 'm' else 1.0)} "
-        f"{UNITS.get(name, '')}".rstrip()
+        f"{name:26} {_format(value, response.amplitude_max if of.get(name) == 'm' else 1.0)} "
+        f"{of.get(name, '')}".rstrip()
         for name, value in result.items()
         if not isinstance(value, dict | list)
     ]

@@ -22,8 +22,9 @@ from vanedamp.coupling.scene.scene import Continuation, Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import linear_tops, result_of
-from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, width_of
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.transient import left_over, settled_after
@@ -173,7 +174,7 @@ class Curve:
         self._grid = grid(scene)
         self._peaks = linear_tops(self._grid)
         self.size = self._grid.size
-        self._table = SweepTable(self.size, width_of(self._grid.base))
+        self._table = SweepTable(self.size, Row(self._grid.base))
         self._news, self._cancelled, self.asked = Condition(), False, time.monotonic()
         first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends belong to all its parts
         self.coarse = len(first)
@@ -214,7 +215,7 @@ class Curve:
         """Return the sweep over the frequencies that are done, with the peaks of the whole linear curves."""
         with self._news:
             done = np.flatnonzero(self._table.done)
-            part = SweepTable(len(done), self._table.values.shape[1])
+            part = SweepTable(len(done), self._table.row)
             codes = self._table.codes[done]
             part.put(slice(None), self._table.values[done].copy(), codes, self._table.texts)
         frequencies = self._grid.axes[FREQUENCY]
@@ -225,7 +226,7 @@ class Curve:
         if future.cancelled():
             return
         error = future.exception()
-        result = future.result() if error is None else broken(error, width_of(self._grid.base), len(task.points))
+        result = future.result() if error is None else broken(error, self._table.row, len(task.points))
         with self._news:
             self._table.add(task, result, False)
             self._news.notify_all()

@@ -12,8 +12,9 @@ import numpy as np
 
 from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import ListProgress, run_list
-from vanedamp.coupling.sweep.worker import SweepTable, width_of
+from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import tables
 from vanedamp.studies.optimisation.measures import counted
@@ -47,7 +48,7 @@ class Checkpoint(SceneCheckpoint):
         first, self._asked = self._asked, self._asked + len(points)
         if missing := points[len(self._runs[first : self._asked]) :]:
             known = len(points) - len(missing)
-            finished = SweepTable(len(missing), width_of(base))
+            finished = SweepTable(len(missing), Row(base))
             self._list, self._base = finished, base
 
             def told(done: int) -> None:
@@ -69,5 +70,6 @@ class Checkpoint(SceneCheckpoint):
     def _of(self, table: SweepTable) -> np.ndarray:
         """Return the columns (p, 4) of a list of runs, finished or not."""
         ok = table.text("status") == "ok" if table.count else np.zeros(len(table.done))
-        found = counted(self._base, self._table.measure, self._table.limits, table.values)
+        size = len(table.done)
+        found = counted(self._table.measure, self._table.limits, table.arrays((size,)), size)
         return np.column_stack([found, ok.astype(float)])

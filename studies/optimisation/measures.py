@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Literal
 
@@ -12,8 +13,6 @@ from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spots import Spots, spots_of
-from vanedamp.coupling.sweep.further import stresses_of, wear_of
-from vanedamp.coupling.sweep.worker import COLUMNS, parts_of
 from vanedamp.files.toml_input import STRICT, InputError, Positive
 
 Measure = Literal["amplitude_mean", "amplitude_max", "stress", "life", "wear"]
@@ -83,28 +82,27 @@ def _undamped(scene: Scene, spots: Spots) -> float:
     return float(linear["undamped"][:, MEASURES.index("von_mises")].max())
 
 
-def counted(base: Scene, measure: Measure, limits: Limits, values: np.ndarray) -> np.ndarray:
-    """Return of runs in a sweep's columns (p, c) what counts, the same without bodies, and by how much they exceed
+def counted(measure: Measure, limits: Limits, found: Mapping[str, np.ndarray], runs: int) -> np.ndarray:
+    """Return of runs, by their quantities (p, ...), what counts, the same without bodies, and by how much they exceed
     their limits (p, 3): the largest relative excess, 0 within all limits, 1 where it is not known. nan: not known.
     """  # fmt: skip
-    parts = {name: values[:, columns] for name, columns in parts_of(base).items()}
-    stress = {name: found for name, found in stresses_of(parts["stress"], (len(values),)) if found.ndim == 2}
-    largest = {name: found.max(axis=1) for name, found in stress.items()}
-    wear = dict(wear_of(parts["wear"], (len(values),))).get("wear_depth_rate", np.full(len(values), np.nan))
-    amplitude = {name: values[:, COLUMNS.index(f"{name}_dynamic")] for name in ("amplitude_mean", "amplitude_max")}
-    none = np.full(len(values), np.nan)
-    damage = largest.get("damage_per_hour", none)
-    undamped = values[:, COLUMNS.index("amplitude_undamped")]
+    none = np.full(runs, np.nan)
+
+    def largest(name: str) -> np.ndarray:
+        values = found.get(name, none)
+        return values.max(axis=tuple(range(1, values.ndim)))
+
+    damage, wear, undamped = largest("damage_per_hour"), largest("wear_depth_rate"), largest("amplitude_undamped")
     pairs = {
-        "amplitude_mean": (amplitude["amplitude_mean"], undamped),
-        "amplitude_max": (amplitude["amplitude_max"], undamped),
-        "stress": (largest.get("stress_von_mises", none), largest.get("stress_von_mises_undamped", none)),
+        "amplitude_mean": (largest("amplitude_mean_dynamic"), undamped),
+        "amplitude_max": (largest("amplitude_max_dynamic"), undamped),
+        "stress": (largest("stress_von_mises"), largest("stress_von_mises_undamped")),
         "life": (damage, none), "wear": (wear, none),
     }  # fmt: skip
     used = {
-        "amplitude": amplitude["amplitude_mean"], "stress": pairs["stress"][0],
-        "utilisation": largest.get("utilisation", none), "wear": wear,
+        "amplitude": pairs["amplitude_mean"][0], "stress": pairs["stress"][0], "utilisation": largest("utilisation"),
+        "wear": wear,
     }  # fmt: skip
     excess = [damage * limit if name == "life" else used[name] / limit for name, limit in limits.given.items()]
-    over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(len(values))
+    over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(runs)
     return np.column_stack([*pairs[measure], np.where(np.isnan(over), 1.0, over)])  # a limit is not kept unseen

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.designs import amplitude_known, is_choice
@@ -237,7 +238,7 @@ def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
     if not sweep.peaks or swept is None:
         return {}
     along = list(sweep.axes).index(swept)
-    units = {name: 1.0 if unit == "m" else hertz for name, unit in PEAKS.items()}
+    units = {name: 1.0 if table()[name].unit == "m" else hertz for name in PEAKS}
     return {name: values[point[:along] + point[along + 1 :]] / units[name] for name, values in sweep.peaks.items()}
 
 

@@ -17,6 +17,8 @@ import pytest
 pytest.importorskip("sphinx", reason="needs the extra docs")
 pytest.importorskip("myst_parser", reason="needs the extra docs")
 
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
+
 from docs._ext import commands, pages, python_api, toml_keys
 from docs._ext.fields import described
 from docs.check_site import faults
@@ -26,7 +28,6 @@ from tests.tools.schemas import shipped_schemas
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
 from vanedamp.coupling.sweep.record import PEAKS
 from vanedamp.coupling.sweep.worker import IN_PLANE, MEASURES
 from vanedamp.files.reference import options

@@ -32,7 +32,8 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed, record_with, room
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
-from vanedamp.coupling.response.figures import FIGURES, Measured, measure
+from vanedamp.coupling.quantities.sums import SUMS
+from vanedamp.coupling.response.figures import Measured, measure
 from vanedamp.coupling.response.steadiness import judged, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
 from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
@@ -55,13 +56,13 @@ class Job(NamedTuple):
     at: Annotated[np.ndarray, "numbers", int]
     codes: Annotated[np.ndarray, "k", int]  # of numerics.codes; 0: the scene has not run
     kinds: Annotated[np.ndarray, "k", int]  # classes of motion (response.figures)
-    figures: Annotated[np.ndarray, "k figures"]
+    sums: Annotated[np.ndarray, "k sums"]
     peaks: Annotated[np.ndarray, "periods"]  # room to judge a run
 
 
 def new_job(scenes: int = 0, periods: int = 0, linked: bool = False) -> Job:
     """Return the job of many scenes, of at most so many periods; or of one run that the caller judges."""
-    job = room(Job, {"numbers": 10, "k": scenes, "figures": len(FIGURES), "periods": periods})
+    job = room(Job, {"numbers": 10, "k": scenes, "sums": len(SUMS), "periods": periods})
     job.at[COUNT], job.at[LINKED] = scenes, linked
     return job
 
@@ -147,7 +148,7 @@ def _end(job, setup, free, stuck, measured, rec, done, code):
             return False
     k, first = at[PLACE], min(at[DROPPED], max(done - 1, 0))
     job.codes[k] = code
-    job.kinds[k] = measure(measured, rec, first, done, confidence, job.figures[k])
+    job.kinds[k] = measure(measured, rec, first, done, confidence, job.sums[k])
     return True
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.further import section_width
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.terminal import duration
@@ -56,7 +56,7 @@ def check_sweep(scene: Scene, workers: int) -> None:
             f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
-    needed = _SAMPLE * section_width(scene) * points
+    needed = _SAMPLE * Row(scene).width * points * ("sections" in scene.kept)
     if needed > MOST_BYTES:
         raise InputError(
             f"sweep.sections: those of {points} points need {_amount(needed)}; at most {_amount(MOST_BYTES)}"

@@ -10,7 +10,7 @@ from itertools import islice
 
 from vanedamp.coupling.ensembles.ensemble import ensemble
 from vanedamp.coupling.ensembles.members import members
-from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, Ensemble
+from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.files.checkpoint_file import clear
@@ -68,6 +68,6 @@ def run_ensemble(arguments: Namespace, scene: Scene) -> None:
 def _at_one_frequency(result: Ensemble) -> Iterator[str]:
     yield f"{'':26} {'5 %':>12} {'25 %':>12} {'50 %':>12} {'75 %':>12} {'95 %':>12}"
     for name, values in result.quantile.items():
-        unit = (AT_POINTS | OF_CURVES)[name]
+        unit = spreads()[name].unit
         unit = "" if unit == "1" else unit
         yield f"{name:26} {' '.join(f'{value:12.6g}' for value in values.tolist())} {unit}".rstrip()

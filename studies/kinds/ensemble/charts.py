@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.ensembles.design import INDICES
-from vanedamp.coupling.ensembles.record import OF_CURVES, Ensemble
+from vanedamp.coupling.ensembles.record import REDUCTION, Ensemble, spreads
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
@@ -100,7 +100,8 @@ def indices_figure(record: Ensemble, place: Place) -> go.Figure:
 
 def bar_names(record: Ensemble) -> list[str]:
     """Return the results of a curve that have indices, the reduction first."""
-    return sorted((name for name in OF_CURVES if name in record.indices), key=lambda name: name != "reduction")
+    of_curves = (name for name, one in spreads().items() if one.dims == ("curves",))
+    return sorted((name for name in of_curves if name in record.indices), key=lambda name: name != REDUCTION)
 
 
 def has_bars(record: Ensemble) -> bool:

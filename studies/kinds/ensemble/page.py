@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
-from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, Ensemble
+from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.kinds.ensemble import NAME
 from vanedamp.studies.kinds.ensemble.charts import (
@@ -82,7 +82,7 @@ def _index_rows(record: Ensemble, place: tuple[Any, ...]) -> Iterator[list[Any]]
 
 def _quantile_rows(record: Ensemble) -> Iterator[tuple[str, str, list[float]]]:
     """Yield name, unit and quantiles of the results of a single curve, at one frequency of all results."""
-    units = AT_POINTS | OF_CURVES if not record.axes else OF_CURVES
+    units = {name: one.unit for name, one in spreads().items() if not record.axes or one.dims == ("curves",)}
     for name, unit in units.items():
         if name in record.quantile and record.quantile[name].ndim == 1:
             factor = 1e6 if unit == "m" else 1.0

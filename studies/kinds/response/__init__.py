@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vanedamp.coupling.response.response import UNITS
+from vanedamp.coupling.quantities.quantity import table
+from vanedamp.coupling.response.response import units
 from vanedamp.studies.facts import Fact, Found
 from vanedamp.studies.hot_spots import plus_minus
 
@@ -12,16 +13,16 @@ NAME = "response"
 ABOUT = "the response of a scene"
 COMMANDS = ("run",)
 RECORD = "vanedamp.Response"
-_OF_RESPONSE = (
-    "status", "classification", "frequency", "amplitude_mean", "amplitude_mean_dynamic", "amplitude_max",
-    "amplitude_harmonic", "impacts_per_period", "attached_mass_fraction", "energy_residual", "periods", "transient",
-)  # fmt: skip
+_OF_RUN = ("status", "classification", "frequency", "periods", "transient")
 
 
 def facts(record: Found) -> Iterator[Fact]:
     """Yield its figures."""
-    for name in _OF_RESPONSE:
-        yield Fact(name, record.attributes.get(name), UNITS.get(name, ""))
+    of = units()
+    names = [*_OF_RUN[:3], *(name for name, one in table().items() if not one.dims), *_OF_RUN[3:]]
+    for name in names:
+        if name in record.attributes or name in _OF_RUN:
+            yield Fact(name, record.attributes.get(name), of.get(name, ""))
     for name, spot in record.attributes.get("stress", {}).items():
         share = spot["strength_fraction"]
         level = "" if share is None else f"{share:.3g} of the fatigue strength"

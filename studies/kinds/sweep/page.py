@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
-from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.kinds.sweep import NAME
 from vanedamp.studies.kinds.sweep.bifurcations import MOST_PANELS as PANELS
 from vanedamp.studies.kinds.sweep.bifurcations import (

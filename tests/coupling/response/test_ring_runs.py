@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from vanedamp.coupling.sweep.further import sectors_of
 
 from tests.reference.comparison import follow
 from tests.tools.rings import Chain
@@ -11,7 +12,6 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.further import sectors_of
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_peaks

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import xarray
+from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
 
 from tests.tools.sweep_processes import DATA, scene
 from vanedamp.coupling.derivatives.passage import PassageStatus
@@ -14,7 +15,6 @@ from vanedamp.coupling.exponents import lyapunov as module
 from vanedamp.coupling.exponents.lyapunov import lyapunov
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import parts_of, width_of

@@ -1,0 +1,80 @@
+"""Amplitudes of the displacement at `excitation.at`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.quantities.quantity import quantity
+
+ORDER = 10
+
+
+@quantity("m", spread=True)
+def amplitude_max(peak: Any) -> Any:
+    """largest displacement, without its sign, at `excitation.at`"""
+    return peak
+
+
+@quantity("m", spread=True)
+def amplitude_mean(peaks: Any, periods: Any) -> Any:
+    """mean of the largest displacements of the periods"""
+    return peaks / periods
+
+
+@quantity("m")
+def amplitude_mean_confidence(confidence: Any) -> Any:
+    """half width of the 95 % confidence interval of that mean; unknown if there are too few periods"""
+    return confidence
+
+
+@quantity("m")
+def static_deflection(static: Any) -> Any:
+    """displacement that static loads of the bodies hold, their weight or centrifugal pull: the mean position of the
+    motion; 0 without such loads"""
+    return static
+
+
+@quantity("m")
+def amplitude_max_dynamic(distance: Any) -> Any:
+    """largest distance from the static deflection"""
+    return distance
+
+
+@quantity("m", spread=True)
+def amplitude_mean_dynamic(distances: Any, periods: Any) -> Any:
+    """mean of the periods' largest distances from the static deflection, to be compared with linear amplitudes"""
+    return distances / periods
+
+
+@quantity("m")
+def amplitude_rms(square: Any, periods: Any, period: Any) -> Any:
+    """root mean square of the displacement"""
+    return np.sqrt(np.maximum(square / (periods * period), 0.0))
+
+
+@quantity("m")
+def amplitude_harmonic(harmonic: Any, periods: Any, period: Any) -> Any:
+    """amplitude X of its part X sin(2 pi f t + phase) at the excitation's frequency, order 1"""
+    wave = 2.0 / (periods * period) * harmonic
+    return np.hypot(wave.real, wave.imag)
+
+
+@quantity("rad")
+def phase(harmonic: Any, periods: Any, period: Any) -> Any:
+    """phase of that part"""
+    wave = 2.0 / (periods * period) * harmonic
+    return np.arctan2(wave.real, 0.0 - wave.imag)  # 0.0 - x is no -0.0
+
+
+@quantity("m", spread=True)
+def amplitude_undamped(undamped: Any) -> Any:
+    """amplitude of the linear structure without bodies, from the static deflection; unknown under noise"""
+    return undamped
+
+
+@quantity("m", spread=True)
+def amplitude_fixed(fixed: Any) -> Any:
+    """the same with every body fixed in its cavity"""
+    return fixed

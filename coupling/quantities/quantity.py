@@ -1,0 +1,125 @@
+"""Quantities, and the table of all of them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.files.extensions import ExtensionPoint
+
+FAMILIES = ExtensionPoint(
+    "family of quantities", "vanedamp.coupling.quantities", "vanedamp.quantities", ()
+)  # fmt: skip
+
+
+class Quantity(NamedTuple):
+    """What a motion has.
+
+    unit: "1" without; dims: names of its own dimensions; about: the sentence; formula: of what it needs; text: whether
+    it is a word; spread: whether ensembles tell how it spreads, over hot spots that of the worst; limited: whether its
+    largest value along a curve counts, such as of wear; family: the file.
+    """
+
+    name: str
+    unit: str
+    dims: tuple[str, ...]
+    about: str
+    formula: Callable[..., Any]
+    text: bool = False
+    spread: bool = False
+    limited: bool = False
+    family: str = ""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of what the formula takes."""
+        return _arguments(self.formula)
+
+    @property
+    def dtype(self) -> type:
+        """Type of its arrays."""
+        return object if self.text else float
+
+    def exists(self, sources: Iterable[str]) -> bool:
+        """Whether all that it needs is among some names."""
+        return set(self.needs).issubset(sources)
+
+    def of(self, sources: Mapping[str, Any]) -> Any:
+        """Return its value; None where something that it needs is None."""
+        given = {name: sources[name] for name in self.needs}
+        return None if any(value is None for value in given.values()) else self.formula(**given)
+
+
+@cache
+def _arguments(formula: Callable[..., Any]) -> tuple[str, ...]:
+    return tuple(inspect.signature(formula).parameters)
+
+
+def quantity(
+    unit: str = "1", dims: tuple[str, ...] = (), text: bool = False, spread: bool = False, limited: bool = False
+) -> Callable[[Callable[..., Any]], Quantity]:  # fmt: skip
+    """Make a function the quantity of its name; arguments as in Quantity."""
+
+    def made(formula: Callable[..., Any]) -> Quantity:
+        about = " ".join((formula.__doc__ or "").split())
+        return Quantity(formula.__name__, unit, dims, about, formula, text, spread, limited)
+
+    return made
+
+
+@cache
+def table() -> Mapping[str, Quantity]:
+    """Return all quantities by name, family by family."""
+    found: dict[str, Quantity] = {}
+    for name, module in FAMILIES.all().items():
+        for one in _declared(module):
+            if one.name in found:
+                raise ValueError(f"{module.__name__}: there is a quantity {one.name} in {found[one.name].family}")
+            found[one.name] = one._replace(family=name)
+    return found
+
+
+def _declared(module: Any) -> Iterator[Quantity]:
+    """Yield the quantities of a module, and those in its lists."""
+    for value in vars(module).values():
+        if isinstance(value, Quantity):
+            yield value
+        elif isinstance(value, list):
+            yield from (one for one in value if isinstance(one, Quantity))
+
+
+def family(name: str) -> list[Quantity]:
+    """Return the quantities of a family."""
+    return [one for one in table().values() if one.family == name]
+
+
+def evaluated(sources: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all quantities that some sources have."""
+    with np.errstate(all="ignore"):
+        return {name: one.of(sources) for name, one in table().items() if one.exists(sources)}
+
+
+def labels(dim: str) -> tuple[str, ...]:
+    """Return the names along a dimension that are the same for all scenes; empty for other dimensions."""
+    return next((module.LABELS[dim] for module in FAMILIES.all().values() if dim in getattr(module, "LABELS", {})), ())
+
+
+class Measured:
+    """Base of records with `quantities`: an attribute each, and each family as a mapping."""
+
+    quantities: Mapping[str, Any]
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and name != "quantities":
+            if name in self.quantities:
+                return self.quantities[name]
+            if name in FAMILIES.own() or any(one.family == name for one in table().values()):
+                return {one.name: self.quantities[one.name] for one in family(name) if one.name in self.quantities}
+        raise AttributeError(f"{type(self).__name__} has no {name}", name=name, obj=self)
+
+    def __dir__(self) -> Iterable[str]:
+        return [*super().__dir__(), *self.quantities]
