@@ -311,7 +311,7 @@ class Response(Measured, Record, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        own = self.derived()
+        own = {name: value for name, value in self.derived().items() if name not in self._plain}
         for name in own.keys() & {"wear", "contact_strength"}:
             own[name] = json.dumps(own[name])
         own |= {name: value for name, value in self._plain.items() if value is not None}

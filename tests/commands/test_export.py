@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
+from tests.tools import changed as other
 from tests.tools.input_files import BLOCK, SCENE, changed, rom_scene
 from tests.tools.op2_file import write_op2
 from tests.tools.random_scenes import random_reduced
@@ -298,7 +299,7 @@ def test_points_without_figures_keep_their_status(results, tmp_path):
     sweep = vd.Sweep.load(results / "sweep.h5")
     status, mean = sweep.status.copy(), sweep.amplitude_mean.copy()
     status[0, 1], mean[0, 1] = "error: broken, oh", np.nan
-    assert vd.export(replace(sweep, status=status, amplitude_mean=mean), tmp_path / "sweep.csv") == ()
+    assert vd.export(other.changed(sweep, status=status, amplitude_mean=mean), tmp_path / "sweep.csv") == ()
     table = pandas.read_csv(tmp_path / "sweep.csv")
     assert table["status"][1] == "error: broken, oh"
     assert np.isnan(table["amplitude_mean [m]"][1])
@@ -423,7 +424,7 @@ def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_
     place = [0] * mean.ndim
     place[list(sweep.axes).index("excitation.frequency")] = 1
     mean[tuple(place)] = np.nan
-    told, *_ = vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
+    told, *_ = vd.export(other.changed(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
     assert told == "left out: 1 points of curves without a figure"
     curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
     frequencies = sweep.axes["excitation.frequency"]
