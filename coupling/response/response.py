@@ -28,6 +28,11 @@ from vanedamp.rom.recovery import COMPONENTS
 _NESTED = ("wear", "contact_strength", "stress", "strength", "sectors")
 
 
+#: what runs do not have, and why
+_CURVE = "a run has one frequency; the curve of a sweep has peaks"
+NOT_IN_RUNS = {"undamped_top": _CURVE, "fixed_top": _CURVE}
+
+
 class Status(StrEnum):
     """How a run ended. Without `ok` the results cover only the periods that were completed."""
 

@@ -17,6 +17,8 @@ from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file, ring_
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.store import read_only
 
+#: what sweeps do not have, and why
+NOT_IN_SWEEPS: dict[str, str] = {}
 #: texts of every point
 TEXTS = ("status", "classification")
 _SECTION = "section"
