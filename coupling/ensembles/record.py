@@ -25,9 +25,10 @@ _NAMED = 3
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
 #: what ensembles do not have, and why
 _ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
+_PEAK = "the peak without bodies is in `reduction`, others are not kept"
 NOT_IN_ENSEMBLES = {
-    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY,
-    "undamped_top": "the peak without bodies is in `reduction`, others are not kept", "fixed_top": "counted in `reduction`, not kept",
+    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
+    "fixed_top": _PEAK,
 }  # fmt: skip
 #: dimensions over which the largest is kept
 _REDUCED = {"damper", "hot_spot", "sector"}

@@ -1,4 +1,4 @@
-"""Tables of quantities, from the code: `{quantities}` says what each is, `{quantities-by-kind}` which results have it."""
+"""Tables of quantities, from the code: `{quantities}`, what each is; `{quantities-by-kind}`, which results have it."""
 
 from __future__ import annotations
 
