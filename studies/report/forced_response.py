@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import table
+from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
+from vanedamp.coupling.quantities.in_plane import wall_impacts
+from vanedamp.coupling.quantities.quantity import Measured, table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.designs import amplitude_known, is_choice
@@ -39,7 +41,7 @@ class LinearCurves(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ForcedResponse:
+class ForcedResponse(Measured):
     """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
 
     reference          divisor of amplitudes in charts: the maximum without bodies over the range
@@ -47,9 +49,7 @@ class ForcedResponse:
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks, from the static
                        deflection under the bodies' loads, which linear amplitudes leave out, too
     confidence         half width of the 95 % confidence interval of that mean, nan where it is not known
-    energy_share       (n, 4) of viscous, friction, impact and contact loss
-    in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
-                       bodies in the plane
+    quantities         (n, ...) all quantities of the sweep, attributes as well
     headline           results and sentence of the curve
     onset_of           impacts whose first place is the onset
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
@@ -69,10 +69,7 @@ class ForcedResponse:
     damped_max: np.ndarray
     damped_mean: np.ndarray
     confidence: np.ndarray
-    attached_mass_fraction: np.ndarray
-    impacts_per_period: np.ndarray
-    energy_share: np.ndarray
-    in_plane: Mapping[str, np.ndarray]
+    quantities: Mapping[str, np.ndarray]
     headline: Headline
     hertz: float = math.nan
     onset_of: str = "impacts on walls"
@@ -158,18 +155,20 @@ def response_along(
     damped = {
         "damped_max": sweep.amplitude_max_dynamic, "damped_mean": sweep.amplitude_mean_dynamic,
         "confidence": sweep.amplitude_mean_confidence,
-        "impacts_per_period": sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
     }  # fmt: skip
     cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
     x = sweep.axes[axis][point[list(sweep.axes).index(axis)]]
     undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
     swept, hertz = resonance_axis(sweep.scene, sweep.axes)
     tops = peaks_of(sweep, point) if axis == swept else {}
-    in_plane = {key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()}
-    impacts = cut["impacts_per_period"]
-    known = in_plane.get("wall_impacts")
+    numbers = {name: values for name, values in sweep.quantities.items() if values.dtype != object}
+    quantities = {
+        name: frozen(np.where(ok.reshape(-1, *(1 for _ in values.shape[len(sweep.shape) :])), values[point], np.nan))
+        for name, values in numbers.items()
+    }
+    impacts, known = quantities[impacts_per_period.name], quantities.get(wall_impacts.name)
     counted = known is not None and not np.isnan(known[ok]).any()
-    alone = not in_plane and len({damper.cavity for damper in sweep.scene.damper}) == len(sweep.scene.damper)
+    alone = not sweep.in_plane and len({damper.cavity for damper in sweep.scene.damper}) == len(sweep.scene.damper)
     walls = known.sum(axis=1) if counted and known is not None else impacts
     return ForcedResponse(
         name=name,
@@ -179,11 +178,10 @@ def response_along(
         reference=reference_of(undamped, tops),
         undamped=undamped,
         fixed=fixed,
-        energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
-        in_plane=in_plane,
+        quantities=quantities,
         headline=headline(
-            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], walls, impacts, undamped, fixed,
-            tops, axis == swept,
+            x, cut["damped_mean"], cut["damped_max"], quantities[attached_mass_fraction.name], walls, impacts, undamped,
+            fixed, tops, axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
         onset_of="impacts on walls" if counted or alone else "impacts of any kind",

@@ -11,6 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from vanedamp.coupling.quantities import in_plane
 from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
@@ -20,7 +21,8 @@ _SHARED = "#475569"  # linear curves of several responses
 _PANELS, _PANEL_HEIGHT = 3, 260  # energy panels side by side; height of one, px
 #: measures of planar bodies: name, factor, and hover text of a value
 _IN_PLANE = (
-    ("tilt_max", 1e3, "%{y:.4g} mrad"), ("lift_share", 1.0, "%{y:.3f}"), ("linearisation", 100.0, "%{y:.2g} %"),
+    (in_plane.tilt_max.name, 1e3, "%{y:.4g} mrad"), (in_plane.lift_share.name, 1.0, "%{y:.3f}"),
+    (in_plane.linearisation.name, 100.0, "%{y:.2g} %"),
 )  # fmt: skip
 _TITLE_WIDTH = 110  # characters of titles side by side
 #: smallest jump over the reference, and over the steps of the curve around it
@@ -234,8 +236,8 @@ def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
     """Return numbers, from 0, and names of the planar bodies of a response."""
     if not response.in_plane:
         return []
-    extended = np.flatnonzero(np.isfinite(response.in_plane["tilt_max"]).any(axis=0)).tolist()
-    several = response.in_plane["tilt_max"].shape[1] > 1
+    extended = np.flatnonzero(np.isfinite(response.tilt_max).any(axis=0)).tolist()
+    several = response.tilt_max.shape[1] > 1
     return [(body, f"{response.name}, body {body + 1}" if several else response.name) for body in extended]
 
 

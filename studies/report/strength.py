@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.quantities.quantity import Quantity, table
+from vanedamp.coupling.quantities.stress import LINEAR, MEASURES
+from vanedamp.coupling.quantities.stress import utilisation as of_strength
+from vanedamp.coupling.quantities.stress import von_mises as stress_of
 from vanedamp.coupling.response.contact_work import contact_name
-from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.strength.assessment import fatigue_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
@@ -64,10 +67,10 @@ def _spot(name: str, facts: Mapping[str, Any], found: Mapping[str, Any]) -> dict
 
 
 def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return charts of stress, damage and wear along the axis of a sweep's resonance, or its first.
+    """Return charts of stress, damage, wear and the like along the axis of a sweep's resonance, or its first.
 
     Other axes are held at their values of the worst point, which `held` names. It has the highest utilisation, or
-    without a strength the highest stress, or without stress the fastest wear.
+    without a strength the highest stress, or without stress the most of another limited quantity.
     """
     axis = resonance_axis(sweep.scene, sweep.axes)[0] or next(iter(sweep.axes))
     *point, spot = _worst(sweep)
@@ -82,26 +85,30 @@ def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
         rows = ([spot, *row] for spot, own in curves.items() for row in zip(x, *own.values(), strict=True))
         figure = dressed(stress_figure(x, title, curves), height=460)
         shown["charts"].append(page.chart("stress", figure, ("hot_spot", axis, *CURVES), rows, [file]))
-        used, highest = (float(sweep.stress[name][(*point, spot)]) for name in ("utilisation", "stress_von_mises"))
+        at = (*point, spot)
+        used, highest = (float(sweep.quantities[one.name][at]) for one in (of_strength, stress_of))
         if np.isfinite(highest):
             spots = list(sweep.hot_spots)
             shown["worst"] = {
                 "at": float(x[places[axis]]), "spot": spots[spot], "utilisation": used, "stress": highest,
             }  # fmt: skip
-    quantities = {
-        "damage per hour, 1/h": sweep.stress.get("damage_per_hour"),
-        "depth of wear, nm/h": 1e9 * sweep.wear["wear_depth_rate"] if sweep.wear else None,
-    }
-    for place, (label, values) in enumerate(quantities.items()):
-        if values is None or not np.isfinite(values[line]).any():
+    for one in limited(sweep):
+        values = sweep.quantities[one.name][line]
+        if not np.isfinite(values).any():
             continue
-        own = np.reshape(values[line], (len(x), -1))
-        names = list(sweep.hot_spots) if place == 0 else ["fastest contact"]
+        own, words = np.reshape(values, (len(x), -1)), one.name.replace("_", " ")
+        names = list(sweep.hot_spots) if one.dims else [words]
+        label = f"{words}, {one.unit}".removesuffix(", 1")
         figure = dressed(lines_figure(x, title, own, names, label), height=360)
         rows = ([name, *row] for name, column in zip(names, own.T, strict=True) for row in zip(x, column, strict=True))
-        kind, column = ("damage", "damage_per_hour") if place == 0 else ("wear", "depth_rate")
-        shown["charts"].append(page.chart(kind, figure, ("of", axis, column), rows, [file]))
+        shown["charts"].append(page.chart(one.name, figure, ("of", axis, one.name), rows, [file]))
     return shown
+
+
+def limited(sweep: Sweep) -> list[Quantity]:
+    """Return the quantities of a sweep that are limited, but the stress that has a chart with its linear curves."""
+    found = (one for name, one in table().items() if name in sweep.quantities)
+    return [one for one in found if one.limited and one.name != stress_of.name]
 
 
 def course_chart(
@@ -132,14 +139,16 @@ def _largest(x: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def _curves(stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
     """Return the curves of a figure of stress, by hot spot and name of the curve, of stresses (n, spots)."""
-    names = dict(zip(CURVES, ("stress_von_mises", "stress_von_mises_undamped", "stress_von_mises_fixed"), strict=True))
+    own = (stress_of.name, *(f"{stress_of.name}_{curve}" for curve in LINEAR))
+    names = dict(zip(CURVES, own, strict=True))
     return {spot: {curve: stress[name][:, place] for curve, name in names.items()} for place, spot in enumerate(spots)}
 
 
 def _worst(sweep: Sweep) -> tuple[int, ...]:
     """Return the place in its grid, and the hot spot, that a sweep uses most; zeros without a run that is known."""
-    measures = [sweep.stress[name] for name in ("utilisation", "stress_von_mises") if sweep.stress]
-    measures += [sweep.wear["wear_depth_rate"][..., None]] if sweep.wear else []
+    first = (of_strength.name, stress_of.name, *(one.name for one in limited(sweep)))
+    measures = [sweep.quantities[name] for name in first if name in sweep.quantities]
+    measures = [each.reshape(*sweep.shape, -1) for each in measures]
     measure = next((each for each in measures if np.isfinite(each).any()), np.zeros((*sweep.shape, 1)))
     return tuple(int(place) for place in np.unravel_index(int(np.nanargmax(measure)), measure.shape))
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
 from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
@@ -52,7 +53,7 @@ from vanedamp.studies.report.map_chart import (
 from vanedamp.studies.report.page import Page, body_note, format_setting
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sector_charts import ring_shown
-from vanedamp.studies.report.strength import sweep_shown
+from vanedamp.studies.report.strength import limited, sweep_shown
 
 ORDER = 50
 KIND = NAME
@@ -63,7 +64,7 @@ _MOST_STATES = 24
 #: measures of each chart of responses
 _COLUMNS = {
     "response": ("undamped", "fixed", "damped_max", "damped_mean"),
-    "mistuning": ("attached_mass_fraction", "impacts_per_period"),
+    "mistuning": (attached_mass_fraction.name, impacts_per_period.name),
     "energy": LOSSES,
 }
 
@@ -83,7 +84,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
         "diagrams": [_diagram(file, sweep, page) for file, sweep in sweeps.items() if diagram_axis(sweep)],
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "rings": [ring_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.sectors],
-        "strength": [sweep_shown(file, sweep, page) for file, sweep in sweeps.items() if sweep.stress or sweep.wear],
+        "strength": [sweep_shown(file, sweep, page) for file, sweep in sweeps.items() if limited(sweep)],
         "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
         "warnings": list(dict.fromkeys(text for sweep in sweeps.values() for text in sweep.warnings)),
     }
