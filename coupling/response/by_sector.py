@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from vanedamp.coupling.response.evaluation import Needs, Observer, Outcome
 from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
+
+
+class Sectors(Observer):
+    """Keeps the response of the sectors of a ring, if it is one."""
+
+    def needs(self, scene: Scene, system: System) -> Needs:
+        """Return the largest values, and the impacts by contact if the method counts them."""
+        if not len(system.outputs):
+            return Needs()
+        counted = getattr(METHODS.part(scene.solver.method), "WEARS", False)
+        return Needs(outputs=True, exponent=1.0 if counted else None)
+
+    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the response of the sectors."""
+        window = slice(found["transient"], run.periods)
+        return {"sectors": response_by_sector(scene, run.system, run.records, run.rows, window)}
 
 
 def response_by_sector(

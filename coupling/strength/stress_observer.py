@@ -7,33 +7,40 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.spot_stress import LINEAR, MEASURES, SCALARS, SpotStress, named
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.strength.assessment import with_strength
 from vanedamp.coupling.strength.linear_stress import linear_stresses
+from vanedamp.coupling.strength.modal_observer import ModalObserver
 from vanedamp.coupling.strength.spot_history import SpotHistories
-from vanedamp.coupling.strength.spots import Spots
+from vanedamp.coupling.strength.spots import Spots, samples_of
 from vanedamp.coupling.strength.stress import PeriodStress, every_other, period_stress
 from vanedamp.coupling.strength.stress_spectrum import linear_moments
+from vanedamp.coupling.system.system import System
 
 #: periods of those evaluated together by which the error of sampling is measured
 _CHECKED = 8
 
 
-class StressTaker:
-    """Takes the stress of every period as coordinate_watch.CoordinateWatch hands it over."""
+class StressObserver(ModalObserver):
+    """Keeps the stress of every period; asked: samples of each that others keep."""
 
-    def __init__(self, spots: Spots) -> None:
-        self.spots, self.each = spots, 0
+    def __init__(self, spots: Spots, asked: int) -> None:
+        super().__init__(asked)
+        self.spots = spots
         self._parts: list[tuple[int, PeriodStress]] = []
         self._checked = np.zeros((2, len(spots.rows)))
         self._histories = SpotHistories(spots.materials)
 
-    def take(self, begin: int, coordinates: np.ndarray, each: int) -> None:
-        """Take periods from number `begin` on: coordinates (p each + 2, n), with a sample more at both ends."""
-        self.each, stress = each, self.spots.stress(coordinates)
+    def samples(self, scene: Scene, system: System) -> int:
+        """Return the samples of each period from which stresses are taken."""
+        return samples_of(scene, system, self.spots, self.asked)
+
+    def take(self, begin: int, coordinates: np.ndarray) -> None:
+        """Take periods (modal_observer.ModalObserver)."""
+        each, stress = self.each, self.spots.stress(coordinates)
         found = period_stress(stress, each)
         self._parts.append((begin, found))
         self._histories.add(begin * each, stress[..., 1:-1])
@@ -43,22 +50,23 @@ class StressTaker:
             for total, part in zip(self._checked, (found, halved), strict=True):
                 total += part.amplitude[:few, :, MEASURES.index("von_mises")].sum(axis=0)
 
-    def result(self, scene: Scene, response: Response) -> tuple[SpotStress, ...] | None:
-        """Return the stress over the periods evaluated; None if there is none."""
-        first = response.transient
+    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the stress over the periods evaluated."""
+        self.take_up_to(run.periods)
+        first = found["transient"]
         parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in part)) for begin, part in self._parts]
         whole = PeriodStress(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True))) if parts else None
         if whole is None or not len(whole.mean):
-            return None
+            return {}
         all_of, half = self._checked
         error = np.abs(half - all_of) / np.where(all_of > 0.0, all_of, 1.0)
-        found = spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
-        repeats, duration = response.classification != "non-periodic", len(whole.mean) / response.frequency
-        counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(found))]
+        spots = spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
+        repeats, duration = found["classification"] != "non-periodic", len(whole.mean) / scene.frequency
+        counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(spots))]
         noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
-        spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(found))]
-        materials = self.spots.materials
-        return tuple(with_strength(*each, duration) for each in zip(found, materials, counted, spectra, strict=True))
+        spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(spots))]
+        parts_of = zip(spots, self.spots.materials, counted, spectra, strict=True)
+        return {"stress": tuple(with_strength(*each, duration) for each in parts_of)}
 
 
 def spot_stresses(

@@ -1,4 +1,4 @@
-"""What looks at the modal coordinates of a run as it advances: samples that are dropped as soon as they are taken.
+"""What takes the modal coordinates of a run as it advances: samples that are dropped as soon as they are taken.
 
 Samples are many: a period takes some 100 of every mode. They are taken in the evaluated periods only, where these are
 known before, and their memory is given back.
@@ -7,17 +7,14 @@ known before, and their memory is given back.
 from __future__ import annotations
 
 import mmap
-from dataclasses import replace
+from abc import abstractmethod
 
 import numpy as np
 
 from vanedamp.coupling.engine.run import EventDrivenRun
-from vanedamp.coupling.response.evaluation import Outcome, Run
-from vanedamp.coupling.response.plane import plane_of
+from vanedamp.coupling.response.evaluation import Needs, Observer, Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.strength.spots import samples_of
-from vanedamp.coupling.strength.stress_watch import StressTaker
 from vanedamp.coupling.system.system import System
 
 #: fields of the records with a row for every sample
@@ -26,44 +23,44 @@ _SAMPLED = ("samples", "coordinates", "sampled", "shut")
 _TOGETHER = 20_000
 
 
-class CoordinateWatch:
-    """Hands the samples of every period to what takes their stress as a run advances (response.evaluation.Watch)."""
+class ModalObserver(Observer):
+    """Takes the samples of every period as a run advances; asked: of each period, how many others keep."""
 
-    def __init__(self, taker: StressTaker) -> None:
-        self.taker, self.each, self.asked = taker, 0, 0
+    def __init__(self, asked: int) -> None:
+        self.asked, self.each = asked, 0
         self._rooms: list[tuple[np.ndarray, mmap.mmap]] = []
         self._whole: Records | None = None
         self._taken, self._sampling, self._first = 0, True, -1
 
-    def samples(self, scene: Scene, system: System, asked: int) -> int:
-        """Return how many samples of each period the run keeps."""
-        self.each = samples_of(scene, system, self.taker.spots, asked)
-        self.asked = asked
-        return self.each
+    @abstractmethod
+    def samples(self, scene: Scene, system: System) -> int:
+        """Return how many samples of each period are needed, a multiple of those asked for."""
+
+    @abstractmethod
+    def take(self, begin: int, coordinates: np.ndarray) -> None:
+        """Take p periods from number `begin` on: coordinates (p each + 2, n), with a sample more at both ends."""
+
+    def needs(self, scene: Scene, system: System) -> Needs:
+        """Return the samples."""
+        self.each = self.samples(scene, system)
+        return Needs(samples=self.each)
 
     def records(self, empty: Records) -> Records:
         """Return the records with samples whose memory can be given back."""
         self._whole = empty._replace(**{name: self._room(getattr(empty, name)) for name in _SAMPLED})
         return self._whole
 
-    def __call__(self, run: Run, dropped: int | None) -> None:
+    def look(self, run: Run, dropped: int | None) -> None:
         """Take the periods done since the last call, and sample what follows if it may be evaluated."""
-        self._take(run.outcome().periods)
+        self.take_up_to(run.outcome().periods)
         assert self._whole is not None
         if isinstance(run, EventDrivenRun) and not self.asked:
             self._sampling = dropped is None or self._taken >= dropped
-            run.records = self._whole if self._sampling else _cut(self._whole, slice(0))
+            none = {name: getattr(self._whole, name)[:0] for name in _SAMPLED}
+            run.records = self._whole if self._sampling else self._whole._replace(**none)
         self._whole.coordinates[self._taken * self.each :][:1] = np.nan  # remains if a method keeps none
 
-    def close(self, outcome: Outcome) -> Outcome:
-        """Take the rest. Return the outcome with the samples that were asked for."""
-        self._take(outcome.periods)
-        records = _cut(outcome.records, slice(None, None, self.each // self.asked) if self.asked else slice(0))
-        if (plane := outcome.plane) is not None:
-            plane = plane_of(outcome.system, records, plane.bound, plane.walls)
-        return replace(outcome, records=records, plane=plane)
-
-    def _take(self, done: int) -> None:
+    def take_up_to(self, done: int) -> None:
         """Take the periods up to `done`, and give their samples back."""
         begin, self._taken = self._taken, done
         if not self._sampling or done <= begin or self._whole is None:
@@ -81,7 +78,7 @@ class CoordinateWatch:
         # the first sample has none before it where the periods before were not sampled
         before = q[max(rows.start - 1, self._first)]
         padded = np.concatenate([before[None], q[rows], q[rows][-1:]])
-        self.taker.take(begin, padded, self.each)
+        self.take(begin, padded)
         if not self.asked:
             for array, room in self._rooms:
                 _give_back(room, array.strides[0], rows.start - 1, rows.stop - 1)
@@ -94,10 +91,6 @@ class CoordinateWatch:
         array = np.frombuffer(room, like.dtype).reshape(like.shape)
         self._rooms.append((array, room))
         return array
-
-
-def _cut(records: Records, kept: slice) -> Records:
-    return records._replace(**{name: getattr(records, name)[kept] for name in _SAMPLED})
 
 
 def _give_back(room: mmap.mmap, row: int, first: int, last: int) -> None:
