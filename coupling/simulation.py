@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
-from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.methods.registry import WALLS, respond
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.response.by_sector import Sectors
-from vanedamp.coupling.response.evaluation import Observer, Outcome
+from vanedamp.coupling.response.by_sector import sectors
+from vanedamp.coupling.response.evaluation import Fields, Observer, Outcome
 from vanedamp.coupling.response.moved_start import Mean, moved
-from vanedamp.coupling.response.observers import AsOne, Events, Samples, Wear
+from vanedamp.coupling.response.observers import EVENT_LIST, TOGETHER, samples, wear
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
-from vanedamp.coupling.strength.contact_strength import ContactObserver
+from vanedamp.coupling.scene.structures import Ring
+from vanedamp.coupling.strength.contact_strength import CONTACTS
 from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.coupling.strength.stress_observer import StressObserver
 from vanedamp.files.store import frozen
@@ -45,62 +46,56 @@ def simulate(
     scene = loaded(scene)
     chosen = choose(scene)
     start = start or chosen.start
-    observers = observers_of(chosen.scene, events, samples_per_period)
-    if moved_start:
-        observers.append(MovedStart(start, progress))
     known = {"scene": scene, "estimate": chosen.estimate, "advice": chosen.advice, "warnings": chosen.warnings}
-    return respond(chosen.scene, observers, start, progress, known, started)
+    observers = [Observer(lambda *_: known), *observers_of(chosen.scene, events, samples_per_period)]
+    if moved_start:
+        observers.append(Observer(partial(_from_moved, start, progress)))
+    return respond(chosen.scene, observers, start, progress, started)
 
 
 def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0) -> list[Observer]:
     """Return what a run keeps of a scene without open choices; arguments as in `simulate`."""
     spots, pair = spots_of(scene), scene.contact.pair
     return [
-        Samples(samples_per_period),
-        *([Events()] if events else []),
-        *([] if scene.wear is None else [Wear()]),
-        Sectors(),
+        WALLS,
+        samples(samples_per_period),
+        *([EVENT_LIST] if events else []),
+        *([] if scene.wear is None else [wear(scene)]),
+        *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
         *([] if spots is None else [StressObserver(spots, samples_per_period)]),
-        *([] if pair is None or pair.radius is None else [ContactObserver()]),
-        AsOne(),
+        *([] if pair is None or pair.radius is None else [CONTACTS]),
+        TOGETHER,
     ]
 
 
-class MovedStart(Observer):
-    """Runs a second time, from bodies a little aside, and warns if the results are others.
+def _from_moved(
+    start: RestartState | None, progress: Callable[[int, int], None] | None, scene: Scene, run: Outcome, known: Fields
+) -> Fields:
+    """Return the results of a second run from bodies a little aside, and a warning if they are others.
 
-    start, progress: those of the first run.
+    None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
     """
-
-    def __init__(self, start: RestartState | None, progress: Callable[[int, int], None] | None) -> None:
-        self.start, self.progress = start, progress
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the results of the second run.
-
-        None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
-        """
-        hit = found["impacts_per_period"] or run.counters.get("impacts")  # the transient's choose a state as well
-        if found["status"] is not Status.OK or not hit or not scene.damper:
-            return {}
-        start, tolerance = self.start, 2 * scene.time.tolerance
-        places = moved(scene, scene.positions if start is None else start.slip.tolist())
-        if start is None:
-            bodies = tuple(replace(body, position=place) for body, place in zip(scene.damper, places, strict=True))
-            scene = replace(scene, damper=bodies)
-        else:
-            start = replace(start, slip=frozen(places))
-        try:
-            second = vars(respond(scene, start=start, progress=self.progress))
-        except InputError:  # a tilted body at a wall
-            return {}
-        one, other = (_mean(each) for each in (found, second))
-        agrees = one.agrees(other, tolerance)
-        names = "amplitude_mean_dynamic", "amplitude_mean_confidence", "impacts_per_period", "classification"
-        results = {"agrees": agrees, "status": other.status} | {name: second[name] for name in names}
-        return {"moved_start": results, "warnings": () if agrees else (one.sentence(other),)}
+    hit = known["impacts_per_period"] or run.counters.get("impacts")  # the transient's choose a state as well
+    if known["status"] is not Status.OK or not hit or not scene.damper:
+        return {}
+    tolerance = 2 * scene.time.tolerance
+    places = moved(scene, scene.positions if start is None else start.slip.tolist())
+    if start is None:
+        bodies = tuple(replace(body, position=place) for body, place in zip(scene.damper, places, strict=True))
+        scene = replace(scene, damper=bodies)
+    else:
+        start = replace(start, slip=frozen(places))
+    try:
+        second = vars(respond(scene, start=start, progress=progress))
+    except InputError:  # a tilted body at a wall
+        return {}
+    one, other = (_mean(each) for each in (known, second))
+    agrees = one.agrees(other, tolerance)
+    names = "amplitude_mean_dynamic", "amplitude_mean_confidence", "impacts_per_period", "classification"
+    results = {"agrees": agrees, "status": other.status} | {name: second[name] for name in names}
+    return {"moved_start": results, "warnings": () if agrees else (one.sentence(other),)}
 
 
-def _mean(found: Mapping[str, Any]) -> Mean:
+def _mean(found: Fields) -> Mean:
     confidence = found["amplitude_mean_confidence"]
     return Mean(found["status"].value, found["amplitude_mean_dynamic"], math.nan if confidence is None else confidence)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.methods import Method
-from vanedamp.coupling.response.evaluation import Observer, Run, evaluate, run_scene
+from vanedamp.coupling.response.evaluation import Needs, Observer, Run, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
@@ -32,21 +32,16 @@ def respond(
     observers: Sequence[Observer] = (),
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
-    known: Mapping[str, Any] | None = None,
     started: float | None = None,
 ) -> Response:
     """Return the response of a scene without open choices, with what some observers keep.
 
-    start, progress: as in coupling.simulation.simulate; known: further fields of the response, by name; started: when
-    its time began (time.perf_counter), if that was before.
+    start, progress: as in coupling.simulation.simulate; started: when its time began (time.perf_counter), if before.
     """
-    started = time.perf_counter() if started is None else started
+    started = started or time.perf_counter()
     run = run_of(scene, observers, start)
     ended = run_scene(run, scene, progress, observers)
-    outcome, known = run.outcome(), {"warnings": ()} | dict(known or {})
-    known["final"] = final_state(scene, run)
-    known["warnings"] += wall_warnings(scene, {}, np.array(outcome.penetration))
-    return evaluate(scene, outcome, ended, started, observers, known)
+    return evaluate(scene, run.outcome(), ended, started, observers, final_state(scene, run))
 
 
 def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.ndarray) -> tuple[str, ...]:
@@ -68,6 +63,10 @@ def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.nda
     )
 
 
+#: warns of bodies deep in rigid walls
+WALLS = Observer(lambda scene, run, _: {"warnings": wall_warnings(scene, {}, np.array(run.penetration))})
+
+
 def final_state(scene: Scene, run: Run) -> RestartState | None:
     """Return the present state of a run of a scene; None within a period, or if the method keeps none."""
     state = run.final()
@@ -87,15 +86,16 @@ def run_of(scene: Scene, observers: Sequence[Observer] = (), start: RestartState
         raise InputError(f"wear: {reason}; leave the table out")
     system = assemble(scene)
     _check_bodies(scene, system)
-    needs = [observer.needs(scene, system) for observer in observers]
+    needs = [Needs(), *(observer.begin(scene, system) for observer in observers)]
+    samples, logs, outputs, exponents = zip(*needs, strict=True)
+    scene.solver.check_samples(max(samples))
     records = new_records(
-        system, most_periods(scene), max((each.samples for each in needs), default=0),
-        isinstance(scene.structure, Rom), deflects(scene, system),
-        next((each.exponent for each in needs if each.exponent is not None), None), any(each.outputs for each in needs),
+        system, most_periods(scene), max(samples), isinstance(scene.structure, Rom), deflects(scene, system),
+        next(filter(None, exponents), None), any(outputs),
     )  # fmt: skip
     for observer in observers:
         records = observer.records(records)
-    return method.begin(scene, system, records, any(each.log for each in needs), start_of(scene, system, start))
+    return method.begin(scene, system, records, any(logs), start_of(scene, system, start))
 
 
 def _check_bodies(scene: Scene, system: System) -> None:

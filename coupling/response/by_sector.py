@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from vanedamp.coupling.response.evaluation import Needs, Observer, Outcome
-from vanedamp.coupling.response.event_log import Rows
-from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
@@ -19,26 +14,18 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 
-class Sectors(Observer):
-    """Keeps the response of the sectors of a ring, if it is one."""
-
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return the largest values, and the impacts by contact if the method counts them."""
-        if not len(system.outputs):
-            return Needs()
-        counted = getattr(METHODS.part(scene.solver.method), "WEARS", False)
-        return Needs(outputs=True, exponent=1.0 if counted else None)
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the response of the sectors."""
-        window = slice(found["transient"], run.periods)
-        return {"sectors": response_by_sector(scene, run.system, run.records, run.rows, window)}
+def sectors(scene: Scene) -> Observer:
+    """Return what keeps the response of the sectors of a ring; impacts by contact if the method counts them."""
+    counted = getattr(METHODS.part(scene.solver.method), "WEARS", False)
+    return Observer(
+        lambda scene, run, known: {"sectors": response_by_sector(scene, run, slice(known["transient"], run.periods))},
+        Needs(outputs=True, exponent=1.0 if counted else None),
+    )
 
 
-def response_by_sector(
-    scene: Scene, system: System, records: Records, rows: Rows, window: slice
-) -> SectorResponse | None:
+def response_by_sector(scene: Scene, run: Outcome, window: slice) -> SectorResponse | None:
     """Return the response of the sectors over some periods; None where a method has not noted it."""
+    system, records = run.system, run.records
     found = records.outputs[window]
     peak = found[..., 0]
     if not found.size or not np.isfinite(peak).all():
@@ -48,9 +35,8 @@ def response_by_sector(
         peak = np.maximum(peak - static, static - found[..., 1])
     undamped, fixed = _linear(scene, system)
     return SectorResponse(
-        peak.mean(axis=0), peak.max(axis=0), undamped, fixed, _impacts(scene, system, records, rows, window),
-        tuned=_tuned(scene),
-    )  # fmt: skip
+        peak.mean(axis=0), peak.max(axis=0), undamped, fixed, _impacts(scene, run, window), tuned=_tuned(scene)
+    )
 
 
 def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
@@ -62,9 +48,10 @@ def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
     return free, fixed
 
 
-def _impacts(scene: Scene, system: System, records: Records, rows: Rows, window: slice) -> np.ndarray:
+def _impacts(scene: Scene, run: Outcome, window: slice) -> np.ndarray:
     """Return the impacts per period (N,) of the bodies in each sector; nan if they are not counted."""
-    hits, found = records.hits[window], np.zeros(len(system.outputs))
+    system, hits, rows = run.system, run.records.hits[window], run.rows
+    found = np.zeros(len(system.outputs))
     if not hits.shape[1]:
         return found * np.nan
     owner, counts = sectors_of_bodies(scene, system), hits.mean(axis=0)

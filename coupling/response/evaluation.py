@@ -55,6 +55,10 @@ STATUS_OF = {
 }
 
 
+#: fields of a response, by name
+Fields = Mapping[str, Any]
+
+
 class Run(Protocol):
     """A run of any method that can be continued."""
 
@@ -101,15 +105,23 @@ class Needs(NamedTuple):
     exponent: float | None = None
 
 
-class Observer:
-    """One thing that a run keeps beside its sums, asked for before it begins. It serves one run.
+_NOTHING = Needs()
 
-    This one asks for nothing, and tells nothing: others say what differs.
+
+@dataclass
+class Observer:
+    """One thing that a run keeps beside its sums, asked for before it begins.
+
+    fields: returns fields of the response of a run that has ended, by name, from its scene, its outcome and the fields
+    known before; `warnings` are added to those. needs: what the run has to record.
     """
 
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return what the run has to record. Raises InputError for what its method cannot."""
-        return Needs()
+    fields: Callable[[Scene, Outcome, Fields], Fields]
+    needs: Needs = _NOTHING
+
+    def begin(self, scene: Scene, system: System) -> Needs:
+        """Return what a run of a scene has to record."""
+        return self.needs
 
     def records(self, empty: Records) -> Records:
         """Return the records to which the run writes."""
@@ -117,13 +129,6 @@ class Observer:
 
     def look(self, run: Run, dropped: int | None) -> None:
         """Look at a run before it goes on; dropped: periods that will be left out, None if that is open."""
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return fields of the response of a run that has ended, by name; `warnings` are added to those before.
-
-        found: the fields known so far, without those of later observers.
-        """
-        return {}
 
 
 class Ended(NamedTuple):
@@ -203,22 +208,15 @@ def _run_until_known(
 
 
 def evaluate(
-    scene: Scene,
-    run: Outcome,
-    ended: Ended,
-    started: float,
-    observers: Sequence[Observer] = (),
-    known: Mapping[str, Any] | None = None,
-) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter), with what its observers have kept.
-
-    known: further fields, by name.
-    """
-    found = {"warnings": ()} | _sums(scene, run, ended) | dict(known or {})
+    scene: Scene, run: Outcome, ended: Ended, started: float, observers: Sequence[Observer] = (),
+    final: RestartState | None = None,
+) -> Response:  # fmt: skip
+    """Return the response of a run that began at `started` (time.perf_counter), with what its observers have kept."""
+    found = _sums(scene, run, ended)
     for observer in observers:
         more = observer.fields(scene, run, found)
-        found |= more | {"warnings": (*found["warnings"], *more.get("warnings", ()))}
-    return Response(**found, wall_time_s=time.perf_counter() - started)
+        found |= {**more, "warnings": (*found["warnings"], *more.get("warnings", ()))}
+    return Response(**found, final=final, wall_time_s=time.perf_counter() - started)
 
 
 def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
@@ -244,8 +242,8 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
         "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
         "energy": energy, "periods": done, "transient": first, "counters": run.counters,
         "penetration": run.penetration, "peak": records.peak[:done].copy(), "section": section[:, :2].copy(),
-        "slip": section[:, 3 : 3 + b].copy(), "slip_velocity": section[:, 3 + b :].copy(), "event_list": [],
-        "time": np.zeros(0), "displacement": np.zeros(0), "body_displacement": np.zeros((0, b)),
+        "slip": section[:, 3 : 3 + b].copy(), "slip_velocity": section[:, 3 + b :].copy(), "warnings": (),
+        "event_list": [], "time": np.zeros(0), "displacement": np.zeros(0), "body_displacement": np.zeros((0, b)),
     }  # fmt: skip
 
 

@@ -2,88 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.response.contact_work import ContactWork
-from vanedamp.coupling.response.evaluation import Needs, Observer, Outcome
+from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome
 from vanedamp.coupling.response.event_log import events_of, impact_energies
 from vanedamp.coupling.response.moved_start import as_one
 from vanedamp.coupling.response.plane import planar_samples
 from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
 
 
-class Samples(Observer):
-    """Keeps `each` equidistant samples of every period; 0: none."""
-
-    def __init__(self, each: int) -> None:
-        self.each = each
-
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return the samples. Raises InputError for a number that steps do not meet."""
-        scene.solver.check_samples(self.each)
-        return Needs(samples=self.each)
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return times, displacements, modal coordinates if the method keeps any, and what bodies do in the plane."""
-        if not self.each:
-            return {}
-        system, records, count = run.system, run.records, run.periods * self.each
-        each = records.samples_per_period  # others may need more
-        kept = slice(None, run.periods * each, each // self.each)
-        samples, coordinates, x = records.samples[kept], records.coordinates[kept], records.samples[kept, 0].copy()
-        made: dict[str, Any] = {
-            "time": np.arange(count) * (system.period / self.each), "displacement": x,
-            "body_displacement": samples[:, 1:].copy(),
-        }  # fmt: skip
-        if coordinates.size and np.all(np.isfinite(coordinates)):
-            made["coordinates"] = coordinates.copy()
-        if run.plane is not None:
-            made["in_plane"] = planar_samples(system, x, records.sampled[kept], records.shut[kept])
-        return made
+def samples(each: int) -> Observer:
+    """Return what keeps equidistant samples of every period: displacements, modal coordinates if the method has any."""
+    return Observer(partial(_samples, each), Needs(samples=each))
 
 
-class Events(Observer):
-    """Keeps the list of events."""
-
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return the log."""
-        return Needs(log=True)
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the list."""
-        return {"event_list": events_of(run.rows, run.log)}
-
-
-class Wear(Observer):
-    """Keeps the work of the contacts of a scene with [wear], exact engine, and their wear."""
-
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return the sums by contact, and the log where contacts yield: the energies of their impacts are in it."""
-        assert scene.wear is not None
-        return Needs(log=scene.yields, exponent=scene.wear.impact_exponent)
-
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return work and wear, and a warning if it does not fit the friction work of the energy balance."""
-        work = _contact_work(scene, run, found["transient"])
-        if not work or not len(work[0].course):
-            return {"contact_work": work}
-        warnings = ledger_warning(work, found["energy"]["friction"])
-        return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": warnings}
+def _samples(kept: int, scene: Scene, run: Outcome, known: Fields) -> Fields:
+    if not kept:
+        return {}
+    records, each = run.records, run.records.samples_per_period  # others may need more
+    rows = slice(None, run.periods * each, each // kept)
+    taken, coordinates, x = records.samples[rows], records.coordinates[rows], records.samples[rows, 0].copy()
+    time = np.arange(len(x)) * (run.system.period / kept)
+    made: dict[str, Any] = {"time": time, "displacement": x, "body_displacement": taken[:, 1:].copy()}
+    if coordinates.size and np.all(np.isfinite(coordinates)):
+        made["coordinates"] = coordinates.copy()
+    if run.plane is not None:
+        made["in_plane"] = planar_samples(run.system, x, records.sampled[rows], records.shut[rows])
+    return made
 
 
-class AsOne(Observer):
-    """Warns of neighbours that move as one."""
+def wear(scene: Scene) -> Observer:
+    """Return what keeps the work of the contacts of a scene with [wear], exact engine, and their wear."""
+    assert scene.wear is not None
+    # the energies of impacts on contacts that yield are in the log
+    return Observer(_worn, Needs(log=scene.yields, exponent=scene.wear.impact_exponent))
 
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the warning."""
-        if not found["impacts_per_period"]:
-            return {}
-        return {"warnings": as_one(scene, *(found[name][found["transient"] :] for name in ("slip", "slip_velocity")))}
+
+def _worn(scene: Scene, run: Outcome, known: Fields) -> Fields:
+    work = _contact_work(scene, run, known["transient"])
+    if not work or not len(work[0].course):
+        return {"contact_work": work}
+    warnings = ledger_warning(work, known["energy"]["friction"])
+    return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": warnings}
+
+
+def _together(scene: Scene, run: Outcome, known: Fields) -> Fields:
+    if not known["impacts_per_period"]:
+        return {}
+    return {"warnings": as_one(scene, *(known[name][known["transient"] :] for name in ("slip", "slip_velocity")))}
+
+
+#: keeps the list of events
+EVENT_LIST = Observer(lambda _, run, known: {"event_list": events_of(run.rows, run.log)}, Needs(log=True))
+#: warns of neighbours that move as one
+TOGETHER = Observer(_together)
 
 
 def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:

@@ -7,20 +7,19 @@ factor of the spring's and dashpot's pulse, which is exact for isolated collisio
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.contacts.collision import collision
 from vanedamp.coupling.contacts.hertz import Contact
 from vanedamp.coupling.response.contact_strength import ContactStrength
-from vanedamp.coupling.response.evaluation import Needs, Observer, Outcome
+from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome
 from vanedamp.coupling.response.event_log import entries_of
 from vanedamp.coupling.response.records import DETACHES, IMPACT
 from vanedamp.coupling.scene.contact_laws.compliant import peak_over_mean
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
 
 
 class Impacts(NamedTuple):
@@ -38,36 +37,32 @@ class Impacts(NamedTuple):
     one: np.ndarray
 
 
-class ContactObserver(Observer):
-    """Keeps the strength of the contacts of a scene that says what touches, with a rounded contact."""
+def _strengths(scene: Scene, run: Outcome, known: Fields) -> Fields:
+    pair, begin = scene.contact.pair, known["transient"] / scene.frequency
+    assert pair is not None
+    contact = pair.contact
+    assert contact is not None
+    entries = entries_of(run.rows, run.log)
+    entries = entries[(entries[:, 1] == IMPACT) | (entries[:, 1] == DETACHES)]
+    places = run.rows.places
+    one_of = {place: row for row, place in enumerate(places)}
+    rows = np.array([one_of[place] for place in places], int)[entries[:, 2].astype(int)]
+    strengths: dict[int, ContactStrength] = {}
+    try:
+        for row in np.unique(rows):
+            own = np.flatnonzero(rows == row)
+            impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
+            if len(impacts.entry):
+                first = int(own[impacts.entry[0]])
+                strengths[first] = _strength(places[row], impacts, contact, pair.first_yield)
+    except ValueError as error:
+        return {"warnings": (f"contact.pair: {error}",)}
+    contacts = tuple(strengths[first] for first in sorted(strengths))
+    return {"contacts": contacts, "warnings": tuple(_warnings(contacts, pair.restitution_speeds))}
 
-    def needs(self, scene: Scene, system: System) -> Needs:
-        """Return the log."""
-        return Needs(log=True)
 
-    def fields(self, scene: Scene, run: Outcome, found: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the strength of the contacts over the periods evaluated, and warnings."""
-        pair, begin = scene.contact.pair, found["transient"] / scene.frequency
-        assert pair is not None
-        contact = pair.contact
-        assert contact is not None
-        entries = entries_of(run.rows, run.log)
-        entries = entries[(entries[:, 1] == IMPACT) | (entries[:, 1] == DETACHES)]
-        places = list(dict.fromkeys(run.rows.places))
-        of_row = {place: number for number, place in enumerate(places)}
-        numbers = np.array([of_row[place] for place in run.rows.places], int)[entries[:, 2].astype(int)]
-        strengths: dict[int, ContactStrength] = {}
-        try:
-            for number in np.unique(numbers):
-                own = np.flatnonzero(numbers == number)
-                impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
-                if len(impacts.entry):
-                    first = int(own[impacts.entry[0]])
-                    strengths[first] = _strength(places[number], impacts, contact, pair.first_yield)
-        except ValueError as error:
-            return {"warnings": (f"contact.pair: {error}",)}
-        contacts = tuple(strengths[first] for first in sorted(strengths))
-        return {"contacts": contacts, "warnings": tuple(_warnings(contacts, pair.restitution_speeds))}
+#: keeps the strength of the contacts of a scene that says what touches, with a rounded contact
+CONTACTS = Observer(_strengths, Needs(log=True))
 
 
 def impacts_of(entries: np.ndarray, compliant: bool, begin: float) -> Impacts:
