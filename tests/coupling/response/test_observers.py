@@ -14,13 +14,13 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 
 SCENE = {
-    "structure": {"model": "rigid", "mass": 0.148, "stiffness": 3.4e7, "damping_ratio": 0.002},
-    "excitation": {"frequency": 2414.0, "force": 40.0},
+    "structure": {"model": "rigid", "mass": 0.148, "stiffness": 3.4e7, "damping_ratio": 0.05},
+    "excitation": {"frequency": 2414.0, "force": 400.0},
     "cavity": [{"name": "c", "gap": 2e-5}],
     "damper": [{"cavity": "c", "mass": 0.003, "friction": 0.4, "restitution": 0.7}],
     "contact": {"law": "compliant", "stiffness": 2e7, "pair": {"young": 2e11, "radius": 0.05}},
     "wear": {"coefficient": 2e-4, "hardness": 2.5e9, "impact_rate": 1e-15, "width": 0.01},
-    "time": {"periods": 40, "transient": 10},
+    "time": {"periods": 60, "transient": 20},
 }
 MADE = Scene.of(SCENE, "scene")
 
@@ -53,15 +53,15 @@ def test_an_observer_sees_the_run_and_fills_its_fields():
     own = Own(tell, Needs(samples=12, log=True))
     response = respond(MADE, [samples(4), own, Observer(lambda *_: {"warnings": ("two",)})])
     assert response.provenance == {"impacts": response.impacts_per_period} and response.warnings == ("one", "two")
-    assert seen == [(0, 10), (10, 10)]
+    assert seen == [(0, 20), (20, 20)]
     plain = respond(MADE, [samples(4)])
-    assert response.displacement == pytest.approx(plain.displacement, rel=1e-6, abs=1e-12) and len(plain.time) == 160
+    assert response.displacement == pytest.approx(plain.displacement, rel=1e-6, abs=1e-12) and len(plain.time) == 240
     assert not response.event_list and len(respond(MADE, [EVENT_LIST]).event_list) == response.events
 
 
 def test_a_run_keeps_no_log_and_no_sums_that_nobody_asked_for():
     run = run_of(MADE)
-    run.advance_to(40)
+    run.advance_to(60)
     outcome = run.outcome()
     assert not outcome.log and not outcome.records.samples.size and not outcome.records.worn.size
     assert not respond(MADE).wear and respond(MADE).contacts is None
