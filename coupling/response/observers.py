@@ -44,7 +44,7 @@ def wear(scene: Scene) -> Observer:
 
 
 def _worn(scene: Scene, run: Outcome, known: Fields) -> Fields:
-    work = _contact_work(scene, run, known["transient"])
+    work = contact_work(scene, run, known["transient"])
     if not work or not len(work[0].course):
         return {"contact_work": work}
     warnings = ledger_warning(work, known["energy"]["friction"])
@@ -63,7 +63,7 @@ EVENT_LIST = Observer(lambda _, run, known: {"event_list": events_of(run.rows, r
 TOGETHER = Observer(_together)
 
 
-def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
+def contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
     """Return the work of each contact of a run over its periods from `first` on."""
     records, rows, window = run.records, run.rows, slice(first, run.periods)
     struck = _struck(run)

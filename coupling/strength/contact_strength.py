@@ -37,31 +37,37 @@ class Impacts(NamedTuple):
     one: np.ndarray
 
 
-def _strengths(scene: Scene, run: Outcome, known: Fields) -> Fields:
-    pair, begin = scene.contact.pair, known["transient"] / scene.frequency
+def contacts_of(scene: Scene, run: Outcome, begin: float = 0.0) -> tuple[ContactStrength, ...]:
+    """Return the strength of a run's contacts by their impacts from a time on, s, in the order of the first ones.
+
+    The scene says what touches, with a rounded contact. Raises ValueError for one pressed wider than its bodies.
+    """
+    pair, places = scene.contact.pair, run.rows.places
     assert pair is not None
     contact = pair.contact
     assert contact is not None
-    entries = entries_of(run.rows, run.log)
+    entries, one_of = entries_of(run.rows, run.log), {place: row for row, place in enumerate(places)}
     entries = entries[(entries[:, 1] == IMPACT) | (entries[:, 1] == DETACHES)]
-    places = run.rows.places
-    one_of = {place: row for row, place in enumerate(places)}
     rows = np.array([one_of[place] for place in places], int)[entries[:, 2].astype(int)]
-    strengths: dict[int, ContactStrength] = {}
+    found: dict[int, ContactStrength] = {}
+    for row in np.unique(rows):
+        own = np.flatnonzero(rows == row)
+        impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
+        if len(impacts.entry):
+            found[int(own[impacts.entry[0]])] = _strength(places[row], impacts, contact, pair.first_yield)
+    return tuple(found[first] for first in sorted(found))
+
+
+def _strengths(scene: Scene, run: Outcome, known: Fields) -> Fields:
+    assert scene.contact.pair is not None
     try:
-        for row in np.unique(rows):
-            own = np.flatnonzero(rows == row)
-            impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
-            if len(impacts.entry):
-                first = int(own[impacts.entry[0]])
-                strengths[first] = _strength(places[row], impacts, contact, pair.first_yield)
+        found = contacts_of(scene, run, known["transient"] / scene.frequency)
     except ValueError as error:
         return {"warnings": (f"contact.pair: {error}",)}
-    contacts = tuple(strengths[first] for first in sorted(strengths))
-    return {"contacts": contacts, "warnings": tuple(_warnings(contacts, pair.restitution_speeds))}
+    return {"contacts": found, "warnings": tuple(_warnings(found, scene.contact.pair.restitution_speeds))}
 
 
-#: keeps the strength of the contacts of a scene that says what touches, with a rounded contact
+#: keeps the strength of rounded contacts
 CONTACTS = Observer(_strengths, Needs(log=True))
 
 
