@@ -41,7 +41,7 @@ class StressObserver(Observer):
         super().__init__(self._stress)
         self.spots, self.asked, self.each = spots, asked, 0
         self._rooms: list[tuple[np.ndarray, mmap.mmap]] = []
-        self._whole: Records | None = None
+        self._whole: Records
         self._taken, self._sampling, self._first = 0, True, -1
         self._parts: list[tuple[int, PeriodStress]] = []
         self._checked = np.zeros((2, len(spots.rows)))
@@ -60,7 +60,6 @@ class StressObserver(Observer):
     def look(self, run: Run, dropped: int | None) -> None:
         """Take the periods done since the last call, and sample what follows if it may be evaluated."""
         self._take_up_to(run.outcome().periods)
-        assert self._whole is not None
         if isinstance(run, EventDrivenRun) and not self.asked:
             self._sampling = dropped is None or self._taken >= dropped
             none = {name: getattr(self._whole, name)[:0] for name in _SAMPLED}
@@ -70,7 +69,7 @@ class StressObserver(Observer):
     def _take_up_to(self, done: int) -> None:
         """Take the periods up to `done`, and give their samples back."""
         begin, self._taken = self._taken, done
-        if not self._sampling or done <= begin or self._whole is None:
+        if not self._sampling or done <= begin:
             return
         q, together = self._whole.coordinates, max(_TOGETHER // self.each, 1)
         if np.isnan(q[begin * self.each]).any():
