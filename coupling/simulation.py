@@ -19,7 +19,7 @@ from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.scene.structures import Ring
-from vanedamp.coupling.strength.contact_strength import CONTACTS
+from vanedamp.coupling.strength.contact_strength import CONTACTS, wanted
 from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.coupling.strength.stress_observer import StressObserver
 from vanedamp.files.store import frozen
@@ -55,7 +55,7 @@ def simulate(
 
 def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0) -> list[Observer]:
     """Return what a run keeps of a scene without open choices; arguments as in `simulate`."""
-    spots, pair = spots_of(scene), scene.contact.pair
+    spots = spots_of(scene)
     return [
         WALLS,
         samples(samples_per_period),
@@ -63,7 +63,7 @@ def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0
         *([] if scene.wear is None else [wear(scene)]),
         *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
         *([] if spots is None else [StressObserver(spots, samples_per_period)]),
-        *([] if pair is None or pair.radius is None else [CONTACTS]),
+        *([CONTACTS] if wanted(scene) else []),
         TOGETHER,
     ]
 

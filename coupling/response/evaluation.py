@@ -95,8 +95,8 @@ class Outcome:
 class Needs(NamedTuple):
     """What a run has to record for an observer.
 
-    samples: of each period; log: whether to keep it; outputs: whether the largest values of further outputs are wanted;
-    exponent: of the energies of impacts, whose sums and numbers are counted by contact then.
+    samples: of each period; log: whether to keep it; outputs: whether to note largest values of further outputs;
+    exponent: of the energies of impacts, whose sums and numbers are kept by contact then.
     """
 
     samples: int = 0

@@ -25,8 +25,8 @@ from vanedamp.coupling.scene.scene import Scene
 class Impacts(NamedTuple):
     """Impacts (k,) of one contact.
 
-    entry: number among the contact's entries of the log; speed, after: m/s, before and after; impulse: N s; duration:
-    s, nan: not known; one: whether a compliant one is of one spring, not of several in parallel.
+    entry: place in the contact's log; speed, after: m/s, before and after; impulse: N s; duration: s, nan: not known;
+    one: whether a compliant one is of one spring, not of several in parallel.
     """
 
     entry: np.ndarray
@@ -37,10 +37,15 @@ class Impacts(NamedTuple):
     one: np.ndarray
 
 
+def wanted(scene: Scene) -> bool:
+    """Whether a scene says what touches, with a rounded contact."""
+    return scene.contact.pair is not None and scene.contact.pair.radius is not None
+
+
 def contacts_of(scene: Scene, run: Outcome, begin: float = 0.0) -> tuple[ContactStrength, ...]:
     """Return the strength of a run's contacts by their impacts from a time on, s, in the order of the first ones.
 
-    The scene says what touches, with a rounded contact. Raises ValueError for one pressed wider than its bodies.
+    Raises ValueError for a contact pressed wider than its bodies.
     """
     pair, places = scene.contact.pair, run.rows.places
     assert pair is not None

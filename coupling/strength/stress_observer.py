@@ -48,7 +48,7 @@ class StressObserver(Observer):
         self._histories = SpotHistories(spots.materials)
 
     def begin(self, scene: Scene, system: System) -> Needs:
-        """Return the samples of each period from which stresses are taken."""
+        """Return the samples from which stresses are taken."""
         self.each = samples_of(scene, system, self.spots, self.asked)
         return Needs(samples=self.each)
 
