@@ -9,6 +9,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.response.observers import samples
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -39,7 +40,7 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
     if unknown or model.output_rows is None:
         known = ", ".join(model.outputs) or "none"
         raise InputError(f"outputs: no output {(unknown or ['?'])[0]!r} in {structure.file}; it has {known}")
-    response = respond(scene, samples_per_period=samples_per_period)
+    response = respond(scene, [samples(samples_per_period)])
     coordinates = response.coordinates
     if coordinates is None:
         if len(response.time):

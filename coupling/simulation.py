@@ -6,17 +6,22 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
-from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.methods.registry import WALLS, respond
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.response.moved_start import Mean, as_one, moved
+from vanedamp.coupling.response.by_sector import sectors
+from vanedamp.coupling.response.evaluation import Fields, Observer, Outcome
+from vanedamp.coupling.response.moved_start import Mean, moved
+from vanedamp.coupling.response.observers import EVENT_LIST, TOGETHER, samples, wear
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
-from vanedamp.coupling.strength import contact_strength
-from vanedamp.coupling.strength.watched import watched
+from vanedamp.coupling.scene.structures import Ring
+from vanedamp.coupling.strength.contact_strength import CONTACTS, wanted
+from vanedamp.coupling.strength.spots import spots_of
+from vanedamp.coupling.strength.stress_observer import StressObserver
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -40,32 +45,40 @@ def simulate(
     started = time.perf_counter()
     scene = loaded(scene)
     chosen = choose(scene)
-    rounded = contact_strength.wanted(chosen.scene)
     start = start or chosen.start
-    response = watched(chosen.scene, events or rounded, samples_per_period, start, progress)
-    if rounded:
-        response = contact_strength.with_contacts(chosen.scene, response, events)
-    notes = response.warnings
-    if response.impacts_per_period:
-        notes += as_one(chosen.scene, *(part[response.transient :] for part in (response.slip, response.slip_velocity)))
-    other, doubt = _from_moved(chosen.scene, response, start, progress) if moved_start else (None, ())
-    took = time.perf_counter() - started
-    return replace(
-        response, estimate=chosen.estimate, advice=chosen.advice,
-        warnings=chosen.warnings + notes + doubt, wall_time_s=took, moved_start=other, scene=scene,
-    )  # fmt: skip
+    known = {"scene": scene, "estimate": chosen.estimate, "advice": chosen.advice, "warnings": chosen.warnings}
+    observers = [Observer(lambda *_: known), *observers_of(chosen.scene, events, samples_per_period)]
+    if moved_start:
+        observers.append(Observer(partial(_from_moved, start, progress)))
+    return respond(chosen.scene, observers, start, progress, started)
+
+
+def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0) -> list[Observer]:
+    """Return what a run keeps of a scene without open choices; arguments as in `simulate`."""
+    spots = spots_of(scene)
+    return [
+        WALLS,
+        samples(samples_per_period),
+        *([EVENT_LIST] if events else []),
+        *([] if scene.wear is None else [wear(scene)]),
+        *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
+        *([] if spots is None else [StressObserver(spots, samples_per_period)]),
+        *([CONTACTS] if wanted(scene) else []),
+        TOGETHER,
+    ]
 
 
 def _from_moved(
-    scene: Scene, response: Response, start: RestartState | None, progress: Callable[[int, int], None] | None
-) -> tuple[dict[str, Any] | None, tuple[str, ...]]:
+    start: RestartState | None, progress: Callable[[int, int], None] | None, scene: Scene, run: Outcome, known: Fields
+) -> Fields:
     """Return the results of a second run from bodies a little aside, and a warning if they are others.
 
     None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
     """
-    hit = response.impacts_per_period or response.counters.get("impacts")  # the transient's choose a state as well
-    if response.status is not Status.OK or not hit or not scene.damper:
-        return None, ()
+    hit = known["impacts_per_period"] or run.counters.get("impacts")  # the transient's choose a state as well
+    if known["status"] is not Status.OK or not hit or not scene.damper:
+        return {}
+    tolerance = 2 * scene.time.tolerance
     places = moved(scene, scene.positions if start is None else start.slip.tolist())
     if start is None:
         bodies = tuple(replace(body, position=place) for body, place in zip(scene.damper, places, strict=True))
@@ -73,16 +86,16 @@ def _from_moved(
     else:
         start = replace(start, slip=frozen(places))
     try:
-        second = respond(scene, start=start, progress=progress)
+        second = vars(respond(scene, start=start, progress=progress))
     except InputError:  # a tilted body at a wall
-        return None, ()
-    one, other = (_mean(each) for each in (response, second))
-    agrees = one.agrees(other, 2 * scene.time.tolerance)
+        return {}
+    one, other = (_mean(each) for each in (known, second))
+    agrees = one.agrees(other, tolerance)
     names = "amplitude_mean_dynamic", "amplitude_mean_confidence", "impacts_per_period", "classification"
-    found = {"agrees": agrees, "status": other.status} | {name: getattr(second, name) for name in names}
-    return found, () if agrees else (one.sentence(other),)
+    results = {"agrees": agrees, "status": other.status} | {name: second[name] for name in names}
+    return {"moved_start": results, "warnings": () if agrees else (one.sentence(other),)}
 
 
-def _mean(response: Response) -> Mean:
-    confidence = response.amplitude_mean_confidence
-    return Mean(response.status.value, response.amplitude_mean_dynamic, math.nan if confidence is None else confidence)
+def _mean(found: Fields) -> Mean:
+    confidence = found["amplitude_mean_confidence"]
+    return Mean(found["status"].value, found["amplitude_mean_dynamic"], math.nan if confidence is None else confidence)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.methods import Method
-from vanedamp.coupling.response.evaluation import Run, Watch, evaluate, run_scene
+from vanedamp.coupling.response.evaluation import Needs, Observer, Run, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
@@ -18,7 +17,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
-from vanedamp.coupling.scene.structures import Ring, Rom
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import most_periods
@@ -30,25 +29,19 @@ _DEEP = 1e-3
 
 def respond(
     scene: Scene,
-    events: bool = False,
-    samples_per_period: int = 0,
+    observers: Sequence[Observer] = (),
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
-    watch: Watch | None = None,
-    outputs: bool = False,
+    started: float | None = None,
 ) -> Response:
-    """Return the response of a scene without open choices. Arguments as in coupling.simulation.simulate.
+    """Return the response of a scene without open choices, with what some observers keep.
 
-    watch: looks at more samples than are asked for; outputs: with the response of the sectors of a ring.
+    start, progress: as in coupling.simulation.simulate; started: when its time began (time.perf_counter), if before.
     """
-    started = time.perf_counter()
-    logs = scene.wear is not None and scene.yields  # the energies of their impacts are in the log
-    run = run_of(scene, events or logs, samples_per_period, start, watch, outputs)
-    ended = run_scene(run, scene, progress, watch)
-    outcome = run.outcome() if watch is None else watch.close(run.outcome())
-    response = evaluate(scene, outcome, ended, started, events)
-    warnings = response.warnings + wall_warnings(scene, {}, np.array(response.penetration))
-    return replace(response, final=final_state(scene, run), warnings=warnings)
+    started = started or time.perf_counter()
+    run = run_of(scene, observers, start)
+    ended = run_scene(run, scene, progress, observers)
+    return evaluate(scene, run.outcome(), ended, started, observers, final_state(scene, run))
 
 
 def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.ndarray) -> tuple[str, ...]:
@@ -70,53 +63,39 @@ def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.nda
     )
 
 
+#: warns of bodies deep in rigid walls
+WALLS = Observer(lambda scene, run, _: {"warnings": wall_warnings(scene, {}, np.array(run.penetration))})
+
+
 def final_state(scene: Scene, run: Run) -> RestartState | None:
     """Return the present state of a run of a scene; None within a period, or if the method keeps none."""
     state = run.final()
     return None if state is None else marked_with_speed(scene, state)
 
 
-def run_of(
-    scene: Scene,
-    events: bool = False,
-    samples_per_period: int = 0,
-    start: RestartState | None = None,
-    watch: Watch | None = None,
-    outputs: bool = False,
-) -> Run:
-    """Return a run of the scene's method at time zero.
+def run_of(scene: Scene, observers: Sequence[Observer] = (), start: RestartState | None = None) -> Run:
+    """Return a run of the scene's method at time zero, which records what some observers need.
 
     Raises InputError for a scene that the method cannot run, such as one that begins with the state of another run.
     """
     method: Method = METHODS.part(scene.solver.method)
     if start is not None and (reason := why_no_restart(scene)):
         raise InputError(f"continuation: {reason}")
-    scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
     if scene.wear is not None and (reason := _why_not(scene.solver.method, "WEARS")):
         raise InputError(f"wear: {reason}; leave the table out")
     system = assemble(scene)
     _check_bodies(scene, system)
-    samples = samples_per_period if watch is None else watch.samples(scene, system, samples_per_period)
+    needs = [Needs(), *(observer.begin(scene, system) for observer in observers)]
+    samples, logs, outputs, exponents = zip(*needs, strict=True)
+    scene.solver.check_samples(max(samples))
     records = new_records(
-        system,
-        most_periods(scene),
-        samples,
-        isinstance(scene.structure, Rom),
-        deflects(scene, system),
-        _impact_exponent(scene),
-        outputs,
-    )
-    records = records if watch is None else watch.records(records)
-    return method.begin(scene, system, records, events, start_of(scene, system, start))
-
-
-def _impact_exponent(scene: Scene) -> float | None:
-    """Return the exponent of impacts that wear; where a ring wants them counted by body any; None: not counted."""
-    if scene.wear is not None:
-        return scene.wear.impact_exponent
-    counted = isinstance(scene.structure, Ring) and _why_not(scene.solver.method, "WEARS") is None
-    return 1.0 if counted else None
+        system, most_periods(scene), max(samples), isinstance(scene.structure, Rom), deflects(scene, system),
+        next(filter(None, exponents), None), any(outputs),
+    )  # fmt: skip
+    for observer in observers:
+        records = observer.records(records)
+    return method.begin(scene, system, records, any(logs), start_of(scene, system, start))
 
 
 def _check_bodies(scene: Scene, system: System) -> None:

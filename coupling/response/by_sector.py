@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.response.event_log import Rows
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.evaluation import Needs, Observer, Outcome
 from vanedamp.coupling.response.sector_response import BY_SECTOR, SectorResponse
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
 from vanedamp.coupling.system.system import System
@@ -15,10 +15,18 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def response_by_sector(
-    scene: Scene, system: System, records: Records, rows: Rows, window: slice
-) -> SectorResponse | None:
+def sectors(scene: Scene) -> Observer:
+    """Return what keeps the response of the sectors of a ring; impacts by contact if the method counts them."""
+    counted = getattr(METHODS.part(scene.solver.method), "WEARS", False)
+    return Observer(
+        lambda scene, run, known: {"sectors": response_by_sector(scene, run, slice(known["transient"], run.periods))},
+        Needs(outputs=True, exponent=1.0 if counted else None),
+    )
+
+
+def response_by_sector(scene: Scene, run: Outcome, window: slice) -> SectorResponse | None:
     """Return the response of the sectors over some periods; None where a method has not noted it."""
+    system, records = run.system, run.records
     found = records.outputs[window]
     peak = found[..., 0]
     if not found.size or not np.isfinite(peak).all():
@@ -27,7 +35,7 @@ def response_by_sector(
         static = found[..., 2].sum(axis=0) / (len(found) * system.period)
         peak = np.maximum(peak - static, static - found[..., 1])
     undamped, fixed = _linear(scene, system)
-    impacts = _impacts(scene, system, records, rows, window)
+    impacts = _impacts(scene, run, window)
     own = map(frozen, (peak.mean(axis=0), peak.max(axis=0), undamped, fixed, impacts))
     return SectorResponse(dict(zip(BY_SECTOR, own, strict=True)), tuned=_tuned(scene))
 
@@ -41,9 +49,10 @@ def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
     return free, fixed
 
 
-def _impacts(scene: Scene, system: System, records: Records, rows: Rows, window: slice) -> np.ndarray:
+def _impacts(scene: Scene, run: Outcome, window: slice) -> np.ndarray:
     """Return the impacts per period (N,) of the bodies in each sector; nan if they are not counted."""
-    hits, found = records.hits[window], np.zeros(len(system.outputs))
+    system, hits, rows = run.system, run.records.hits[window], run.rows
+    found = np.zeros(len(system.outputs))
     if not hits.shape[1]:
         return found * np.nan
     owner, counts = sectors_of_bodies(scene, system), hits.mean(axis=0)

@@ -15,9 +15,7 @@ import numpy as np
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.quantities.quantity import evaluated
 from vanedamp.coupling.quantities.sums import SUMS, nothing_known, sources_of
-from vanedamp.coupling.response.by_sector import response_by_sector
-from vanedamp.coupling.response.contact_work import ContactWork
-from vanedamp.coupling.response.event_log import Rows, events_of, impact_energies
+from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.figures import (
     NO_CONTACT,
     NON_PERIODIC,
@@ -34,7 +32,6 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steadiness import judge, run_ends
 from vanedamp.coupling.response.steady_state import transient_length
-from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.system import System
@@ -61,6 +58,10 @@ STATUS_OF = {
 }
 
 
+#: fields of a response, by name
+Fields = Mapping[str, Any]
+
+
 class Run(Protocol):
     """A run of any method that can be continued."""
 
@@ -72,22 +73,6 @@ class Run(Protocol):
 
     def final(self) -> RestartState | None:
         """Return the state that another run can begin with; None if the run ended within a period, or keeps none."""
-
-
-class Watch(Protocol):
-    """What looks at the samples of a run while it advances (registry.respond)."""
-
-    def samples(self, scene: Scene, system: System, asked: int) -> int:
-        """Return how many samples of each period the run keeps for it, a multiple of those asked for."""
-
-    def records(self, empty: Records) -> Records:
-        """Return the records to which the run writes."""
-
-    def __call__(self, run: Run, dropped: int | None) -> None:
-        """Look at the run so far; dropped: periods that will be left out, None if that is open."""
-
-    def close(self, outcome: Outcome) -> Outcome:
-        """Look at the rest of a run that has ended. Return its outcome with the samples that were asked for."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +95,45 @@ class Outcome:
     plane: Plane | None = None
 
 
+class Needs(NamedTuple):
+    """What a run has to record for an observer.
+
+    samples: of each period; log: whether to keep it; outputs: whether the largest values of further outputs are wanted;
+    exponent: of the energies of impacts, whose sums and numbers are counted by contact then.
+    """
+
+    samples: int = 0
+    log: bool = False
+    outputs: bool = False
+    exponent: float | None = None
+
+
+_NOTHING = Needs()
+
+
+@dataclass
+class Observer:
+    """One thing that a run keeps beside its sums, asked for before it begins.
+
+    fields: returns fields of the response of a run that has ended, by name, from its scene, its outcome and the fields
+    known before; `warnings` are added to those. needs: what the run has to record.
+    """
+
+    fields: Callable[[Scene, Outcome, Fields], Fields]
+    needs: Needs = _NOTHING
+
+    def begin(self, scene: Scene, system: System) -> Needs:
+        """Return what a run of a scene has to record."""
+        return self.needs
+
+    def records(self, empty: Records) -> Records:
+        """Return the records to which the run writes."""
+        return empty
+
+    def look(self, run: Run, dropped: int | None) -> None:
+        """Look at a run before it goes on; dropped: periods that will be left out, None if that is open."""
+
+
 class Ended(NamedTuple):
     """How a run ended: status, periods left out, and the confidence of the mean of the others, m (None: unknown)."""
 
@@ -119,23 +143,26 @@ class Ended(NamedTuple):
 
 
 def run_scene(
-    run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None, watch: Watch | None = None
+    run: Run,
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    observers: Sequence[Observer] = (),
 ) -> Ended:
     """Run all periods; where their number is open, until the response is steady; with steady = "auto", until its mean
     is known well enough.
 
-    progress: called with the number of periods done and of those to do; watch: called before the run, and as it goes.
-    """  # fmt: skip
+    progress: called with the number of periods done and of those to do; observers: look at the run as it goes.
+    """
     transient = Transient(scene, run.outcome().system)
     dropped, periods, most = transient.length()
     if scene.time.steady == "auto":
-        return _run_until_known(run, transient, periods, progress, watch)
+        return _run_until_known(run, transient, periods, progress, observers)
     done, counted = 0, run.outcome().records.counted
     while True:
         counted[0] = dropped
         while done < periods:
-            if watch is not None:
-                watch(run, dropped)
+            for observer in observers:
+                observer.look(run, dropped)
             # compiled functions hear of no interrupt before they return
             done = min(done + _CHUNK, dropped if done < dropped else periods)
             ended = run.advance_to(done)
@@ -155,13 +182,13 @@ def _run_until_known(
     transient: Transient,
     periods: int,
     progress: Callable[[int, int], None] | None,
-    watch: Watch | None,
+    observers: Sequence[Observer],
 ) -> Ended:
     """Run until the mean amplitude is known well enough, at most some periods."""
     tolerance, ended = transient.scene.time.tolerance, Ended(Status.NOT_STEADY, transient.scene.time.dropped)
     for done in [*range(_CHUNK, periods, _CHUNK), periods]:
-        if watch is not None:
-            watch(run, None)
+        for observer in observers:
+            observer.look(run, None)
         status = run.advance_to(done)
         if status is not Status.OK:
             return Ended(status, ended.transient)
@@ -183,8 +210,20 @@ def _run_until_known(
     return ended
 
 
-def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: bool = True) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter). events: keep the list of events."""
+def evaluate(
+    scene: Scene, run: Outcome, ended: Ended, started: float, observers: Sequence[Observer] = (),
+    final: RestartState | None = None,
+) -> Response:  # fmt: skip
+    """Return the response of a run that began at `started` (time.perf_counter), with what its observers have kept."""
+    found = _sums(scene, run, ended)
+    for observer in observers:
+        more = observer.fields(scene, run, found)
+        found |= {**more, "warnings": (*found["warnings"], *more.get("warnings", ()))}
+    return Response(**found, final=final, wall_time_s=time.perf_counter() - started)
+
+
+def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
+    """Return the fields of a response that any run has."""
     system, records, done, status = run.system, run.records, run.periods, ended.status
     first = min(ended.transient, max(done - 1, 0))
     row = np.empty(len(SUMS))
@@ -195,91 +234,25 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
     sums = sources_of(row)
     energy = {name: float(value) for name, value in sums["energy"].items()}
     status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
-    extent: dict[str, Any] = {}
     if run.plane is not None:
         in_plane = _in_plane(run.plane, slice(first, done))
         status = Status.TILTED if _tilted(in_plane, run.plane.bound) and status in _USABLE else status
         sums |= in_plane
-        if records.samples_per_period:
-            extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
-    if scene.wear is not None and records.worn.shape[1]:  # a ring-down does not count it
-        extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
-    if records.outputs.shape[1]:
-        extent["sectors"] = response_by_sector(scene, system, records, run.rows, slice(first, done))
-    return Response(
-        status=status,
-        frequency=scene.frequency,
-        events=run.events,
-        classification=class_name(kind),
-        energy=energy,
-        wall_time_s=time.perf_counter() - started,
-        periods=done,
-        transient=first,
-        counters=run.counters,
-        event_list=events_of(run.rows, run.log) if events else [],
-        quantities=_known(evaluated(sums | {"overlap": run.penetration} | linear_parts(scene, system)), status),
-        **_series(system, records, done),
-        **extent,
-    )
-
-
-def _worn(scene: Scene, work: tuple[ContactWork, ...], friction: float) -> dict[str, Any]:
-    """Return work and wear of the contacts, and a warning if it does not fit the friction work of the balance, J."""
-    if not work or not len(work[0].course):
-        return {"contact_work": work}
-    return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": ledger_warning(work, friction)}
-
-
-def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
-    """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
-    records, rows, window = run.records, run.rows, slice(first, run.periods)
-    struck = _struck(run)
-    found = []
-    for row, (number, side, corner) in enumerate(rows.places):
-        friction = _friction(scene, run, row)
-        sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
-        course = np.stack([sliding, struck[window, row]], axis=1)
-        found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
-    return tuple(found)
-
-
-def _struck(run: Outcome) -> np.ndarray:
-    """Return the sums (periods + 1, rows) of the energies of impacts to the power of [wear], J^n."""
-    struck, exponent = run.records.struck.copy(), float(run.records.exponent[0])
-    struck[:, np.flatnonzero(np.isfinite(run.rows.spring))] = 0.0  # known only as a contact ends
-    period, row, energy = impact_energies(run.rows, run.log, run.system.period)
-    np.add.at(struck, (np.minimum(period, len(struck) - 1), row), energy**exponent)
-    return struck
-
-
-def _friction(scene: Scene, run: Outcome, row: int) -> float:
-    """Return the coefficient of friction of a row of the log; 0: none, and no work of it."""
-    number, side, _ = run.rows.places[row]
-    if run.rows.without_body[row]:
-        return scene.friction_damper[number].friction if side == "casing" else 0.0
-    if run.system.in_plane and row < run.system.contacts:
-        return float(run.system.friction[row])
-    return scene.damper[number].friction if side == "floor" else 0.0
+    section, b = records.section[: done + 1], system.bodies
+    return {
+        "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
+        "energy": energy, "periods": done, "transient": first, "counters": run.counters,
+        "quantities": _known(evaluated(sums | {"overlap": run.penetration} | linear_parts(scene, system)), status),
+        "peak": records.peak[:done].copy(), "section": section[:, :2].copy(),
+        "slip": section[:, 3 : 3 + b].copy(), "slip_velocity": section[:, 3 + b :].copy(), "warnings": (),
+        "event_list": [], "time": np.zeros(0), "displacement": np.zeros(0), "body_displacement": np.zeros((0, b)),
+    }  # fmt: skip
 
 
 def closed_status(status: Status, imbalance: float, gain: float, bound: float) -> Status:
     """Return the status of a run by its energies, too: their imbalance, and what impacts and contacts have made."""
     closed = imbalance <= bound and gain <= _MADE
     return Status.ENERGY if not closed and status in _USABLE else status
-
-
-def _series(system: System, records: Records, done: int) -> dict[str, Any]:
-    """Return the series of a response: of its periods, and of its samples."""
-    section, b, count = records.section[: done + 1], system.bodies, done * records.samples_per_period
-    samples, coordinates = records.samples[:count], records.coordinates[:count]
-    kept = coordinates.size and np.all(np.isfinite(coordinates))  # not where none were wanted, or the method keeps none
-    return {
-        "peak": records.peak[:done].copy(), "section": section[:, :2].copy(), "slip": section[:, 3 : 3 + b].copy(),
-        "slip_velocity": section[:, 3 + b :].copy(),
-        "time": np.arange(count) * (system.period / max(records.samples_per_period, 1)),
-        "displacement": samples[:, 0].copy(), "body_displacement": samples[:, 1:].copy(),
-        "coordinates": coordinates.copy() if kept else None,
-    }  # fmt: skip
 
 
 def _in_plane(plane: Plane, window: slice) -> dict[str, np.ndarray]:

@@ -121,20 +121,17 @@ def impact_energies(rows: Rows, chunks: Sequence[np.ndarray], period: float) -> 
 
 
 def entries_of(rows: Rows, chunks: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the entries (k, LINE_WIDTH or WIDTH) of a log, in which impacts have their ends."""
+    """Return the entries (k, LINE_WIDTH or WIDTH) of a log.
+
+    Impacts on compliant contacts, logged as they begin, have the speed and the impulse that their end has brought.
+    """
     entries: np.ndarray = np.concatenate(chunks) if chunks else np.zeros((0, WIDTH))
-    _complete(rows.spring, entries)
+    kind, row = entries[:, 1], entries[:, 2].astype(int)
+    of_springs = np.flatnonzero(np.isfinite(rows.spring[row]) & ((kind == IMPACT) | (kind == DETACHES)))
+    of_springs = of_springs[np.argsort(row[of_springs], kind="stable")]
+    hits = kind[of_springs] == IMPACT
+    begun = np.maximum.accumulate(np.where(hits, np.arange(len(hits)), 0))
+    begin, end = of_springs[begun[~hits]], of_springs[~hits]
+    known = (kind[begin] == IMPACT) & (row[begin] == row[end])
+    entries[begin[known], 4:] = entries[end[known], 4:]
     return entries
-
-
-def _complete(spring: np.ndarray, entries: np.ndarray) -> None:
-    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
-    begun: dict[int, np.ndarray] = {}
-    for entry in entries:
-        kind, row = int(entry[1]), int(entry[2])
-        if not np.isfinite(spring[row]):
-            continue
-        if kind == IMPACT:
-            begun[row] = entry
-        elif kind == DETACHES and row in begun:
-            begun[row][4:] = entry[4:]

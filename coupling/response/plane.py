@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,26 +17,24 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; samples: in the plane, from the response's samples; walls: (periods, b) impacts on walls.
+    ok; walls: (periods, b) impacts on walls.
     """
 
     tilt: np.ndarray
     lifted: np.ndarray
     neglected: np.ndarray
     bound: float
-    samples: Callable[[np.ndarray], PlanarSamples]
     walls: np.ndarray
 
 
 def plane_of(system: System, records: Records, linearisation: float, walls: np.ndarray) -> Plane:
     """Return the results in the plane of a run; walls: (periods, b) impacts on walls."""
-    samples = partial(_samples, system, records.sampled, records.shut)
-    return Plane(records.tilt, records.lifted, system.neglected, linearisation, samples, walls)
+    return Plane(records.tilt, records.lifted, system.neglected, linearisation, walls)
 
 
-def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarray) -> PlanarSamples:
-    """Return the first samples in the plane, as many as there are of the response x (n,)."""
-    q, contacts, extended = sampled[: len(x)], system.contacts, np.flatnonzero(system.tilt >= 0)
+def planar_samples(system: System, x: np.ndarray, q: np.ndarray, shut: np.ndarray) -> PlanarSamples:
+    """Return samples in the plane, from those of the response x (n,), coordinates q (n, N) and closed contacts."""
+    contacts, extended = system.contacts, np.flatnonzero(system.tilt >= 0)
     base = x - q @ system.response if system.table.any() else np.zeros(len(x))
     gap = system.rest[:contacts] + q @ system.J[:contacts].T
     rotation = q @ system.turn.T
@@ -52,6 +48,6 @@ def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarra
     return PlanarSamples(
         body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T + rotation * system.height,
         floor_across=across,
-        floor_rotation=rotation, contact_gap=gap, contact_closed=shut[: len(x), :contacts].astype(bool),
+        floor_rotation=rotation, contact_gap=gap, contact_closed=shut[:, :contacts].astype(bool),
         contacts=tuple(rows_of_units(system).places[:contacts]),
     )  # fmt: skip

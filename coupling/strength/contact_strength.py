@@ -8,30 +8,33 @@ factor of the spring's and dashpot's pulse, which is exact for isolated collisio
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
+
+import numpy as np
 
 from vanedamp.coupling.contacts.collision import collision
 from vanedamp.coupling.contacts.hertz import Contact
 from vanedamp.coupling.response.contact_strength import ContactStrength
-from vanedamp.coupling.response.response import Event, Response
+from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome
+from vanedamp.coupling.response.event_log import entries_of
+from vanedamp.coupling.response.records import DETACHES, IMPACT
 from vanedamp.coupling.scene.contact_laws.compliant import peak_over_mean
 from vanedamp.coupling.scene.scene import Scene
 
-_Key = tuple[int, str, int]
 
+class Impacts(NamedTuple):
+    """Impacts (k,) of one contact.
 
-class Impact(NamedTuple):
-    """An impact: contact, speed of approach, m/s, and the energy, J, of Hertz's contact under its largest force.
-
-    mass: kg, of the collision; duration: s, None where it is that of Hertz's collision.
+    entry: place in the contact's log; speed, after: m/s, before and after; impulse: N s; duration: s, nan: not known;
+    one: whether a compliant one is of one spring, not of several in parallel.
     """
 
-    key: _Key
-    speed: float
-    energy: float
-    mass: float
-    duration: float | None
+    entry: np.ndarray
+    speed: np.ndarray
+    after: np.ndarray
+    impulse: np.ndarray
+    duration: np.ndarray
+    one: np.ndarray
 
 
 def wanted(scene: Scene) -> bool:
@@ -39,82 +42,86 @@ def wanted(scene: Scene) -> bool:
     return scene.contact.pair is not None and scene.contact.pair.radius is not None
 
 
-def with_contacts(scene: Scene, response: Response, events: bool) -> Response:
-    """Return the response of a scene with the strength of its contacts, and warnings. events: keep their list."""
-    pair = scene.contact.pair
+def contacts_of(scene: Scene, run: Outcome, begin: float = 0.0) -> tuple[ContactStrength, ...]:
+    """Return the strength of a run's contacts by their impacts from a time on, s, in the order of the first ones.
+
+    Raises ValueError for a contact pressed wider than its bodies.
+    """
+    pair, places = scene.contact.pair, run.rows.places
     assert pair is not None
     contact = pair.contact
     assert contact is not None
-    begin = response.transient / response.frequency
-    kept = response.event_list if events else ()
+    entries, one_of = entries_of(run.rows, run.log), {place: row for row, place in enumerate(places)}
+    entries = entries[(entries[:, 1] == IMPACT) | (entries[:, 1] == DETACHES)]
+    rows = np.array([one_of[place] for place in places], int)[entries[:, 2].astype(int)]
+    found: dict[int, ContactStrength] = {}
+    for row in np.unique(rows):
+        own = np.flatnonzero(rows == row)
+        impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
+        if len(impacts.entry):
+            found[int(own[impacts.entry[0]])] = _strength(places[row], impacts, contact, pair.first_yield)
+    return tuple(found[first] for first in sorted(found))
+
+
+def _strengths(scene: Scene, run: Outcome, known: Fields) -> Fields:
+    assert scene.contact.pair is not None
     try:
-        found: dict[_Key, list[Impact]] = {}
-        for impact in impacts_of(contact, not scene.contact.rigid, response.event_list, begin):
-            found.setdefault(impact.key, []).append(impact)
-        strengths = tuple(_strength(impacts, contact, pair.first_yield) for impacts in found.values())
+        found = contacts_of(scene, run, known["transient"] / scene.frequency)
     except ValueError as error:
-        return replace(response, event_list=kept, warnings=(*response.warnings, f"contact.pair: {error}"))
-    return replace(
-        response, contacts=strengths, event_list=kept,
-        warnings=response.warnings + tuple(_warnings(strengths, pair.restitution_speeds)),
-    )  # fmt: skip
+        return {"warnings": (f"contact.pair: {error}",)}
+    return {"contacts": found, "warnings": tuple(_warnings(found, scene.contact.pair.restitution_speeds))}
 
 
-def impacts_of(contact: Contact, compliant: bool, events: Sequence[Event], begin: float) -> Iterator[Impact]:
-    """Yield the impacts from a time on, s. Springs in parallel of one contact, which close one in another, are one."""
-    ends = _ends(events) if compliant else {}
-    until: dict[_Key, float] = {}
-    for event in events:
-        key = event.damper, event.side, event.corner
-        speed, after = abs(event.relative_velocity_before), abs(event.relative_velocity_after)
-        if event.kind != "impact" or event.time < begin or speed == 0.0 or event.impulse == 0.0:
-            continue
-        if event.time < until.get(key, 0.0):
-            continue
-        end, impulse, single = ends.get((key, event.time), (None, abs(event.impulse), True))
-        if end is not None and single:
-            duration = end - event.time
-            force = peak_over_mean(after / speed) * impulse / duration
-            yield Impact(key, speed, contact.energy(force), 0.0, duration)
-            continue
-        mass = impulse / (speed + after)
-        until[key] = event.time if end is None else end
-        yield Impact(key, speed, 0.5 * mass * speed**2, mass, None if end is None else end - event.time)
+#: keeps the strength of rounded contacts
+CONTACTS = Observer(_strengths, Needs(log=True))
 
 
-def _ends(events: Sequence[Event]) -> dict[tuple[_Key, float], tuple[float, float, bool]]:
-    """Return end, s, impulse, N s, and whether it is one spring, of compliant contacts, by their key and beginning."""
-    found: dict[tuple[_Key, float], tuple[float, float, bool]] = {}
-    begun: dict[_Key, list[Event]] = {}
-    closed: dict[_Key, int] = {}
-    for event in events:
-        key = event.damper, event.side, event.corner
-        if event.kind == "impact":
-            begun.setdefault(key, []).append(event)
-            closed[key] = closed.get(key, 0) + 1
-        elif event.kind == "detach" and closed.get(key):
-            closed[key] -= 1
-            if not closed[key]:
-                springs = begun.pop(key)
-                impulse = sum(abs(one.impulse) for one in springs)
-                found[key, springs[0].time] = event.time, impulse, len(springs) == 1
-    return found
+def impacts_of(entries: np.ndarray, compliant: bool, begin: float) -> Impacts:
+    """Return the impacts from a time on, s, in the log's entries (n, .) of one contact: impacts and ends.
+
+    Springs in parallel, which close one in another, are one impact.
+    """
+    time, hits = entries[:, 0], entries[:, 1] == IMPACT
+    speed, after, impulse = np.abs(entries[:, 3:6]).T
+    counts = hits & (time >= begin) & (speed != 0.0) & (impulse != 0.0)
+    end, one = np.full(len(time), np.nan), np.zeros(len(time), bool)
+    if compliant:
+        closed = np.cumsum(np.where(hits, 1, -1))
+        closed -= np.minimum.accumulate(np.minimum(closed, 0))  # an end without a beginning does not count
+        begins = hits & (closed == 1)
+        ends = ~hits & (closed == 0) & np.r_[False, closed[:-1] == 1]
+        impact = np.cumsum(begins) - 1
+        ended, of_spring = impact[ends], impact[hits]
+        place = np.flatnonzero(begins)[ended]
+        end[place], one[place] = time[ends], np.bincount(of_spring)[ended] == 1
+        impulse[place] = np.bincount(of_spring, impulse[hits])[ended]
+    until = np.where(counts & ~one, np.fmax(end, time), -np.inf)
+    counts[1:] &= time[1:] >= np.maximum.accumulate(until)[:-1]
+    columns = np.arange(len(time)), speed, after, impulse, end - time, one & (end > time)
+    return Impacts(*(column[counts] for column in columns))
 
 
-def _strength(impacts: list[Impact], contact: Contact, first_yield: float | None) -> ContactStrength:
+def _strength(
+    place: tuple[int, str, int], impacts: Impacts, contact: Contact, first_yield: float | None
+) -> ContactStrength:
     """Return the strength of one contact, from its impacts."""
-    worst = max(impacts, key=lambda impact: impact.energy)
-    force, duration = contact.force_of_energy(worst.energy), worst.duration
-    if duration is None:
-        duration = collision(contact, worst.mass, worst.speed).duration
+    _, speed, after, impulse, durations, one = impacts
+    mass = impulse / (speed + after)
+    energy = 0.5 * mass * speed**2  # of Hertz's contact under the largest force
+    pulses = zip(*(column[one].tolist() for column in (after / speed, impulse, durations)), strict=True)
+    energy[one] = [contact.energy(peak_over_mean(left) * passed / lasts) for left, passed, lasts in pulses]
+    worst = int(np.argmax(energy))
+    force, duration = contact.force_of_energy(float(energy[worst])), float(durations[worst])
+    if np.isnan(duration):
+        duration = collision(contact, float(mass[worst]), float(speed[worst])).duration
     pressure = contact.pressure(force)
     utilisation = yielding = None
     if first_yield is not None:
         limit = contact.energy(contact.force_of_pressure(first_yield))
-        utilisation = pressure / first_yield
-        yielding = sum(impact.energy > limit for impact in impacts) / len(impacts)
-    fastest = max(impact.speed for impact in impacts)
-    return ContactStrength(*worst.key, len(impacts), fastest, force, duration, pressure, utilisation, yielding)
+        utilisation, yielding = pressure / first_yield, int(np.sum(energy > limit)) / len(energy)
+    return ContactStrength(
+        *place, len(energy), float(speed.max()), force, duration, pressure, utilisation, yielding
+    )  # fmt: skip
 
 
 def _warnings(strengths: Sequence[ContactStrength], speeds: tuple[float, float] | None) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.response.observers import samples
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.spots import known_spots
@@ -34,7 +35,7 @@ def stress_history(scene: Scene, samples_per_period: int = 100) -> StressHistory
     """
     scene = choose(scene).scene
     spots = known_spots(scene)
-    response = respond(scene, samples_per_period=samples_per_period)
+    response = respond(scene, [samples(samples_per_period)])
     if response.coordinates is None:
         raise InputError(f"solver.method: {scene.solver.method} keeps no samples of modal coordinates")
     kept = slice(response.transient * samples_per_period, None)

@@ -14,6 +14,7 @@ from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.response.evaluation import Ended, evaluate
+from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart import start_of
@@ -151,7 +152,7 @@ def _free_motion(
         if segment.period > done:
             report(done := segment.period)
     outcome = run.outcome()
-    response = evaluate(free, outcome, Ended(walk.status, 0), began)
+    response = evaluate(free, outcome, Ended(walk.status, 0), began, [EVENT_LIST])
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])

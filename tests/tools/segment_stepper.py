@@ -27,6 +27,7 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     TOUCHING,
 )
+from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
@@ -176,7 +177,7 @@ class Stepper:
 
     def __init__(self, scene: Scene, change=None) -> None:
         """change: alters the mutable run before it begins."""
-        self.run = run_of(scene, events=True)
+        self.run = run_of(scene, [EVENT_LIST])
         if change is not None:
             change(self.run)
         self.budget = scene.solver.max_events

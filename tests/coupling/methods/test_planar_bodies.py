@@ -15,6 +15,7 @@ from vanedamp.coupling.methods import moreau, penalty, scipy_ivp
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.event_log import events_of
+from vanedamp.coupling.response.observers import samples
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import start_of
@@ -394,7 +395,7 @@ def test_loads_of_a_waveform_act_across_the_cavity(tmp_path, method):
             cavity=[{"name": "c1", "gap": 20.0, "play": 10.0} | FOUR], damper=[block],
             time={"periods": 2, "transient": 0},
         )  # fmt: skip
-        runs.append(respond(scene, samples_per_period=8))
+        runs.append(respond(scene, [samples(8)]))
     assert {run.status for run in runs} == {Status.OK}
     lift = [run.in_plane.body_lift[:, 0] for run in runs]
     assert np.ptp(lift[0]) > 1e-4

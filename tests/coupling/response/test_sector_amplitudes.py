@@ -7,6 +7,7 @@ from scipy.optimize import minimize_scalar
 from tests.reference.integrator import integrate, quadrature
 from tests.tools.rings import Chain
 from vanedamp.coupling.response.by_sector import response_by_sector
+from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
@@ -183,4 +184,5 @@ def test_a_method_that_notes_no_sectors_has_none(file):
     system = assemble(made)
     records = new_records(system, 3, 0, outputs=True)
     assert records.outputs.shape == (4, 5, 3)
-    assert response_by_sector(made, system, records, rows_of_line(system), slice(0, 3)) is None
+    run = Outcome(system, records, 3, 0, 0.0, {}, [], rows_of_line(system))
+    assert response_by_sector(made, run, slice(0, 3)) is None

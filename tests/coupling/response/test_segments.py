@@ -8,6 +8,7 @@ import pytest
 from tests.tools.periodic_scenes import scene_of
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import CLOSES, STOPS
+from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.simulation import simulate
@@ -19,7 +20,7 @@ SEEDS = [7, 20, 17, 11, 16, 21]
 
 def walked(seed, folder):
     scene = scene_of(seed, folder)[1].replace({"time.periods": PERIODS})
-    walk = Walk(run_of(scene, events=True), PERIODS)
+    walk = Walk(run_of(scene, [EVENT_LIST]), PERIODS)
     segments = list(walk)
     assert walk.status is Status.OK and len(segments) > 2 * PERIODS
     return scene, walk.run, segments

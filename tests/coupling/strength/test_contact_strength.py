@@ -3,12 +3,13 @@
 import json
 import math
 
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import vanedamp as vd
 from vanedamp.coupling.contacts.collision import collision, speed_of_force
-from vanedamp.coupling.response.response import Event
+from vanedamp.coupling.response.records import DETACHES, IMPACT
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio, peak_over_mean
 from vanedamp.coupling.strength.contact_strength import impacts_of
 from vanedamp.files.store import load_any
@@ -114,6 +115,86 @@ def test_a_scene_without_a_rounded_contact_has_none():
     assert "as wide as the bodies" in response.warnings[0]
 
 
+def log(*entries):
+    """Entries of one contact: time, kind, row, speeds before and after, impulse."""
+    return np.array(entries, float).reshape(-1, 6)
+
+
 def test_impacts_before_the_window_do_not_count():
-    events = [Event(t, "impact", 0, "left", -1.0, 1.0, 0.02) for t in (0.0, 1.0)]
-    assert len(list(impacts_of(CONTACT, False, events, 0.5))) == 1
+    entries = log(*((t, IMPACT, 0, -1.0, 1.0, 0.02) for t in (0.0, 1.0)))
+    assert impacts_of(entries, False, 0.5).entry.tolist() == [1]
+
+
+def test_springs_that_close_one_in_another_are_one_impact():
+    """An end without a beginning is none of them; one that has not ended by the end of the run has no impulse yet."""
+    entries = log(
+        (0.0, DETACHES, 0, 1.0, 1.0, 0.0),
+        (1.0, IMPACT, 0, -2.0, 2.0, 0.1), (1.1, IMPACT, 1, -1.9, 1.9, 0.2), (1.3, DETACHES, 1, 0.0, 1.9, 0.2),
+        (1.4, DETACHES, 0, 0.0, 2.0, 0.1), (2.0, IMPACT, 0, -1.0, 0.5, 0.3), (2.5, DETACHES, 0, 0.0, 0.5, 0.3),
+        (2.6, DETACHES, 1, 0.0, 0.5, 0.3), (3.0, IMPACT, 0, -1.0, 0.0, 0.0),
+    )  # fmt: skip
+    found = impacts_of(entries, True, 0.0)
+    assert found.entry.tolist() == [1, 5] and found.one.tolist() == [False, True]
+    assert found.impulse == pytest.approx([0.3, 0.3]) and found.duration == pytest.approx([0.4, 0.5])
+    assert impacts_of(entries, True, 1.5).entry.tolist() == [5]
+
+
+def by_turns(entries, begin):
+    """Entry, impulse, end and number of springs of impacts on springs, entry by entry."""
+    begun, closed, ended, found, until = [], 0, {}, [], -np.inf
+    for place, (_, kind, *_) in enumerate(entries):
+        if kind == IMPACT:
+            begun, closed = [*begun, place], closed + 1
+        elif closed:
+            closed -= 1
+            if not closed:
+                ended[begun[0]] = entries[place, 0], entries[begun, 5].sum(), len(begun)
+                begun = []
+    for place, (time, kind, _, speed, _, impulse) in enumerate(entries.tolist()):
+        if kind == IMPACT and time >= max(begin, until) and speed and impulse:
+            end, total, springs = ended.get(place, (np.nan, impulse, 0))
+            until = until if springs == 1 else np.fmax(end, time)
+            found.append((place, total, end - time, springs == 1))
+    return found
+
+
+def test_impacts_of_random_logs():
+    random = np.random.default_rng(1)
+    for count in (1, 2, 3, 7, 40, 300):
+        entries = np.column_stack([
+            np.sort(random.random(count)), random.choice([IMPACT, DETACHES], count), np.zeros(count),
+            -random.choice([0.0, 1.0, 2.0], count), random.random(count), random.choice([0.0, 0.5, 1.0], count),
+        ])  # fmt: skip
+        known, found = by_turns(entries, 0.2), impacts_of(entries, True, 0.2)
+        columns = np.transpose([found.entry, found.impulse, found.duration, found.one])
+        assert columns == pytest.approx(np.reshape(np.array(known, float), (-1, 4)), nan_ok=True)
+
+
+BLOCK = {"shape": "block", "length": 6.88e-3, "height": 4.8e-3, "tilt": 1e-4}
+
+
+@pytest.mark.parametrize(
+    ("contact", "restitution", "body"),
+    [
+        ({"law": "newton"}, 0.7, {}),
+        ({"law": "newton"}, 0.7, BLOCK),
+        ({"law": "poisson"}, 0.7, BLOCK),
+        ({"law": "compliant", "stiffness": "hertz", "speed": SPEED}, 0.7, {}),
+        ({"law": "hertz", "force": 500.0}, 1.0, {}),
+    ],
+    ids=["newton", "block", "poisson", "compliant", "hertz"],
+)
+def test_no_events_are_built_that_nobody_asked_for(contact, restitution, body, monkeypatch):
+    """In runs and in sweeps, whose contacts are those of a run that lists its events."""
+    damper = {"cavity": "c", "mass": MASS, "velocity": SPEED, "restitution": restitution} | body
+    made = thrown(contact, damper=[damper], cavity=[{"name": "c", "gap": 1e-4, "play": 2e-4}])
+    known = vd.simulate(made, events=True)
+    assert known.contacts and known.event_list
+
+    def none(*_):
+        raise AssertionError("an event is built")
+
+    monkeypatch.setattr("vanedamp.coupling.response.event_log.Event", none)
+    assert vd.simulate(made).contacts == known.contacts
+    found = vd.sweep(made.replace({"sweep": {"damper.0.velocity": [SPEED, 2 * SPEED]}}))
+    assert all(status == known.status for status in found.status)

@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 
 from tests.coupling.strength.test_stressed_runs import FIRST, MASS, STIFFNESS, STRESS, scene
 from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.response.observers import samples
 from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles
@@ -67,7 +68,7 @@ def test_damage_of_a_motion_with_impacts_is_that_of_its_dense_history(file):
     made = scene(file)
     response = simulate(made)
     assert response.impacts_per_period > 0.5
-    dense = respond(made, samples_per_period=1000)
+    dense = respond(made, [samples(1000)])
     q = dense.coordinates[40 * 1000 :] @ ReducedModel.load(file).natural[1].T
     expected = damage(rainflow_cycles(q @ STRESS["hot1"][0]), Fatigue(**CURVE).completed(None), static=5e8)
     assert response.stress[0].strength["damage"] == pytest.approx(expected, rel=0.03)
@@ -107,7 +108,7 @@ def noise(file, **changes):
 
 def test_moments_of_a_linear_response_to_noise_are_those_of_its_run(file):
     made = noise(file, cavity=[], damper=[])
-    dense = respond(made, samples_per_period=2000)
+    dense = respond(made, [samples(2000)])
     q = dense.coordinates[8 * 2000 :] @ ReducedModel.load(file).natural[1].T
     for name, rows, factor in (("hot1", STRESS["hot1"][0], 1.0), ("hot2", STRESS["hot2"][3], 3.0)):
         place = list(STRESS).index(name)

@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
+from vanedamp.coupling.response.observers import samples
 from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -92,7 +93,7 @@ def test_stress_changes_nothing_else_and_follows_dense_samples(file):
     assert response.amplitude_mean == plain.amplitude_mean and np.array_equal(response.section, plain.section)
     assert response.impacts_per_period > 0.5
     assert len(response.time) == 0 and response.coordinates is None
-    dense, history = respond(made, samples_per_period=1000), stress_history(made, 1000)
+    dense, history = respond(made, [samples(1000)]), stress_history(made, 1000)
     q = dense.coordinates[40 * 1000 :] @ ReducedModel.load(file).natural[1].T
     assert history.spots == ("hot1", "hot2") and np.array_equal(history.time, dense.time[40 * 1000 :])
     assert history.stress == pytest.approx(np.array([STRESS[name] @ q.T for name in history.spots]), abs=1.0)
@@ -104,7 +105,7 @@ def test_stress_changes_nothing_else_and_follows_dense_samples(file):
 
 def test_samples_that_are_asked_for_stay_as_they_are(file):
     made = scene(file)
-    response, plain = simulate(made, samples_per_period=20), respond(made, samples_per_period=20)
+    response, plain = simulate(made, samples_per_period=20), respond(made, [samples(20)])
     assert response.coordinates[:200] == pytest.approx(plain.coordinates[:200], rel=1e-6, abs=1e-12)
     assert response.coordinates.shape == plain.coordinates.shape and np.array_equal(response.time, plain.time)
     assert response.stress[0].samples_per_period % 20 == 0

@@ -67,10 +67,13 @@ def test_a_sweep_uses_its_spots_most_at_the_worst_point_of_all_axes(known):
     stress = np.random.default_rng(1).uniform(1e7, 2e8, (3, 2, 2, 2))
     stress[2, 0, 1, 0], stress[1, 1, 0, 1] = np.nan, 3e8
     names = ("stress_von_mises", "stress_von_mises_undamped", "stress_von_mises_fixed")
+    stresses = dict.fromkeys(names, stress) | {
+        "utilisation": stress / 5e8 if known else np.full(stress.shape, np.nan),
+    }  # fmt: skip
     sweep = SimpleNamespace(
         axes=axes, scene=SimpleNamespace(excitation=SimpleNamespace(engine_order=None)), hot_spots=["a", "b"],
-        stress=dict.fromkeys(names, stress) | {"utilisation": stress / 5e8 if known else np.full(stress.shape, np.nan)},
-        wear={}, shape=(3, 2, 2), units=lambda: {"excitation.frequency": "Hz"},
+        stress=stresses, quantities=stresses,
+        shape=(3, 2, 2), units=lambda: {"excitation.frequency": "Hz"},
     )  # fmt: skip
     charts = []
     shown = sweep_shown(

@@ -5,6 +5,7 @@ import pytest
 
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.scene.scene import Scene
@@ -79,7 +80,7 @@ def test_closed_forms_are_what_quadrature_finds(tmp_path, stiffness, dashpot, bo
     The slow mode's amplitude, speed over frequency, is 1e5 times the motion: so are the last bits of its shape.
     """
     several = scene(tmp_path, 7, 2, stiffness, dashpot)
-    run = run_of(several, events=True)
+    run = run_of(several, [EVENT_LIST])
     expected, records = by_quadrature(run, 2), run.records
     energies = records.ledger[2, [EXCITATION, VISCOUS, FRICTION]]
     np.testing.assert_allclose(energies, expected[:3].real, rtol=0, atol=bound * np.abs(energies).max())

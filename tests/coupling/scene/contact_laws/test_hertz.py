@@ -10,6 +10,7 @@ from vanedamp.coupling.contacts.collision import collision, speed_of_force
 from vanedamp.coupling.contacts.parallel_springs import parallel_springs
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN
+from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.sweep.sweep import sweep
@@ -35,7 +36,7 @@ def thrown(speed, contact=(), body=(), **changes):
 def first_collision(scene):
     """Largest sum of the springs' forces, N, and duration, s, by the segments of the engine's own motion."""
     peak, begin, end = 0.0, None, None
-    for segment in Walk(run_of(scene, events=True), PERIODS):
+    for segment in Walk(run_of(scene, [EVENT_LIST]), PERIODS):
         if not np.isin(segment.state[: segment.system.contacts], (OPEN, LEAVING)).all():
             begin, end = segment.start if begin is None else begin, segment.start + segment.duration
             times = np.linspace(0.0, segment.duration, 400)
