@@ -60,8 +60,8 @@ def _wear(data: dict[str, Any], rng: np.random.Generator) -> None:
         data["wear"] = {"rate": rates[0] * 1e-13, "impact_rate": rates[1] * 1e-9, "area": rates[2] * 1e-4}
         data["wear"]["impact_exponent"] = float(rng.uniform(0.6, 2.0))
         data["wear"] = {key: float(value) for key, value in data["wear"].items()}
-    contact = data.setdefault("contact", {})
-    if rng.random() < 0.5 and contact.get("law") != "compliant":
+    contact = data.setdefault("contact", {"law": "newton"})
+    if rng.random() < 0.5 and contact["law"] in ("newton", "poisson"):
         contact["pair"] = {"young": float(rng.uniform(1e9, 2e11)), "radius": float(rng.uniform(0.01, 0.1))}
 
 
