@@ -101,8 +101,9 @@ class Dynamics:
         self.response = np.zeros(sine.stop)
         self.response[self.places] = system.response / self.unit[:size]
         self.response[cosine], self.response[sine] = system.table.real / self.size, -system.table.imag / self.size
-        self.outputs = np.zeros((len(system.outputs), sine.stop))
-        self.outputs[:, : system.modes] = system.outputs.reshape(len(system.outputs), system.modes) / self.unit[: system.modes]
+        outputs, n = len(system.outputs), system.modes
+        self.outputs = np.zeros((outputs, sine.stop))
+        self.outputs[:, :n] = system.outputs.reshape(outputs, n) / self.unit[:n]
         extended = np.flatnonzero(system.tilt >= 0)
         self.tilts = np.zeros((len(extended), sine.stop))
         self.tilts[:, self.places] = (np.eye(size)[system.tilt[extended]] - system.turn[extended]) / self.unit[:size]

@@ -114,8 +114,12 @@ class Numbers:
         """Return the derivatives (n, P) of what the scene says besides its equations: `here` (n,); nan at kinks."""
         scale, found = np.where(here == 0.0, 1.0, np.abs(here)), np.full((len(self), len(here)), np.nan)
         for row, scene, value, size in zip(found, self.scenes, self.values, self.size.tolist(), strict=True):
+
+            def scaled(number: float, scene: Callable[[float], Scene] = scene) -> np.ndarray:
+                return read(scene(number)) / scale
+
             with suppress(NotSmooth):
-                row[:] = derivative(lambda number, at=scene: read(at(number)) / scale, value, size, here / scale)
+                row[:] = derivative(scaled, value, size, here / scale)
         return (found * scale * self.size[:, None]).T
 
     def harmonics(self, dynamics: Dynamics, time: float) -> np.ndarray:
@@ -153,6 +157,9 @@ def numbers_of(
         def at(number: float, path: str | MatrixDirection = path) -> Scene:
             return path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
 
+        def moving(number: float, at: Callable[[float], Scene] = at) -> Scene:
+            return derived(at(number))
+
         def moved(number: float, at: Callable[[float], Scene] = at) -> np.ndarray:
             other = at(number)
             frame = Frame(derived(other), speed, dynamics.frame)
@@ -166,7 +173,7 @@ def numbers_of(
 
         sizes.append(size)
         values.append(value)
-        scenes.append(lambda number, at=at: derived(at(number)))
+        scenes.append(moving)
         try:
             found.append(derivative(moved, value, size, here / scale) * scale * size)
         except NotSmooth:

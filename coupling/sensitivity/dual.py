@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -51,15 +51,18 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __array_function__(self, function: Any, types: Any, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
         if function is np.stack and options == {"axis": -1}:
-            value, turns = (np.stack(parts, axis=-1) for parts in ([*map(_value, given[0])], [*map(_turns, given[0])]))
+            value, turns = (np.stack([*map(part, given[0])], axis=-1) for part in (_value, _turns))
             return Dual(value, np.swapaxes(turns, -1, -2))
         if function is np.where:
-            chosen, one, other = given
-            return Dual(np.where(chosen, _value(one), _value(other)), np.where(chosen[..., None], *map(_turns, given[1:])))
+            chosen, *both = given
+            return Dual(np.where(chosen, *map(_value, both)), np.where(chosen[..., None], *map(_turns, both)))
         return NotImplemented
 
     def __getitem__(self, place: Any) -> Dual:
         return Dual(self.value[place], self.turns[place])
+
+    def __iter__(self) -> Iterator[Dual]:
+        return (self[place] for place in range(len(self.value)))
 
     @property
     def real(self) -> Dual:
@@ -82,6 +85,12 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
     def max(self) -> Dual:
         """Return the largest along the only axis."""
         return self[int(np.argmax(self.value))]
+
+
+def zeros(shape: tuple[int, ...] | int, number: int, dtype: type = float) -> Dual:
+    """Return zeros with derivatives by some numbers."""
+    value = np.zeros(shape, dtype)
+    return Dual(value, np.zeros((*value.shape, number), dtype))
 
 
 def _value(one: Any) -> Any:

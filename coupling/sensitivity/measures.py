@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from types import SimpleNamespace
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,14 +12,9 @@ from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.quantities.quantity import evaluated, labels, table
-from vanedamp.coupling.quantities.sums import SUMS, sources_of
-from vanedamp.coupling.response.by_sector import sectors_of_bodies, tuned_amplitude
-from vanedamp.coupling.response.figures import measure, measured_of
 from vanedamp.coupling.response.segment import EventRun, Segment
 from vanedamp.coupling.response.static_deflection import deflects
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sensitivity.dual import Dual
+from vanedamp.coupling.sensitivity.dual import Dual, zeros
 from vanedamp.coupling.sensitivity.integrands import (
     POWERS,
     Functionals,
@@ -32,7 +25,7 @@ from vanedamp.coupling.sensitivity.integrands import (
     response_of,
     slipping,
 )
-from vanedamp.coupling.sensitivity.peaks import Swing, joined, top_of
+from vanedamp.coupling.sensitivity.peaks import Swing
 from vanedamp.coupling.sensitivity.sensitivity_record import Impact
 from vanedamp.coupling.sensitivity.strength import Struck
 from vanedamp.coupling.sensitivity.wear import Wearing
@@ -40,6 +33,7 @@ from vanedamp.coupling.system.system import FLOOR
 
 #: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
 _KEPT, _SAME = 1000, 1e-12
+
 
 class Measures:
     """Takes what passes (derivatives.walk.Watch) from a period `first` on, and all peaks, impacts and samples.
@@ -58,21 +52,20 @@ class Measures:
         self._k, self._P = len(dynamics.scale), len(numbers)
         self._momentum, response, of = momentum_of(dynamics, numbers), response_of(dynamics, numbers), numbers.parts
         self._sampled, self._square = sampled or response, Product(response, response)
-        self._scene: Scene = dynamics.frame.scene
-        self._deflected = deflects(self._scene, dynamics.system)
+        scene, self._deflected = dynamics.frame.scene, deflects(dynamics.frame.scene, dynamics.system)
         self.response = Swing(response, self._deflected)
-        self._outputs = [Swing(one, self._deflected) for one in each_of(dynamics.outputs, of.outputs)]
-        self._tilts = [Swing(one, False) for one in each_of(dynamics.tilts, of.tilts)]
-        self._wear = Wearing(dynamics, numbers) if self._scene.wear is not None else None
-        self._contacts = Struck(dynamics, numbers) if Struck.wanted(self._scene) else None
+        self.outputs = [Swing(one, self._deflected) for one in each_of(dynamics.outputs, of.outputs)]
+        self.tilts = [Swing(one, False) for one in each_of(dynamics.tilts, of.tilts)]
+        self.wear = Wearing(dynamics, numbers) if scene.wear is not None else None
+        self.contacts = Struck(dynamics, numbers) if Struck.wanted(scene) else None
         self._powers: dict[Flow, list[Product]] = {}
         n = 1 + len(POWERS)
         #: integrals of x^2 and of powers; of momentum and of x with harmonics
-        self._sums, self._waves = _none(n, self._P), _none(1 + len(self.orders), self._P, complex)
-        self._lifted = _none(dynamics.system.bodies, self._P)  # time off the floor, s
-        self._hits = np.zeros(len(dynamics.system.rest))
-        self._ends: list[Dual] = []  # momentum at both ends of the periods that count
-        self.lost = _none(1, self._P)  # energy of impacts
+        self.sums, self.waves = zeros(n, self._P), zeros(1 + len(self.orders), self._P, complex)
+        self.lifted = zeros(dynamics.system.bodies, self._P)  # time off the floor, s
+        self.hits = np.zeros(len(dynamics.system.rest))
+        self.ends: list[Dual] = []  # momentum at both ends of the periods that count
+        self.lost = zeros(1, self._P)  # energy of impacts
         self.impacts: list[Impact] = []
         self._unheld = np.zeros((0, self._P))
         self._times, self.samples = list(times), list[tuple[float, np.ndarray, np.ndarray]]()
@@ -117,14 +110,14 @@ class Measures:
         self._sample(begun, Z)
         if segment.period < self.first:
             return
-        for swing in (*self._outputs, *self._tilts):
+        for swing in (*self.outputs, *self.tilts):
             swing.passed(segment.period - self.first, series, course, segment.duration, ends)
         self._integrate(begun, Z, course, end, shift)
         floor = self.dynamics.system.surface == FLOOR
         stands = floor & (segment.state != codes.OPEN) & (segment.state != codes.LEAVING)
-        up = np.setdiff1d(np.arange(len(self._lifted.value)), self.dynamics.system.body[stands])
-        self._lifted.value[up] += segment.duration
-        self._lifted.turns[up] += shift - self._since
+        up = np.setdiff1d(np.arange(len(self.lifted.value)), self.dynamics.system.body[stands])
+        self.lifted.value[up] += segment.duration
+        self.lifted.turns[up] += shift - self._since
 
     def _whole(self, M: np.ndarray, time: float) -> np.ndarray:
         """Return the derivatives (K, P) of z at a time since the start, s."""
@@ -149,33 +142,33 @@ class Measures:
         for row, product in enumerate([self._square, *self._powers[flow]]):
             value, turns = product.each(z, at)
             each = weight @ value, np.tensordot(weight, turns, 1) + value.T @ edges
-            self._sums.value[row] += each[0].sum()
-            self._sums.turns[row] += each[1].sum(axis=0)
-            if self._wear is not None and row == 1 + POWERS.index("friction"):
-                self._wear.friction.value[slipping(flow)] += each[0]
-                self._wear.friction.turns[slipping(flow)] += each[1]
+            self.sums.value[row] += each[0].sum()
+            self.sums.turns[row] += each[1].sum(axis=0)
+            if self.wear is not None and row == 1 + POWERS.index("friction"):
+                self.wear.friction.value[slipping(flow)] += each[0]
+                self.wear.friction.turns[slipping(flow)] += each[1]
         time = segment.start + np.concatenate([[0.0], course.time, [segment.duration]])
         for row, (order, functional) in enumerate(
             [(1, self._momentum), *((order, self.response.functional) for order in self.orders)]
         ):
             value, turns = functional.of(z, at)
             wave = np.exp(-1j * order * self.dynamics.system.omega * time)
-            turning = -1j * order * np.multiply.outer(time, self._omega.turns)
+            turning = -1j * order * np.multiply.outer(time, self.omega.turns)
             whole = (turns[:, 0] + value * turning) * wave[:, None]
-            self._waves.value[row] += weight @ (value[:, 0] * wave)
-            self._waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
+            self.waves.value[row] += weight @ (value[:, 0] * wave)
+            self.waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
         if self._deflected:
-            for swing in (self.response, *self._outputs):
+            for swing in (self.response, *self.outputs):
                 swing.integrate(weight, edges, z, at)
         if segment.start == 0.0:
             Z = np.vstack([self._unheld, Z[len(self._unheld) :]])
         for instant, turned, moves in ((begun.z, Z, self._since), (*end, shift)):
             value, turns = self._momentum.of(instant[None], turned[None])
             drift = self._momentum.rows @ flow.X @ instant
-            self._ends = [*self._ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moves)]
+            self.ends = [*self.ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moves)]
 
     @property
-    def _omega(self) -> Dual:
+    def omega(self) -> Dual:
         """Angular frequency of order 1, rad/s."""
         system, of = self.dynamics.system, self.numbers.parts
         return Dual(system.omega, -of.period * system.omega / system.period)
@@ -210,19 +203,19 @@ class Measures:
         self.impacts.append(Impact(new.start, float(first.value), shift, first.turns))
         if not counts:
             return
-        np.add.at(self._hits, event.struck, 1.0)
+        np.add.at(self.hits, event.struck, 1.0)
         rigid = [place for place, r in enumerate(units) if np.isinf(dynamics.system.spring[r])]
-        for place in rigid if self._wear is not None else ():
+        for place in rigid if self.wear is not None else ():
             r = units[place]
             mobility = Dual(dynamics.rows[r] @ dynamics.rows[r], 2.0 * of.rows[:, r] @ dynamics.rows[r])
-            self._wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
-        if self._contacts is not None and rigid:
+            self.wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
+        if self.contacts is not None and rigid:
             impulse = self._impulses(event.impulse, (turns[1] - turns[0])[massive], massive)
             for place in rigid:
                 r = units[place]
                 if met[place].value > 0.0 and impulse.value[r] != 0.0:
                     after = speed(r, float(event.after[place]), w_after, turns[1])
-                    self._contacts.strike(met[place], after, np.abs(impulse[r]))
+                    self.contacts.strike(met[place], after, np.abs(impulse[r]))
 
     def _impulses(self, impulse: np.ndarray, turns: np.ndarray, massive: np.ndarray) -> Dual:
         """Return impulses (2u,), N s, by how the speeds that they change turn; nan where they depend on each other."""
@@ -244,8 +237,8 @@ class Measures:
             way, spring = (1.0 if r in own else -1.0), float(dynamics.system.spring[r])
             gap, rate = float(dynamics.gap[r] @ before.z), float(dynamics.gap[r] @ before.flow.X @ before.z)
             turned = dynamics.gap[r] @ Z + of.gap[:, r] @ before.z + rate * shift
-            self._sums.value[row] += way * 0.5 * spring * gap**2
-            self._sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
+            self.sums.value[row] += way * 0.5 * spring * gap**2
+            self.sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
 
     def _sample(self, begun: Before, Z: np.ndarray) -> None:
         """Take displacement, velocity and acceleration at the times within a segment."""
@@ -268,132 +261,8 @@ class Measures:
     @property
     def heights(self) -> Dual:
         """The largest displacements of all periods (n,), m."""
-        return self.response.distances(self._nothing)[0]
+        return self.response.distances(zeros((), self._P))[0]
 
     def energies(self) -> dict[str, Dual]:
         """Return the work of the excitation and the losses over the periods that count, J."""
-        return {name: self._sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
-
-    def figures(self, periods: int) -> tuple[dict[str, Dual], bool]:
-        """Return the figures by name, over the periods that count, of `periods` in all.
-
-        And whether largest values have derivatives on one side only.
-        """
-        sources, kinks = self._sources(periods)
-        found = dict(_named(evaluated(sources)))
-        for row, order in enumerate(self.orders, 1):
-            if order != 1:
-                wave = {"harmonic": self._waves[row], "periods": sources["periods"], "period": sources["period"]}
-                for one in table().values():
-                    if set(one.needs) == set(wave):
-                        found[f"harmonic.{order}.{one.name.removesuffix('_harmonic')}"] = one.of(wave)
-        return found | {f"energy.{name}": one for name, one in self.energies().items()}, kinks
-
-    def _sources(self, periods: int) -> tuple[dict[str, Any], bool]:
-        """Return what quantities need, as far as it has derivatives (quantities.sums), and whether it has kinks."""
-        system, of, nothing, first = self.dynamics.system, self.numbers.parts, self._nothing, self.first
-        count, row = max(periods - first, 1), np.empty(len(SUMS))
-        measure(measured_of(self._scene, system), self.run.records, first, periods, np.nan, row)
-        known, period = sources_of(row), Dual(system.period, of.period)
-        span = count * period
-        static = self._mean(self.response, span)
-        (heights, apart), (distances, aside) = (self.response.distances(mean, first) for mean in (nothing, static))
-        (peak, top), (distance, farthest) = (top_of(each) for each in (heights, distances))
-        found: dict[str, Any] = {
-            "periods": count, "period": period, "omega": self._omega, "static": static, "square": self._sums[0],
-            "peak": peak, "peaks": heights.sum(), "distance": distance, "distances": distances.sum(),
-            "momentum": self._waves[0], "momentum_change": self._ends[-1] - self._ends[0],
-            "impacts": float(known["impacts"]) + nothing, "load": self._load, "energy": self.energies(),
-            "carried": Dual(known["carried"], of.mass[:, system.along].sum(axis=1)),
-        }  # fmt: skip
-        if 1 in self.orders:
-            found["harmonic"] = self._waves[1 + self.orders.index(1)]
-        kinks = [apart, aside, top, farthest]
-        if self._wear is not None:
-            found["wear"], one_sided = self._wear.rates(span)
-            kinks.append(one_sided)
-        if self._contacts is not None:
-            found["contacts"], one_sided = self._contacts.worst()
-            kinks.append(one_sided)
-        if self._outputs:
-            found["sectors"], one_sided = self._sectors(span, count)
-            kinks.append(one_sided)
-        plane = self.run.outcome().plane
-        if plane is not None:
-            found["tilt"], one_sided = self._tilted()
-            found["lifted"] = np.where(system.tilt < 0, np.nan, 1.0) * self._lifted
-            found["walls"] = plane.walls[first:periods].sum(axis=0) + 0.0 * self._lifted
-            kinks.append(one_sided)
-        return found, any(kinks)
-
-    def _mean(self, swing: Swing, span: Dual) -> Dual:
-        """Return the mean over a time, s, from which distances count: zero unless bodies bring a static load."""
-        return swing.integral / span if self._deflected else self._nothing
-
-    def _sectors(self, span: Dual, count: int) -> tuple[SimpleNamespace, bool]:
-        """Return the response of the sectors of a ring, as response.by_sector does, and whether it has kinks."""
-        system, number = self.dynamics.system, self._P
-        found = [one.distances(self._mean(one, span)) for one in self._outputs]
-        mean = joined([heights.mean() for heights, _ in found], number)
-        owner = np.array(sectors_of_bodies(self._scene, system), int)
-        units = np.flatnonzero(~system.without_body)
-        units = units[owner[system.body[units]] >= 0]
-        hits = np.bincount(owner[system.body[units]], self._hits[units], len(found)) / count
-        tuned = tuned_amplitude(self._scene)
-        return SimpleNamespace(
-            amplitude_mean=mean, amplitude_max=joined([heights.max() for heights, _ in found], number),
-            amplitude_undamped=None, amplitude_fixed=None, impacts_per_period=hits + _none(len(found), number),
-            tuned=None if tuned is None else self._tuned(tuned),
-        ), any((top_of(mean)[1], *(apart for _, apart in found)))  # fmt: skip
-
-    def _tuned(self, here: float) -> Dual:
-        """Return the amplitude of the tuned ring, m."""
-        read = self.numbers.of_scene(lambda scene: np.array([tuned_amplitude(scene) or np.nan]), np.array([here]))
-        return Dual(here, read[0])
-
-    def _tilted(self) -> tuple[Dual, bool]:
-        """Return the largest tilts (b,) of bodies, rad, nan of sliders, and whether they have kinks."""
-        bodies, kinks = self.dynamics.system.bodies, False
-        tilt = Dual(np.full(bodies, np.nan), np.zeros((bodies, self._P)))
-        for body, swing in zip(np.flatnonzero(self.dynamics.system.tilt >= 0), self._tilts, strict=True):
-            heights, apart = swing.distances(self._nothing)
-            tilt.value[body], tilt.turns[body] = heights.max().value, heights.max().turns
-            kinks |= apart
-        return tilt, kinks
-
-    @property
-    def _nothing(self) -> Dual:
-        return _none(1, self._P)[0]
-
-    @property
-    def _load(self) -> Dual:
-        """Loads of order 1 on the bodies, together, N."""
-        dynamics, of = self.dynamics, self.numbers.parts
-        along, e = dynamics.system.along, len(dynamics.system.frequency)
-        cosine, sine = dynamics.one + 1, dynamics.one + 1 + e
-        root, size = dynamics.root[along], dynamics.size
-        value = dynamics.load[along][:, [cosine, sine]] * size * root[:, None]
-        turns = of.load[:, along][:, :, [cosine, sine]] * size * root[:, None]
-        turns = turns + value * (of.root[:, along] / root)[:, :, None]
-        return Dual(
-            dynamics.system.load[0, along].sum(), (turns[:, :, 0] - 1j * turns[:, :, 1]).sum(axis=1)
-        )  # fmt: skip
-
-
-def _none(number: int, turns: int, dtype: type = float) -> Dual:
-    return Dual(np.zeros(number, dtype), np.zeros((number, turns), dtype))
-
-
-def _named(found: Mapping[str, Any]) -> Iterator[tuple[str, Dual]]:
-    """Yield quantities that are known, by name; of those with a dimension each number, by its label or place."""
-    for name, value in found.items():
-        if not isinstance(value, Dual):
-            continue
-        if not value.value.ndim:
-            if not np.isnan(value.value):
-                yield name, value
-            continue
-        along = labels(table()[name].dims[-1]) or [str(place) for place in range(len(value.value))]
-        for place, label in enumerate(along):
-            if not np.isnan(value.value[place]):
-                yield f"{name}.{label}", value[place]
+        return {name: self.sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}

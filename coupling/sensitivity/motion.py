@@ -17,6 +17,7 @@ from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sensitivity.figures import Figures
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
@@ -115,11 +116,12 @@ def check_together(growth: np.ndarray) -> None:
 def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
     """Return the record of a motion with derivatives. turns: (k, P) of the state."""
     size, number = motion.numbers.size, len(motion.numbers)
-    (figures, kinks), heights = measures.figures(periods), measures.heights
+    told, heights = Figures(measures, periods), measures.heights
+    figures = told.all()
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
     return Sensitivity(
         paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
-        note="; ".join(note for note, said in zip(_NOTES, (kinks, motion.completed), strict=True) if said),
+        note="; ".join(note for note, said in zip(_NOTES, (told.kinks, motion.completed), strict=True) if said),
         values={name: float(np.real(each.value)) for name, each in figures.items()},
         derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
         state=frozen(state), state_derivative=frozen(turns),

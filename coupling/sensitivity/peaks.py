@@ -76,7 +76,7 @@ class Swing:
     def distances(self, mean: Dual, first: int = 0) -> tuple[Dual, bool]:
         """Return the largest distances (n,) from a value in periods from `first` on, and whether there are kinks."""
         found = [
-            largest([(value - way * mean.value, turns - way * mean.turns)
+            largest([(value - way * float(mean.value), turns - way * mean.turns)
                      for way, values in ((1.0, up), (-1.0, down)) for value, turns in values], self._number)
             for up, down in self.found[first:]
         ]  # fmt: skip
@@ -93,8 +93,9 @@ def _summits(row: np.ndarray, series: Series, course: Course, duration: float, l
     """Return the times of the summits of a functional row (K,) within a segment, near nodes above a value, s."""
     x = course.z @ row
     inner = np.flatnonzero((x[1:-1] >= x[:-2]) & (x[1:-1] >= x[2:])) + 1
-    least = max(least, x.max(initial=-np.inf) - _NEAR * np.ptp(x) if len(x) else least)
-    found = [_summit(row, series, course, node, duration) for node in (*inner.tolist(), 0, len(x) - 1) if x[node] >= least]
+    least = max(least, x.max() - _NEAR * np.ptp(x))
+    near = [node for node in (*inner.tolist(), 0, len(x) - 1) if x[node] >= least]
+    found = (_summit(row, series, course, node, duration) for node in near)
     return [at for at in found if at is not None]
 
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-
 #: reasons why derivatives do not have what some quantities need, by names of sources (arguments of their formulas)
 NOT_IN_DERIVATIVES: dict[str, str] = {
     "confidence": "tells how well a mean is known, not the motion",

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.wear import patches
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sensitivity.dual import Dual
-from vanedamp.coupling.sensitivity.peaks import joined, top_of
+from vanedamp.coupling.sensitivity.dual import Dual, zeros
 
 _HOUR = 3600.0
 
@@ -32,15 +31,14 @@ class Wearing:
     def __init__(self, dynamics: Dynamics, numbers: Numbers) -> None:
         self._dynamics, self._numbers, system = dynamics, numbers, dynamics.system
         rows = rows_of_units(system)
-        self._places = [SimpleNamespace(damper=number, side=side) for number, side, _ in rows.places]
+        self._places = [ContactWork(*place, 1.0, 0, np.zeros((0, 2))) for place in rows.places]
         self._alone = rows.without_body
         scene, u = dynamics.frame.scene, len(self._places)
         self._known = [patch.area is not None for patch in patches(scene, self._places)]
         said = self._said(scene)
         told = Dual(said, numbers.of_scene(self._said, said))
         self._exponent, self._of = told[0], told[1:]
-        nothing = np.zeros((u, len(numbers)))
-        self.friction, self._struck = Dual(np.zeros(u), nothing), Dual(np.zeros(u), nothing.copy())
+        self.friction, self._struck = zeros(u, len(numbers)), zeros(u, len(numbers))
 
     def _said(self, scene: Scene) -> np.ndarray:
         """Return what a scene says of wear: the exponent, and of each unit friction, both rates and area."""
@@ -64,11 +62,8 @@ class Wearing:
         self._struck.value[unit] += power.value
         self._struck.turns[unit] += power.turns
 
-    def rates(self, span: Dual) -> tuple[list[ContactRates] | None, bool]:
-        """Return the rates over a time, s, and whether the fastest depth has derivatives on one side.
-
-        None where impacts on springs wear, whose energies are not followed.
-        """
+    def rates(self, span: Dual) -> list[ContactRates] | None:
+        """Return the rates over a time, s; None where impacts on springs wear, whose energies are not followed."""
         system, of = self._dynamics.system, self._numbers.parts
         found = []
         for unit in range(len(self._places)):
@@ -76,10 +71,9 @@ class Wearing:
             if unit < system.contacts:
                 coefficient = Dual(system.friction[unit], of.friction[:, unit])
                 if np.isfinite(system.spring[unit]) and impact.value > 0.0:
-                    return None, False
+                    return None
             rubs = bool(coefficient.value > 0.0)
             work = (self.friction[unit] / coefficient if rubs else 0.0 * self.friction[unit]) / span
             volume = _HOUR * (sliding * work + impact * self._struck[unit] / span)
             found.append(ContactRates(work, volume, volume / area if self._known[unit] else None))
-        depths = [one.depth_rate for one in found if one.depth_rate is not None]
-        return found, top_of(joined(depths, len(self._numbers)))[1]
+        return found

@@ -17,12 +17,14 @@ from vanedamp.coupling.sensitivity.sensitivity_record import NOT_IN_DERIVATIVES
 SHORT = TABLES | {"time": {"periods": 5, "transient": 2}, "initial": {"displacement": 0.1}}
 WEAR = {"wear": {"rate": 2e-13, "impact_rate": 3e-9, "impact_exponent": 1.3, "area": 1e-4}}
 PAIR = {"young": 2e11, "radius": 0.02, "yield_strength": 4e8}
-LINE = PAIR | {"radius": 0.05, "width": 0.01, "depth": 0.02}
+SPHERE = {"contact": {"law": "newton", "pair": PAIR}}
+LINE = {"contact": {"law": "newton", "pair": PAIR | {"radius": 0.05, "width": 0.01, "depth": 0.02}}}
 #: a block that rocks, on a floor that it leaves
 BLOCK = SHORT | {
-    "cavity": [{"name": "c", "gap": 0.5, "play": 0.3}],
-    "damper": [{"cavity": "c", "shape": "block", "mass": 0.08, "restitution": 0.3, "friction": 0.2, "length": 0.4, "height": 0.5,
-                "lift": 0.1, "tilt": 0.05, "tilt_rate": 0.04}],
+    "cavity": [{"name": "c", "gap": 0.5, "play": 0.3}], "gravity": {"acceleration": 0.04},
+    "time": {"periods": 2, "transient": 0},
+    "damper": [{"cavity": "c", "shape": "block", "mass": 0.08, "restitution": 0.3, "friction": 0.2, "length": 0.4,
+                "height": 0.5, "lift": 0.1, "tilt": 0.05, "tilt_rate": 0.04}],
 }  # fmt: skip
 #: a body that a pull along its cavity presses to a wall, and with it the structure from its place
 PULLED = SHORT | {"gravity": {"acceleration": 3.0, "orientation_deg": 60.0}}
@@ -34,7 +36,9 @@ def ring(folder):
     return {
         "structure": {"model": "ring", "file": chain.saved(folder)},
         "excitation": {"frequency": frequency, "force": 40.0, "at": "tip", "wave": 0},
-        "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all", "scatter": {"position": 0.5, "seed": 1}}],
+        "cavity": [
+            {"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all", "scatter": {"position": 0.5, "seed": 1}}
+        ],
         "gravity": {"acceleration": 2000.0, "orientation_deg": 90.0},
         "damper": [{"cavity": "c", "mass": 0.05, "friction": 0.0, "restitution": 0.6}],
         "time": {"periods": 3, "transient": 1},
@@ -44,10 +48,10 @@ def ring(folder):
 CASES = {
     "wear": (SHORT | WEAR, ["damper.0.friction", "damper.0.mass", "wear.impact_exponent", "wear.area", "wear.rate"],
              ["wear_work_rate", "wear_volume_rate", "wear_depth_rate", "energy_share.friction", "impacts_per_period"]),
-    "sphere": (SHORT | {"contact": {"law": "newton", "pair": PAIR}}, ["damper.0.mass", "cavity.c.gap", "contact.pair.young",
-                                                     "contact.pair.radius", "contact.pair.yield_strength"],
+    "sphere": (SHORT | SPHERE, ["damper.0.mass", "cavity.c.gap", "contact.pair.young", "contact.pair.radius",
+                                "contact.pair.yield_strength"],
                ["contact_force", "contact_pressure", "contact_utilisation", "impact_speed_max"]),
-    "line": (SHORT | {"contact": {"law": "newton", "pair": LINE}}, ["damper.0.restitution", "contact.pair.width", "contact.pair.young"],
+    "line": (SHORT | LINE, ["damper.0.restitution", "contact.pair.width", "contact.pair.young"],
              ["contact_force", "contact_pressure", "contact_utilisation"]),
     "deflected": (PULLED | WEAR, ["gravity.acceleration", "structure.stiffness", "damper.0.restitution"],
                   ["static_deflection", "amplitude_max_dynamic", "amplitude_mean_dynamic"]),
@@ -106,9 +110,11 @@ def test_compliant_contacts_tell_no_hertzian_force():
 
 FORMULAS = {
     "add": lambda a, b: a + 2.0 + b, "subtract": lambda a, b: 3.0 - a - b, "multiply": lambda a, b: 2.0 * a * b,
-    "divide": lambda a, b: 1.0 / a + a / b / 2, "power": lambda a, b: a**b + a**2, "negative": lambda a, b: -a * abs(-b),
+    "divide": lambda a, b: 1.0 / a + a / b / 2, "power": lambda a, b: a**b + a**2,
+    "negative": lambda a, b: -a * abs(-b),
     "root": lambda a, b: np.sqrt(np.maximum(a * b, 0.0)), "hypot": lambda a, b: np.hypot(a, -b),
-    "angle": lambda a, b: np.arctan2(0.0 - a, b), "complex": lambda a, b: ((a + 1j * b) * np.conjugate(a * 1j - b)).real,
+    "angle": lambda a, b: np.arctan2(0.0 - a, b),
+    "complex": lambda a, b: ((a + 1j * b) * np.conjugate(a * 1j - b)).real,
     "imaginary": lambda a, b: (np.float64(2.0) * (a + 1j * b) * (a + 1j * b)).imag,
     "stack": lambda a, b: (np.stack([a, b], axis=-1) / np.where(a > 0.0, a, np.nan)[None]).sum(),
     "largest": lambda a, b: max([a, b]) + sum([a, b]) + np.stack([a, b], axis=-1).max(),
