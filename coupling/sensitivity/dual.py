@@ -89,7 +89,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
 def zeros(shape: tuple[int, ...] | int, number: int, dtype: type = float) -> Dual:
     """Return zeros with derivatives by some numbers."""
-    value = np.zeros(shape, dtype)
+    value: np.ndarray = np.zeros(shape, dtype)
     return Dual(value, np.zeros((*value.shape, number), dtype))
 
 
