@@ -40,7 +40,7 @@ class Figures:
         for name, value in evaluated(sources).items():
             found |= dict(_named(name, value + self._zero if isinstance(value, float) else value))
         for order, wave in zip(self._measures.orders, self._measures.waves[1:], strict=True):
-            part = {"harmonic": wave} | {name: sources[name] for name in ("periods", "period")}
+            part = {"harmonic": wave} | {name: sources[name] for name in ("counted", "period")}
             for one in table().values() if order != 1 else ():
                 if set(one.needs) == set(part):
                     found[f"harmonic.{order}.{one.name.removesuffix('_harmonic')}"] = one.of(part)
@@ -53,8 +53,8 @@ class Figures:
         known, static = sources_of(row), self._mean(measures.response)
         heights, distances = (self._distances(measures.response, mean, first) for mean in (self._zero, static))
         found: dict[str, Any] = {
-            "periods": self._count, "period": self._period, "omega": measures.omega, "static": static,
-            "peak": self._top(heights), "peaks": heights.sum(),
+            "counted": self._count, "period": self._period, "omega": measures.omega, "static": static,
+            "highest": self._top(heights), "heights": heights.sum(),
             "distance": self._top(distances), "distances": distances.sum(), "square": measures.sums[0],
             "momentum": measures.waves[0], "momentum_change": measures.ends[-1] - measures.ends[0],
             "impacts": float(known["impacts"]) + self._zero, "load": self._load, "energy": measures.energies(),
@@ -78,8 +78,13 @@ class Figures:
         return found
 
     def _mean(self, swing: Swing) -> Dual:
-        """Return the mean from which distances count: zero unless bodies bring a static load."""
-        return swing.integral / self._span if swing.deflected else self._zero
+        """Return the mean from which distances count: zero unless bodies bring a static load.
+
+        By numbers that bring one it jumps.
+        """
+        if swing.deflected:
+            return swing.integral / self._span
+        return Dual(0.0, np.where(self._measures.begins, np.nan, 0.0))
 
     def _distances(self, swing: Swing, mean: Dual, first: int = 0) -> Dual:
         found, kinks = swing.distances(mean, first)

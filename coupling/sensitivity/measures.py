@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.linalg import null_space
 
 from vanedamp.coupling.derivatives.derivative import Before
 from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics, Flow
@@ -29,7 +30,7 @@ from vanedamp.coupling.sensitivity.peaks import Swing
 from vanedamp.coupling.sensitivity.sensitivity_record import Impact
 from vanedamp.coupling.sensitivity.strength import Struck
 from vanedamp.coupling.sensitivity.wear import Wearing
-from vanedamp.coupling.system.system import FLOOR
+from vanedamp.coupling.system.system import FLOOR, System
 
 #: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
 _KEPT, _SAME = 1000, 1e-12
@@ -53,6 +54,8 @@ class Measures:
         self._momentum, response, of = momentum_of(dynamics, numbers), response_of(dynamics, numbers), numbers.parts
         self._sampled, self._square = sampled or response, Product(response, response)
         scene, self._deflected = dynamics.frame.scene, deflects(dynamics.frame.scene, dynamics.system)
+        #: (P,) whether numbers bring a static load where there is none: distances count from the mean then
+        self.begins = np.array([not self._deflected and deflects(scene, one) for one in _loaded(dynamics, numbers)])
         self.response = Swing(response, self._deflected)
         self.outputs = [Swing(one, self._deflected) for one in each_of(dynamics.outputs, of.outputs)]
         self.tilts = [Swing(one, False) for one in each_of(dynamics.tilts, of.tilts)]
@@ -208,7 +211,8 @@ class Measures:
         for place in rigid if self.wear is not None else ():
             r = units[place]
             mobility = Dual(dynamics.rows[r] @ dynamics.rows[r], 2.0 * of.rows[:, r] @ dynamics.rows[r])
-            self.wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
+            if met[place].value > 0.0:
+                self.wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
         if self.contacts is not None and rigid:
             impulse = self._impulses(event.impulse, (turns[1] - turns[0])[massive], massive)
             for place in rigid:
@@ -218,13 +222,13 @@ class Measures:
                     self.contacts.strike(met[place], after, np.abs(impulse[r]))
 
     def _impulses(self, impulse: np.ndarray, turns: np.ndarray, massive: np.ndarray) -> Dual:
-        """Return impulses (2u,), N s, by how the speeds that they change turn; nan where they depend on each other."""
+        """Return impulses (2u,), N s, by how the speeds that they change turn; nan of those that these do not tell."""
         acts = np.flatnonzero(impulse)
         rows, found = self.dynamics.rows[acts][:, massive], np.full((len(impulse), self._P), np.nan)
         length = np.linalg.norm(rows, axis=1)
-        if np.linalg.matrix_rank(rows / length[:, None], DEPENDENT) == len(acts):
-            left = turns - (impulse[acts] @ self.numbers.parts.rows[:, acts][:, :, massive]).T
-            found[acts] = np.linalg.pinv(rows.T / length) @ left / length[:, None]
+        left = turns - (impulse[acts] @ self.numbers.parts.rows[:, acts][:, :, massive]).T
+        told = np.linalg.norm(null_space((rows / length[:, None]).T, DEPENDENT), axis=1) <= DEPENDENT
+        found[acts[told]] = (np.linalg.pinv(rows.T / length, DEPENDENT) @ left / length[:, None])[told]
         return Dual(impulse, found)
 
     def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
@@ -266,3 +270,11 @@ class Measures:
     def energies(self) -> dict[str, Dual]:
         """Return the work of the excitation and the losses over the periods that count, J."""
         return {name: self.sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
+
+
+def _loaded(dynamics: Dynamics, numbers: Numbers) -> Iterator[System]:
+    """Yield the system with what each number adds to the static loads, in place of these."""
+    of, one = numbers.parts, dynamics.one
+    for load, root in zip(of.load[:, :, one], of.root, strict=True):
+        weight = dynamics.size * (load * dynamics.root + dynamics.load[:, one] * root)
+        yield dynamics.system._replace(weight=weight)

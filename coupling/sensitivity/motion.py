@@ -118,10 +118,13 @@ def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, 
     size, number = motion.numbers.size, len(motion.numbers)
     told, heights = Figures(measures, periods), measures.heights
     figures = told.all()
+    notes = [note for note, said in zip(_NOTES, (told.kinks, motion.completed), strict=True) if said]
+    begins = [path for path, said in zip(motion.numbers.paths, measures.begins.tolist(), strict=True) if said]
+    notes += [f"{path}: bodies begin to deflect the structure, from where distances count" for path in begins]
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
     return Sensitivity(
         paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
-        note="; ".join(note for note, said in zip(_NOTES, (told.kinks, motion.completed), strict=True) if said),
+        note="; ".join(notes),
         values={name: float(np.real(each.value)) for name, each in figures.items()},
         derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
         state=frozen(state), state_derivative=frozen(turns),
