@@ -172,11 +172,12 @@ def _checked(kind: str, subject: str, scene: Scene, given: Orbit | Scene, period
 
 def claimed(found: Sensitivity, weights: np.ndarray) -> dict[str, np.ndarray]:
     """Return the derivatives as numbers change by some weights (P,), by the names of the differences."""
+    moved = weights != 0.0
     return {
         "state": found.state_derivative @ weights, "peak": found.peak_derivative @ weights,
         "impact_time": found.impact_time_derivative @ weights,
         "impact_speed": np.sign(found.impact_speed) * (found.impact_speed_derivative @ weights),
-        **{name: np.atleast_1d(turns @ weights) for name, turns in found.derivatives.items()},
+        **{name: np.atleast_1d(turns[moved] @ weights[moved]) for name, turns in found.derivatives.items()},
     }  # fmt: skip
 
 
@@ -190,6 +191,12 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
         exact = reference.derivative[name]
         if "rests" in found.note and np.isnan(claim).any():
             continue  # there is an orbit for each place of rest
+        if np.isnan(claim).all() and "begin to deflect" in found.note:
+            continue  # distances count from elsewhere on either side
+        if found.values.get(name) == 0.0 and not claim.any() and _of_largest(name):
+            continue  # bodies in touch strike at round-off
+        if name.startswith("tilt_") and not np.isclose(found.values[name], base[name][0], rtol=1e-9):
+            continue  # the engine notes tilts at the nodes of cubics
         if name in ("impact_time", "impact_speed"):
             if not len(ours):  # compliant contacts have none
                 continue

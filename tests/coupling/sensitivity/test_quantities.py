@@ -100,6 +100,15 @@ def test_every_source_has_derivatives_or_a_reason(tmp_path):
     assert all(NOT_IN_DERIVATIVES.values())
 
 
+def test_where_bodies_begin_to_deflect_distances_have_no_derivative():
+    """Level, nothing presses a slider along its cavity: peaks count from zero; at any tilt from the mean position."""
+    found = vd.sensitivity(vd.Scene.of(SHORT, "scene"), ["gravity.orientation_deg", "damper.0.mass"])
+    assert found.status == "ok" and "gravity.orientation_deg: bodies begin to deflect" in found.note
+    for name in ("static_deflection", "amplitude_max_dynamic", "amplitude_mean_dynamic"):
+        assert np.isnan(found.derivatives[name]).tolist() == [True, False], name
+    assert np.isfinite(found.derivatives["amplitude_max"]).all()
+
+
 def test_compliant_contacts_tell_no_hertzian_force():
     """Their largest force follows from how long they last."""
     tables = SHORT | {"contact": {"law": "compliant", "stiffness": 300.0, "pair": PAIR}}
@@ -137,7 +146,7 @@ def test_plain_numpy_works_on_numbers_with_derivatives(name):
 def test_the_tables_formulas_run_on_numbers_with_derivatives():
     """Of sums that a number changes by their own values each: a power of it."""
     one = lambda value: Dual(value, [value])  # noqa: E731
-    sums = {"square": one(6.0), "periods": 2, "period": one(0.5), "harmonic": one(0.2 - 0.1j)}
+    sums = {"square": one(6.0), "counted": 2, "period": one(0.5), "harmonic": one(0.2 - 0.1j)}
     found = evaluated(sums)
     assert math.isclose(found["amplitude_rms"].value, math.sqrt(6.0)) and found["amplitude_rms"].turns[0] == 0.0
     assert found["amplitude_harmonic"].turns[0] == pytest.approx(0.0, abs=1e-15)
