@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
@@ -23,6 +24,13 @@ _NAMED = 3
 
 #: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
+#: what ensembles do not have, and why
+_ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
+_PEAK = "the peak without bodies is in `reduction`, others are not kept"
+NOT_IN_ENSEMBLES = {
+    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
+    "fixed_top": _PEAK,
+}  # fmt: skip
 #: dimensions over which the largest is kept
 _REDUCED = {"damper", "hot_spot", "sector"}
 PEAK, REDUCTION = "peak_amplitude", "reduction"
@@ -132,7 +140,7 @@ class Ensemble(Record, Plotted):
         swept = resonance_axis(self.scene, self.axes)[0]
         if swept is None or len(self.axes[swept]) < 2:
             return ""
-        mean = np.where(self.status == "ok", self.members["amplitude_mean_dynamic"], -np.inf)
+        mean = np.where(self.status == "ok", self.members[amplitude_mean_dynamic.name], -np.inf)
         curves = np.moveaxis(mean, 1 + list(self.axes).index(swept), -1)[(slice(None), *place)]
         top = self.axes[swept][curves.argmax(axis=-1)]
         share = float(np.isin(top, (self.axes[swept].min(), self.axes[swept].max())).mean())
