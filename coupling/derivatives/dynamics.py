@@ -50,7 +50,8 @@ class Dynamics:
     scale: (k,) sizes of states; to_state, from_state: (k, 2N) and (2N, k) between u and states; rows: (2u, N) J in
     coordinates root mass q; gap: (u, K), speed: (2u, K) functionals of gaps and of the rows' speeds; typical: (K,)
     sizes of z in a typical motion; follows (j, 2N), bound (j,): u of a slider that slips is follows u - way bound;
-    pulled: (j, N) elongations; response: (K,) displacement, m. like: dynamics of another scene whose frequencies and
+    pulled: (j, N) elongations; response: (K,) displacement, m; outputs, tilts: (., K) further outputs, m, and tilts of
+    planar bodies in their cavities, rad. like: dynamics of another scene whose frequencies and
     size serve here, too, so that both compare.
     """
 
@@ -100,6 +101,12 @@ class Dynamics:
         self.response = np.zeros(sine.stop)
         self.response[self.places] = system.response / self.unit[:size]
         self.response[cosine], self.response[sine] = system.table.real / self.size, -system.table.imag / self.size
+        outputs, n = len(system.outputs), system.modes
+        self.outputs = np.zeros((outputs, sine.stop))
+        self.outputs[:, :n] = system.outputs.reshape(outputs, n) / self.unit[:n]
+        extended = np.flatnonzero(system.tilt >= 0)
+        self.tilts = np.zeros((len(extended), sine.stop))
+        self.tilts[:, self.places] = (np.eye(size)[system.tilt[extended]] - system.turn[extended]) / self.unit[:size]
         self._flows: dict[bytes, Flow] = {}
 
     @cached_property

@@ -189,5 +189,6 @@ def _turned(system: System, sign: np.ndarray) -> System:
     rows = ("load", "weight", "response", "J", "elongation", "floor", "turn", "rise", "casing")
     both = {name: getattr(system, name) * own * own[:, None] for name in ("stiffness", "damping")}
     return system._replace(
-        viscous=system.viscous * sign * sign[:, None], **both, **{name: getattr(system, name) * own for name in rows}
+        viscous=system.viscous * sign * sign[:, None], **both, **{name: getattr(system, name) * own for name in rows},
+        outputs=system.outputs.reshape(len(system.outputs), n) * sign,
     )  # fmt: skip

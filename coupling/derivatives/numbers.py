@@ -7,6 +7,7 @@ name; what follows from them along a motion is exact.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -51,6 +52,8 @@ class Parts(NamedTuple):
     bound: np.ndarray  # (j,)
     pulled: np.ndarray  # (j, N)
     response: np.ndarray  # (K,)
+    outputs: np.ndarray  # (o, K)
+    tilts: np.ndarray  # (t, K)
     mass: np.ndarray  # (N,)
     J: np.ndarray  # (2u, N)
     friction: np.ndarray  # (u,)
@@ -70,7 +73,7 @@ class Parts(NamedTuple):
         return cls(
             dynamics.root, dynamics.rows, dynamics.gap, dynamics.speed, dynamics.load, dynamics.turn,
             dynamics.to_state, dynamics.from_state, dynamics.follows, dynamics.bound, dynamics.pulled,
-            dynamics.response, s.mass, s.J, s.friction, s.limit, s.restitution,
+            dynamics.response, dynamics.outputs, dynamics.tilts, s.mass, s.J, s.friction, s.limit, s.restitution,
             np.where(np.isfinite(s.spring), s.spring, 0.0), s.dashpot, s.tangential, s.frequency,
             np.array(s.period), start,
         )  # fmt: skip
@@ -92,18 +95,32 @@ class Numbers:
     """Numbers of a scene, P of them: their derivatives are by `size` (P,) of each.
 
     parts: derivatives of the parts of the equations, times the sizes; paths (P,); frequency: (e,) of the harmonics,
-    rad/s.
+    rad/s; scenes: (P,) how the scene that moves follows from each number; values: (P,) of these.
     """
 
     paths: tuple[str, ...]
     size: np.ndarray
     parts: Parts
     frequency: np.ndarray
+    scenes: Sequence[Callable[[float], Scene]]
+    values: Sequence[float]
     #: derivatives of the flows that a motion has met (derivatives.flow_derivative)
     flows: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.paths)
+
+    def of_scene(self, read: Callable[[Scene], np.ndarray], here: np.ndarray) -> np.ndarray:
+        """Return the derivatives (n, P) of what the scene says besides its equations: `here` (n,); nan at kinks."""
+        scale, found = np.where(here == 0.0, 1.0, np.abs(here)), np.full((len(self), len(here)), np.nan)
+        for row, scene, value, size in zip(found, self.scenes, self.values, self.size.tolist(), strict=True):
+
+            def scaled(number: float, scene: Callable[[float], Scene] = scene) -> np.ndarray:
+                return read(scene(number)) / scale
+
+            with suppress(NotSmooth):
+                row[:] = derivative(scaled, value, size, here / scale)
+        return (found * scale * self.size[:, None]).T
 
     def harmonics(self, dynamics: Dynamics, time: float) -> np.ndarray:
         """Return the derivatives (P, K) of constants and harmonics in z at a time since the passage's start, s."""
@@ -128,6 +145,7 @@ def numbers_of(
     start = begins or (lambda _, frame: np.zeros(len(frame.to_state)))
     parts = Parts.of(dynamics, start(scene, dynamics.frame))
     here, sizes, found = parts.flat(), [], []
+    values, scenes = list[float](), list[Callable[[float], Scene]]()
     scale = _scales(parts, dynamics)
     for path in paths:
         if isinstance(path, MatrixDirection):
@@ -136,8 +154,14 @@ def numbers_of(
             name, value = path, number_of_motion(scene, path, "numbers")
             size = abs(value) or _size(path, dynamics)
 
-        def moved(number: float, path: str | MatrixDirection = path) -> np.ndarray:
-            other = path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
+        def at(number: float, path: str | MatrixDirection = path) -> Scene:
+            return path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
+
+        def moving(number: float, at: Callable[[float], Scene] = at) -> Scene:
+            return derived(at(number))
+
+        def moved(number: float, at: Callable[[float], Scene] = at) -> np.ndarray:
+            other = at(number)
             frame = Frame(derived(other), speed, dynamics.frame)
             made = Dynamics(frame, dynamics.scale, dynamics)
             flat = Parts.of(made, start(other, frame)).flat()
@@ -148,13 +172,15 @@ def numbers_of(
             return flat / scale
 
         sizes.append(size)
+        values.append(value)
+        scenes.append(moving)
         try:
             found.append(derivative(moved, value, size, here / scale) * scale * size)
         except NotSmooth:
             raise NotSmooth(f"{name} = {value:g}: the equations of motion have a kink there") from None
     stacked = np.reshape(found, (len(paths), len(here)))
     names = tuple(path if isinstance(path, str) else path.name for path in paths)
-    return Numbers(names, np.array(sizes), parts.like(stacked), dynamics.system.frequency)
+    return Numbers(names, np.array(sizes), parts.like(stacked), dynamics.system.frequency, scenes, values)
 
 
 def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = ()) -> float:

@@ -17,9 +17,9 @@ LABELS = {"energy_term": ENERGIES, "loss": LOSSES}
 @quantity("1", ("loss",))
 def energy_share(energy: Mapping[str, Any]) -> Any:
     """fractions of viscous, friction, impact and contact loss; unknown where nothing is lost"""
-    lost = np.stack([np.asarray(energy[name]) for name in LOSSES], axis=-1)
+    lost = np.stack([energy[name] for name in LOSSES], axis=-1)
     total = lost.sum(axis=-1, keepdims=True)
-    return np.divide(lost, total, out=np.full(lost.shape, np.nan), where=total > 0.0)
+    return lost / np.where(total > 0.0, total, np.nan)
 
 
 @quantity("1")

@@ -26,13 +26,13 @@ QUANTITIES = [_of_each(one) for one in OF_SECTORS]
 
 
 @quantity()
-def amplification(sectors: Any) -> float | None:
+def amplification(sectors: Any) -> Any:
     """largest mean amplitude of a sector over that of the tuned ring without bodies in resonance; unknown without"""
-    return None if sectors.tuned is None else float(sectors.amplitude_mean.max()) / sectors.tuned
+    return None if sectors.tuned is None else sectors.amplitude_mean.max() / sectors.tuned
 
 
 @quantity()
-def localisation(sectors: Any) -> float | None:
+def localisation(sectors: Any) -> Any:
     """largest mean amplitude of a sector over the root mean square of all, 1 to the root of N; unknown at rest"""
-    square = float(np.sqrt((sectors.amplitude_mean**2).mean()))
-    return float(sectors.amplitude_mean.max()) / square if square > 0.0 else None
+    square = np.sqrt((sectors.amplitude_mean**2).mean())
+    return sectors.amplitude_mean.max() / square if square > 0.0 else None

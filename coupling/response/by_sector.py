@@ -37,7 +37,7 @@ def response_by_sector(scene: Scene, run: Outcome, window: slice) -> SectorRespo
     undamped, fixed = _linear(scene, system)
     impacts = _impacts(scene, run, window)
     own = map(frozen, (peak.mean(axis=0), peak.max(axis=0), undamped, fixed, impacts))
-    return SectorResponse(dict(zip(BY_SECTOR, own, strict=True)), tuned=_tuned(scene))
+    return SectorResponse(dict(zip(BY_SECTOR, own, strict=True)), tuned=tuned_amplitude(scene))
 
 
 def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +68,7 @@ def sectors_of_bodies(scene: Scene, system: System) -> list[int]:
     return [int(number) if number.isdecimal() else -1 for number in floors]
 
 
-def _tuned(scene: Scene) -> float | None:
+def tuned_amplitude(scene: Scene) -> float | None:
     """Return the amplitude of the tuned ring without bodies at its resonance, m; None without a force or damping."""
     if scene.excitation.base_acceleration is not None or scene.excitation.signal is not None:
         return None

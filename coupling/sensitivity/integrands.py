@@ -33,15 +33,31 @@ class Product(NamedTuple):
     left: Functionals
     right: Functionals
 
+    def each(self, z: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products (n, m) along a motion, and their derivatives (n, m, P)."""
+        (a, of_a), (b, of_b) = self.left.of(z, Z), self.right.of(z, Z)
+        return a * b, of_a * b[:, :, None] + a[:, :, None] * of_b
+
     def of(self, z: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return its values (n,) along a motion, and derivatives (n, P)."""
-        (a, of_a), (b, of_b) = self.left.of(z, Z), self.right.of(z, Z)
-        return (a * b).sum(axis=1), (of_a * b[:, :, None] + a[:, :, None] * of_b).sum(axis=1)
+        value, turns = self.each(z, Z)
+        return value.sum(axis=1), turns.sum(axis=1)
 
 
 def response_of(dynamics: Dynamics, numbers: Numbers) -> Functionals:
     """Return the displacement, m."""
     return Functionals(dynamics.response[None], numbers.parts.response[:, None])
+
+
+def each_of(rows: np.ndarray, own: np.ndarray) -> list[Functionals]:
+    """Return functionals (m, K) with derivatives (P, m, K) one by one."""
+    return [Functionals(rows[[k]], own[:, [k]]) for k in range(len(rows))]
+
+
+def slipping(flow: Flow) -> np.ndarray:
+    """Return the units (m,) that slip in a flow."""
+    slips = (flow.state == codes.SLIP_LEFT) | (flow.state == codes.SLIP_RIGHT)
+    return np.flatnonzero((flow.way != 0.0) & slips)
 
 
 def momentum_of(dynamics: Dynamics, numbers: Numbers) -> Functionals:
@@ -63,7 +79,7 @@ def powers_of(flow: Flow, numbers: Numbers) -> list[Product]:
     presses = np.zeros(u, bool)
     presses[flow.solved.springs] = True
     dashpot, of_dashpot = np.where(presses, system.dashpot, 0.0), np.where(presses, of.dashpot, 0.0)
-    slips = (flow.way != 0.0) & ((flow.state == codes.SLIP_LEFT) | (flow.state == codes.SLIP_RIGHT))
+    slips = slipping(flow)
     slip = Functionals(dynamics.speed[u:][slips], of.speed[:, u:][:, slips])
     gap = Functionals(dynamics.speed[:u], of.speed[:, :u])
     lost = dashpot[:, None] * gap.rows, of_dashpot[:, :, None] * gap.rows + dashpot[:, None] * gap.own

@@ -1,21 +1,36 @@
-"""The figures of a motion with their derivatives by numbers, taken segment by segment as the motion passes."""
+"""What quantities need of a motion, with derivatives by numbers, taken segment by segment as the motion passes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.linalg import null_space
 
 from vanedamp.coupling.derivatives.derivative import Before
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
+from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Course
-from vanedamp.coupling.response.segment import Segment
-from vanedamp.coupling.sensitivity.integrands import POWERS, Functionals, Product, momentum_of, powers_of, response_of
-from vanedamp.coupling.sensitivity.peaks import Peak, summits
-from vanedamp.coupling.sensitivity.sensitivity_record import Dual, Impact
+from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.segment import EventRun, Segment
+from vanedamp.coupling.response.static_deflection import deflects
+from vanedamp.coupling.sensitivity.dual import Dual, zeros
+from vanedamp.coupling.sensitivity.integrands import (
+    POWERS,
+    Functionals,
+    Product,
+    each_of,
+    momentum_of,
+    powers_of,
+    response_of,
+    slipping,
+)
+from vanedamp.coupling.sensitivity.peaks import Swing
+from vanedamp.coupling.sensitivity.sensitivity_record import Impact
+from vanedamp.coupling.sensitivity.strength import Struck
+from vanedamp.coupling.sensitivity.wear import Wearing
+from vanedamp.coupling.system.system import FLOOR, System
 
 #: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
 _KEPT, _SAME = 1000, 1e-12
@@ -25,8 +40,10 @@ class Measures:
     """Takes what passes (derivatives.walk.Watch) from a period `first` on, and all peaks, impacts and samples.
 
     orders: of the harmonics; times: of samples, s since the start, rising; sampled: what they are of, in place of the
-    response. Derivatives are by the sizes of the numbers.
+    response; run: the engine's, once it has begun. Derivatives are by the sizes of the numbers.
     """
+
+    run: EventRun
 
     def __init__(
         self, dynamics: Dynamics, numbers: Numbers, first: int, orders: Sequence[int] = (1,),
@@ -34,16 +51,24 @@ class Measures:
     ) -> None:  # fmt: skip
         self.dynamics, self.numbers, self.first, self.orders = dynamics, numbers, first, tuple(orders)
         self._k, self._P = len(dynamics.scale), len(numbers)
-        self._response, self._momentum = response_of(dynamics, numbers), momentum_of(dynamics, numbers)
-        self._sampled = sampled or self._response
-        self._square = Product(self._response, self._response)
+        self._momentum, response, of = momentum_of(dynamics, numbers), response_of(dynamics, numbers), numbers.parts
+        self._sampled, self._square = sampled or response, Product(response, response)
+        scene, self._deflected = dynamics.frame.scene, deflects(dynamics.frame.scene, dynamics.system)
+        #: (P,) whether numbers bring a static load where there is none: distances count from the mean then
+        self.begins = np.array([not self._deflected and deflects(scene, one) for one in _loaded(dynamics, numbers)])
+        self.response = Swing(response, self._deflected)
+        self.outputs = [Swing(one, self._deflected) for one in each_of(dynamics.outputs, of.outputs)]
+        self.tilts = [Swing(one, False) for one in each_of(dynamics.tilts, of.tilts)]
+        self.wear = Wearing(dynamics, numbers) if scene.wear is not None else None
+        self.contacts = Struck(dynamics, numbers) if Struck.wanted(scene) else None
         self._powers: dict[Flow, list[Product]] = {}
         n = 1 + len(POWERS)
-        #: integrals of x^2 and of powers; of x and momentum with harmonics
-        self._sums, self._waves = Dual(np.zeros(n), np.zeros((n, self._P))), _complex(1 + len(self.orders), self._P)
-        self._ends: list[Dual] = []  # momentum at both ends of the periods that count
-        self.lost = Dual(np.zeros(1), np.zeros((1, self._P)))  # energy of impacts
-        self.peaks: list[Peak] = []
+        #: integrals of x^2 and of powers; of momentum and of x with harmonics
+        self.sums, self.waves = zeros(n, self._P), zeros(1 + len(self.orders), self._P, complex)
+        self.lifted = zeros(dynamics.system.bodies, self._P)  # time off the floor, s
+        self.hits = np.zeros(len(dynamics.system.rest))
+        self.ends: list[Dual] = []  # momentum at both ends of the periods that count
+        self.lost = zeros(1, self._P)  # energy of impacts
         self.impacts: list[Impact] = []
         self._unheld = np.zeros((0, self._P))
         self._times, self.samples = list(times), list[tuple[float, np.ndarray, np.ndarray]]()
@@ -80,22 +105,22 @@ class Measures:
         """Take a segment whose end moves by `shift` (P,)."""
         begun, course = self._begun, self._course
         assert begun is not None and course is not None
-        segment, duration = begun.segment, begun.segment.duration
+        segment = begun.segment
         Z = self._whole(begun.M, segment.start)
         end = before.z, np.vstack([before.M[:, self._k :], course.end[self.dynamics.one :]])
-        series = derivative_of(begun.flow, self.numbers).series
-        while len(self.peaks) <= segment.period:
-            self.peaks.append(Peak())
-        peak = self.peaks[segment.period]
-        for value, turns in summits(self._response, series, begun.z, Z, course, duration):
-            peak.add(value, turns)
-        for z, at, moves in ((begun.z, Z, self._since), (*end, shift)):
-            x, of_x = self._response.of(z[None], at[None])
-            rate = float(self._response.rows[0] @ begun.flow.X @ z)
-            peak.add(float(x[0, 0]), of_x[0, 0] + rate * moves)
+        series, ends = derivative_of(begun.flow, self.numbers).series, ((begun.z, Z, self._since), (*end, shift))
+        self.response.passed(segment.period, series, course, segment.duration, ends)
         self._sample(begun, Z)
-        if segment.period >= self.first:
-            self._integrate(begun, Z, course, end, shift)
+        if segment.period < self.first:
+            return
+        for swing in (*self.outputs, *self.tilts):
+            swing.passed(segment.period - self.first, series, course, segment.duration, ends)
+        self._integrate(begun, Z, course, end, shift)
+        floor = self.dynamics.system.surface == FLOOR
+        stands = floor & (segment.state != codes.OPEN) & (segment.state != codes.LEAVING)
+        up = np.setdiff1d(np.arange(len(self.lifted.value)), self.dynamics.system.body[stands])
+        self.lifted.value[up] += segment.duration
+        self.lifted.turns[up] += shift - self._since
 
     def _whole(self, M: np.ndarray, time: float) -> np.ndarray:
         """Return the derivatives (K, P) of z at a time since the start, s."""
@@ -118,54 +143,93 @@ class Measures:
         edges = np.zeros((len(weight), self._P))
         edges[0], edges[-1] = -self._since, shift
         for row, product in enumerate([self._square, *self._powers[flow]]):
-            value, turns = product.of(z, at)
-            self._sums.value[row] += weight @ value
-            self._sums.turns[row] += weight @ turns + value @ edges
+            value, turns = product.each(z, at)
+            each = weight @ value, np.tensordot(weight, turns, 1) + value.T @ edges
+            self.sums.value[row] += each[0].sum()
+            self.sums.turns[row] += each[1].sum(axis=0)
+            if self.wear is not None and row == 1 + POWERS.index("friction"):
+                self.wear.friction.value[slipping(flow)] += each[0]
+                self.wear.friction.turns[slipping(flow)] += each[1]
         time = segment.start + np.concatenate([[0.0], course.time, [segment.duration]])
         for row, (order, functional) in enumerate(
-            [(1, self._momentum), *((order, self._response) for order in self.orders)]
+            [(1, self._momentum), *((order, self.response.functional) for order in self.orders)]
         ):
             value, turns = functional.of(z, at)
             wave = np.exp(-1j * order * self.dynamics.system.omega * time)
-            turning = -1j * order * np.multiply.outer(time, self._of_omega)
+            turning = -1j * order * np.multiply.outer(time, self.omega.turns)
             whole = (turns[:, 0] + value * turning) * wave[:, None]
-            self._waves.value[row] += weight @ (value[:, 0] * wave)
-            self._waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
+            self.waves.value[row] += weight @ (value[:, 0] * wave)
+            self.waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
+        if self._deflected:
+            for swing in (self.response, *self.outputs):
+                swing.integrate(weight, edges, z, at)
         if segment.start == 0.0:
             Z = np.vstack([self._unheld, Z[len(self._unheld) :]])
         for instant, turned, moves in ((begun.z, Z, self._since), (*end, shift)):
             value, turns = self._momentum.of(instant[None], turned[None])
             drift = self._momentum.rows @ flow.X @ instant
-            found = Dual(value[0], turns[0] + np.multiply.outer(drift, moves))
-            self._ends = [*self._ends[:1], found]
+            self.ends = [*self.ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moves)]
 
     @property
-    def _of_omega(self) -> np.ndarray:
-        """Derivatives (P,) of the angular frequency of order 1."""
-        return -self.numbers.parts.period * self.dynamics.system.omega / self.dynamics.system.period
+    def omega(self) -> Dual:
+        """Angular frequency of order 1, rad/s."""
+        system, of = self.dynamics.system, self.numbers.parts
+        return Dual(system.omega, -of.period * system.omega / system.period)
 
     def _struck(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
-        """Take the speed of an impact and the energy that it takes."""
-        dynamics, event, k = self.dynamics, before.event, self._k
+        """Take what impacts do: their speeds, and the energy that they take."""
+        dynamics, event, of, k = self.dynamics, before.event, self.numbers.parts, self._k
         w, w_after = before.u[dynamics.rates], dynamics.state(new)[dynamics.rates]
         massive = np.ones(len(w), bool)
         massive[dynamics.sliders] = False
         flow, z = dynamics.flow(new.state, new.open_force), dynamics.extended(dynamics.state(new), new.time)
-        if new.period >= self.first:
+        turns = [
+            (derivative[:, k:] + np.multiply.outer((own.X @ at)[: dynamics.one], shift))[dynamics.rates]
+            for derivative, own, at in ((before.M, before.flow, before.z), (M, flow, z))
+        ]
+        counts = new.period >= self.first
+        if counts:
             self._let_go(before, flow, shift)
-        if new.period >= self.first and np.any(np.abs(w - w_after)[massive] > _SAME * np.abs(w).max()):
-            turns = [
-                (derivative[:, k:] + np.multiply.outer((own.X @ at)[: dynamics.one], shift))[dynamics.rates]
-                for derivative, own, at in ((before.M, before.flow, before.z), (M, flow, z))
-            ]
+        if counts and np.any(np.abs(w - w_after)[massive] > _SAME * np.abs(w).max()):
             self.lost.value[0] += 0.5 * float((w**2 - w_after**2)[massive].sum())
             self.lost.turns[0] += w[massive] @ turns[0][massive] - w_after[massive] @ turns[1][massive]
-        if len(event.struck):
-            r = int(event.struck[np.argmin(event.before)])
-            row = dynamics.speed[r]
-            Z = self._whole(before.M, new.start)
-            turned = row @ Z + self.numbers.parts.speed[:, r] @ before.z + float(row @ before.flow.X @ before.z) * shift
-            self.impacts.append(Impact(new.start, -float(event.before.min()), shift, -turned))
+        if not len(event.struck):
+            return
+
+        def speed(r: int, value: float, own: np.ndarray, turned: np.ndarray) -> Dual:
+            """Return the speed of a row, m/s, without its sign."""
+            return Dual(abs(value), np.sign(value) * (dynamics.rows[r] @ turned + of.rows[:, r] @ own))
+
+        units = [int(r) for r in event.struck]
+        met = [speed(r, value, w, turns[0]) for r, value in zip(units, event.before.tolist(), strict=True)]
+        first = met[int(np.argmin(event.before))]
+        self.impacts.append(Impact(new.start, float(first.value), shift, first.turns))
+        if not counts:
+            return
+        np.add.at(self.hits, event.struck, 1.0)
+        rigid = [place for place, r in enumerate(units) if np.isinf(dynamics.system.spring[r])]
+        for place in rigid if self.wear is not None else ():
+            r = units[place]
+            mobility = Dual(dynamics.rows[r] @ dynamics.rows[r], 2.0 * of.rows[:, r] @ dynamics.rows[r])
+            if met[place].value > 0.0:
+                self.wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
+        if self.contacts is not None and rigid:
+            impulse = self._impulses(event.impulse, (turns[1] - turns[0])[massive], massive)
+            for place in rigid:
+                r = units[place]
+                if met[place].value > 0.0 and impulse.value[r] != 0.0:
+                    after = speed(r, float(event.after[place]), w_after, turns[1])
+                    self.contacts.strike(met[place], after, np.abs(impulse[r]))
+
+    def _impulses(self, impulse: np.ndarray, turns: np.ndarray, massive: np.ndarray) -> Dual:
+        """Return impulses (2u,), N s, by how the speeds that they change turn; nan of those that these do not tell."""
+        acts = np.flatnonzero(impulse)
+        rows, found = self.dynamics.rows[acts][:, massive], np.full((len(impulse), self._P), np.nan)
+        length = np.linalg.norm(rows, axis=1)
+        left = turns - (impulse[acts] @ self.numbers.parts.rows[:, acts][:, :, massive]).T
+        told = np.linalg.norm(null_space((rows / length[:, None]).T, DEPENDENT), axis=1) <= DEPENDENT
+        found[acts[told]] = (np.linalg.pinv(rows.T / length, DEPENDENT) @ left / length[:, None])[told]
+        return Dual(impulse, found)
 
     def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
         """Take the energy of springs whose force ends, or begins, while they are pressed: it is lost with contact."""
@@ -177,8 +241,8 @@ class Measures:
             way, spring = (1.0 if r in own else -1.0), float(dynamics.system.spring[r])
             gap, rate = float(dynamics.gap[r] @ before.z), float(dynamics.gap[r] @ before.flow.X @ before.z)
             turned = dynamics.gap[r] @ Z + of.gap[:, r] @ before.z + rate * shift
-            self._sums.value[row] += way * 0.5 * spring * gap**2
-            self._sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
+            self.sums.value[row] += way * 0.5 * spring * gap**2
+            self.sums.turns[row] += way * (0.5 * of.spring[:, r] * gap**2 + spring * gap * turned)
 
     def _sample(self, begun: Before, Z: np.ndarray) -> None:
         """Take displacement, velocity and acceleration at the times within a segment."""
@@ -198,69 +262,19 @@ class Measures:
 
     # --- results
 
-    @cached_property
+    @property
     def heights(self) -> Dual:
         """The largest displacements of all periods (n,), m."""
-        turns = [peak.derivatives(self._P)[0] for peak in self.peaks]
-        return Dual(np.array([peak.value for peak in self.peaks]), np.reshape(turns, (-1, self._P)))
-
-    @property
-    def kinks(self) -> bool:
-        """Whether those of the periods that count hold on one side only."""
-        return any(peak.derivatives(self._P)[1] for peak in self.peaks[self.first :])
+        return self.response.distances(zeros((), self._P))[0]
 
     def energies(self) -> dict[str, Dual]:
         """Return the work of the excitation and the losses over the periods that count, J."""
-        return {name: self._sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
-
-    def figures(self, periods: int) -> dict[str, Dual]:
-        """Return the figures by name, over the periods that count, of `periods` in all."""
-        system, of = self.dynamics.system, self.numbers.parts
-        count = max(periods - self.first, 1)
-        span = Dual(np.array([count * system.period]), count * of.period[None])
-        heights = self.heights[self.first :]
-        top = int(np.argmax(heights.value))
-        found = {
-            "amplitude_mean": Dual(heights.value.mean(), heights.turns.mean(axis=0)),
-            "amplitude_max": Dual(heights.value[top], heights.turns[top]),
-            "amplitude_rms": (self._sums[:1] / span).root()[0],
-        }
-        waves = [2.0 * (self._waves[row : row + 1] / span) for row in range(len(self.orders) + 1)]
-        for order, wave in zip(self.orders, waves[1:], strict=True):
-            size, phase = wave[0].polar()
-            names = ("amplitude_harmonic", "phase") if order == 1 else tuple(
-                f"harmonic.{order}.{name}" for name in ("amplitude", "phase")
-            )  # fmt: skip
-            found |= {names[0]: size, names[1]: phase}
-        found |= {f"energy.{name}": energy for name, energy in self.energies().items()}
-        if system.bodies and 1 in self.orders:
-            found["attached_mass_fraction"] = self._attached(waves, span)
-        return found
-
-    def _attached(self, waves: list[Dual], span: Dual) -> Dual:
-        """Return the attached mass over the bodies' mass (response.figures)."""
-        system, of = self.dynamics.system, self.numbers.parts
-        omega = Dual(np.array([system.omega]), self._of_omega[None])
-        change = self._ends[-1] - self._ends[0]
-        force = 2.0 * (change / span) + 1j * (omega * waves[0])
-        load = Dual(system.load[:1, system.along].sum(axis=1), self._of_load)
-        mass = Dual(system.mass[system.along].sum(keepdims=True), of.mass[:, system.along].sum(axis=1)[None])
-        harmonic = waves[1 + self.orders.index(1)]
-        felt = ((force - load) * harmonic.conjugate()).real()
-        return (-1.0 * (felt / (omega * omega * (harmonic * harmonic.conjugate()).real()) / mass))[0]
-
-    @property
-    def _of_load(self) -> np.ndarray:
-        """Derivatives (1, P) of the loads of order 1 on the bodies, together."""
-        dynamics, of = self.dynamics, self.numbers.parts
-        along, e = dynamics.system.along, len(dynamics.system.frequency)
-        cosine, sine = dynamics.one + 1, dynamics.one + 1 + e
-        root, size = dynamics.root[along], dynamics.size
-        value = dynamics.load[along][:, [cosine, sine]] * size * root[:, None]
-        turns = of.load[:, along][:, :, [cosine, sine]] * size * root[:, None]
-        turns = turns + value * (of.root[:, along] / root)[:, :, None]
-        return (turns[:, :, 0] - 1j * turns[:, :, 1]).sum(axis=1)[None]
+        return {name: self.sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
 
 
-def _complex(rows: int, number: int) -> Dual:
-    return Dual(np.zeros(rows, complex), np.zeros((rows, number), complex))
+def _loaded(dynamics: Dynamics, numbers: Numbers) -> Iterator[System]:
+    """Yield the system with what each number adds to the static loads, in place of these."""
+    of, one = numbers.parts, dynamics.one
+    for load, root in zip(of.load[:, :, one], of.root, strict=True):
+        weight = dynamics.size * (load * dynamics.root + dynamics.load[:, one] * root)
+        yield dynamics.system._replace(weight=weight)

@@ -17,6 +17,7 @@ from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sensitivity.figures import Figures
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
@@ -27,7 +28,7 @@ _PARTED = 1e6
 
 #: what is to be known of derivatives that there are: of a kink of amplitudes, of a chatter that the engine completes
 _NOTES = (
-    "summits of one height part: derivatives of amplitudes hold on one side",
+    "summits of one height part: derivatives of amplitudes and other largest values hold on one side",
     "a chatter ends in the motion: derivatives hold to some 1e-6, as far as the engine follows it",
 )
 
@@ -86,7 +87,10 @@ class Motion:
         names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
         short = part < periods
         walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given, part, short)
-        passage = walk.passage(run_from(self.frame, state, periods), periods)
+        run = run_from(self.frame, state, periods)
+        if measures is not None:
+            measures.run = run
+        passage = walk.passage(run, periods)
         self.completed = walk.derivative.completed
         return passage
 
@@ -112,11 +116,15 @@ def check_together(growth: np.ndarray) -> None:
 def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
     """Return the record of a motion with derivatives. turns: (k, P) of the state."""
     size, number = motion.numbers.size, len(motion.numbers)
-    figures, heights = measures.figures(periods), measures.heights
+    told, heights = Figures(measures, periods), measures.heights
+    figures = told.all()
+    notes = [note for note, said in zip(_NOTES, (told.kinks, motion.completed), strict=True) if said]
+    begins = [path for path, said in zip(motion.numbers.paths, measures.begins.tolist(), strict=True) if said]
+    notes += [f"{path}: bodies begin to deflect the structure, from where distances count" for path in begins]
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731
     return Sensitivity(
         paths=motion.numbers.paths, status=SensitivityStatus.OK, names=tuple(motion.frame.names),
-        note="; ".join(note for note, said in zip(_NOTES, (measures.kinks, motion.completed), strict=True) if said),
+        note="; ".join(notes),
         values={name: float(np.real(each.value)) for name, each in figures.items()},
         derivatives={name: frozen(np.real(each.turns) / size) for name, each in figures.items()},
         state=frozen(state), state_derivative=frozen(turns),

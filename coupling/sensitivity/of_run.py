@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.frame import Frame
-from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.model_order.choices import choices_of, with_choices
 from vanedamp.coupling.orbits.orbits import settled_orbit
 from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.ramp import Ramp as RampTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.integrands import Functionals
 from vanedamp.coupling.sensitivity.measures import Measures
@@ -33,12 +31,12 @@ def of_run(scene: Scene, paths: Paths, start: RestartState | None, **options: An
     """Return the derivatives along the run of a scene. Raises NoDerivative, InputError and NotSmooth."""
     if scene.solver.method != "exact":
         raise InputError(f'solver.method: derivatives are those of the exact engine, not of "{scene.solver.method}"')
-    scene = _alone(scene)
+    scene, run_of = _alone(scene)
 
     def begins(other: Scene, frame: Frame) -> np.ndarray:
-        return _own_start(other, frame) if start is None else frame.state_of(at_speed_of(other, start))
+        return _own_start(other, frame) if start is None else frame.state_of(at_speed_of(frame.scene, start))
 
-    motion = Motion(scene, paths, begins=begins)
+    motion = Motion(scene, paths, run_of, begins)
     periods, numbers = scene.time.simulated, motion.numbers
     measures = Measures(motion.dynamics, numbers, scene.time.dropped, **options)
     turns = numbers.parts.start.T / numbers.size
@@ -47,15 +45,15 @@ def of_run(scene: Scene, paths: Paths, start: RestartState | None, **options: An
 
 def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Sequence[float]) -> Sensitivity:
     """Return the derivatives along the free motion of a ring-down. Raises NoDerivative, InputError and NotSmooth."""
-    scene = _alone(found.scene)
+    scene, run_of = _alone(found.scene)
     table, state, turns = table_of(scene), None, None
     if table.start == "steady":
-        state, turns = _steady(scene, paths)
+        state, turns = _steady(run_of(scene), paths)
 
     def begins(other: Scene, frame: Frame) -> np.ndarray:
-        return frame.state_of(blown_or_pulled(other, table)) if state is None else state
+        return frame.state_of(blown_or_pulled(run_of(other), table)) if state is None else state
 
-    motion = Motion(scene, paths, partial(free_scene, table=table), begins)
+    motion = Motion(scene, paths, lambda other: free_scene(run_of(other), table=table), begins)
     numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode
     row, own = np.zeros((1, len(response))), np.zeros((len(numbers), 1, len(response)))
     row[0, mode], own[:, 0, mode] = response[mode], numbers.parts.response[:, mode]
@@ -71,10 +69,13 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
 
     Raises NoDerivative, InputError and NotSmooth.
     """
-    scene, table = _alone(ramp.scene), ramp.table
+    (scene, run_of), table = _alone(ramp.scene), ramp.table
     course, peaks, turned = courses(ramp.scene)[0], list[float](), list[np.ndarray]()
     for period, value in enumerate(course.value[: len(ramp.runs[0].time)].tolist()):
-        at = partial(_ramped, table=table, value=value)
+
+        def at(other: Scene, value: float = value) -> Scene:
+            return scene_at(ramped(run_of(other)), table, value)
+
         motion = Motion(scene, paths, at, _own_start, speed=float(course.speed[0]))
         if period == 0:
             state, turns = _own_start(scene, motion.frame), motion.numbers.parts.start.T / motion.numbers.size
@@ -103,13 +104,13 @@ def _measured(motion: Motion, state: np.ndarray, turns: np.ndarray, periods: int
     return record(motion, measures, periods, passage.state, passage.by_number)
 
 
-def _alone(scene: Scene) -> Scene:
-    """Return a scene without open choices and without tables of what other commands do over its numbers."""
-    return replace(choose(scene).scene, sweep={}, orbit=None)
+def _alone(scene: Scene) -> tuple[Scene, Callable[[Scene], Scene]]:
+    """Return a scene without tables of what other commands do over its numbers, and how what runs follows from it.
 
-
-def _ramped(scene: Scene, table: RampTable, value: float) -> Scene:
-    return scene_at(ramped(scene), table, value)
+    Numbers are those of the scene as it is given: one of a ring may be many of its sectors'.
+    """
+    choices = choices_of([scene])
+    return replace(scene, sweep={}, orbit=None), lambda other: with_choices(other, choices).scene
 
 
 def _own_start(scene: Scene, frame: Frame) -> np.ndarray:

@@ -1,59 +1,102 @@
-"""The largest displacement of each period, and how numbers change it."""
+"""The largest and smallest values of each period, and how numbers change them."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.series import Course, Series
+from vanedamp.coupling.sensitivity.dual import Dual
 from vanedamp.coupling.sensitivity.integrands import Functionals
 
-#: nodes within this fraction of the largest are followed to their summits; steps of Newton's method, its last one
-_NEAR, _STEPS, _SMALL = 1e-2, 6, 1e-13
+#: nodes within this fraction of the largest are followed to their summits: more than a summit may be from its node;
+#: steps of Newton's method, its last one
+_NEAR, _STEPS, _SMALL = 3e-2, 6, 1e-13
 #: summits within this fraction are one height; their derivatives, relative to the largest, are then to agree
 _SAME, _AGREE = 1e-9, 1e-6
 
-
-class Peak:
-    """The summits of |x| in one period: the best so far and those as high."""
-
-    def __init__(self) -> None:
-        self._found: list[tuple[float, np.ndarray]] = []
-
-    def add(self, value: float, turns: np.ndarray) -> None:
-        """Add a displacement (m) with its derivatives (P,) where it may be the largest."""
-        self._found.append((abs(value), np.sign(value) * turns))
-
-    @property
-    def value(self) -> float:
-        """The largest, m."""
-        return max((value for value, _ in self._found), default=0.0)
-
-    def derivatives(self, number: int) -> tuple[np.ndarray, bool]:
-        """Return the derivatives (P,), and whether summits of one height part: then they hold on one side."""
-        best = [turns for value, turns in self._found if value >= (1.0 - _SAME) * self.value]
-        if not best:
-            return np.zeros(number), False
-        apart = np.ptp(best, axis=0) > _AGREE * (np.abs(best).max() + self.value)
-        return best[0], bool(apart.any())
+#: values with their derivatives (P,)
+Found = list[tuple[float, np.ndarray]]
 
 
-def summits(
-    response: Functionals, series: Series, z: np.ndarray, Z: np.ndarray, course: Course, duration: float
-) -> list[tuple[float, np.ndarray]]:
-    """Return the summits of |x| within a segment: displacements and their derivatives (P,). z, Z: at its start."""
-    x = np.abs(course.z @ response.rows[0])
+def largest(found: Found, number: int) -> tuple[Dual, bool]:
+    """Return the largest, 0 of none, and whether others as large part from it: its derivatives hold on one side."""
+    value = max((each for each, _ in found), default=0.0)
+    turned = np.array([turns for each, turns in found if each >= value - _SAME * abs(value)] or [np.zeros(number)])
+    apart = np.ptp(turned, axis=0) > _AGREE * (np.abs(turned).max(initial=0.0) + abs(value))
+    return Dual(value, turned[0]), bool(apart.any())
+
+
+def top_of(each: Dual) -> tuple[Dual, bool]:
+    """Return the largest of some numbers (n,), as `largest` does."""
+    return largest([*zip(each.value.tolist(), each.turns, strict=True)], each.turns.shape[-1])
+
+
+class Swing:
+    """A functional of the motion: its largest and smallest values in each period, and its integral over some.
+
+    deflected: whether distances from its mean count, and not those from zero.
+    """
+
+    def __init__(self, functional: Functionals, deflected: bool) -> None:
+        self.functional, self.deflected, self._number = functional, deflected, len(functional.own)
+        #: values upwards and downwards of each period
+        self.found: list[tuple[Found, Found]] = []
+        self.integral = Dual(0.0, np.zeros(self._number))
+
+    def passed(
+        self, period: int, series: Series, course: Course, duration: float,
+        ends: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    ) -> None:  # fmt: skip
+        """Take the values of a segment. ends: z (K,), Z (K, P) and how its time moves (P,), s, at start and end."""
+        while len(self.found) <= period:
+            self.found.append(([], []))
+        (z, Z, _), row = ends[0], self.functional.rows[0]
+        for z_end, Z_end, moves in ends:
+            value, turns = self.functional.of(z_end[None], Z_end[None])
+            turned = turns[0, 0] + float(row @ series.X @ z_end) * moves
+            for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
+                found.append((sign * float(value[0, 0]), sign * turned))
+        x = course.z @ row
+        size = np.ptp(x) if self.deflected else np.abs(x).max(initial=0.0)
+        for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
+            others = found if self.deflected else [*self.found[period][0], *self.found[period][1]]
+            least = max((value for value, _ in others), default=-np.inf) - _NEAR * size
+            for at in _summits(sign * row, series, course, duration, least):
+                there = series.course(z, Z, at, False)
+                value, turns = self.functional.of(there.last[None], there.end[None])
+                found.append((sign * float(value[0, 0]), sign * turns[0, 0]))
+
+    def integrate(self, weight: np.ndarray, edges: np.ndarray, z: np.ndarray, Z: np.ndarray) -> None:
+        """Take the integral over a segment: see Measures._integrate."""
+        value, turns = self.functional.of(z, Z)
+        self.integral = self.integral + Dual(weight @ value[:, 0], weight @ turns[:, 0] + value[:, 0] @ edges)
+
+    def distances(self, mean: Dual, first: int = 0) -> tuple[Dual, bool]:
+        """Return the largest distances (n,) from a value in periods from `first` on, and whether there are kinks."""
+        found = [
+            largest([(value - way * float(mean.value), turns - way * mean.turns)
+                     for way, values in ((1.0, up), (-1.0, down)) for value, turns in values], self._number)
+            for up, down in self.found[first:]
+        ]  # fmt: skip
+        return joined([height for height, _ in found], self._number), any(apart for _, apart in found)
+
+
+def joined(parts: Iterable[Dual], number: int) -> Dual:
+    """Return single numbers (n,) in one array."""
+    each = list(parts)
+    return Dual([one.value for one in each], np.reshape([one.turns for one in each], (-1, number)))
+
+
+def _summits(row: np.ndarray, series: Series, course: Course, duration: float, least: float) -> list[float]:
+    """Return the times of the summits of a functional row (K,) within a segment, near nodes above a value, s."""
+    x = course.z @ row
     inner = np.flatnonzero((x[1:-1] >= x[:-2]) & (x[1:-1] >= x[2:])) + 1
-    ends = [0, len(x) - 1]
-    best, found = x.max(initial=0.0), []
-    for node in [*inner, *ends]:
-        if x[node] < (1.0 - _NEAR) * best:
-            continue
-        at = _summit(response.rows[0], series, course, int(node), duration)
-        if at is not None:
-            there = series.course(z, Z, at, False)
-            value, turns = response.of(there.last[None], there.end[None])
-            found.append((float(value[0, 0]), turns[0, 0]))
-    return found
+    least = max(least, x.max() - _NEAR * np.ptp(x))
+    near = [node for node in (*inner.tolist(), 0, len(x) - 1) if x[node] >= least]
+    found = (_summit(row, series, course, node, duration) for node in near)
+    return [at for at in found if at is not None]
 
 
 def _summit(row: np.ndarray, series: Series, course: Course, node: int, duration: float) -> float | None:
@@ -71,4 +114,4 @@ def _summit(row: np.ndarray, series: Series, course: Course, node: int, duration
         z, at = series.alone.course(z, nothing, step, False).last, at + step
         if abs(step) <= _SMALL * duration:
             break
-    return at if float(row @ z) * float(bend @ z) < 0.0 else None
+    return at if float(bend @ z) < 0.0 else None

@@ -9,6 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+#: reasons why derivatives do not have what some quantities need, by names of sources (arguments of their formulas)
+NOT_IN_DERIVATIVES: dict[str, str] = {
+    "confidence": "tells how well a mean is known, not the motion",
+    "unbalanced": "is round-off, a check of the run",
+    "overlap": "the exact engine enters no rigid wall: it is 0",
+    "neglected": "bounds an error of the model, and is none of the motion",
+    **dict.fromkeys(("undamped", "fixed"), "is of the linear structure: take differences of its curve, without runs"),
+    **dict.fromkeys(("undamped_top", "fixed_top"), "is of a curve over the frequency, not of one motion"),
+    "stress": "is taken from samples, which miss its extremes: differences of runs are as exact",
+    "lyapunov": "is the growth of these derivatives in a motion that does not repeat",
+    **dict.fromkeys(("section", "slip", "slip_velocity"), "is a series of states: `state_derivative` has the last"),
+    "transient": "is a number of periods",
+}
+
 
 class SensitivityStatus(StrEnum):
     """Whether derivatives exist and mean something. Unless `ok`, there are none, nor figures."""
@@ -29,57 +43,6 @@ class SensitivityStatus(StrEnum):
     """neighbouring motions part so fast that derivatives say nothing of a finite change"""
 
 
-@dataclass(frozen=True, eq=False)
-class Dual:
-    """Numbers with their derivatives: value (n,), turns (n, P), or of one number () and (P,)."""
-
-    value: np.ndarray
-    turns: np.ndarray
-
-    def __getitem__(self, place: Any) -> Dual:
-        return Dual(self.value[place], self.turns[place])
-
-    def __add__(self, other: Dual) -> Dual:
-        return Dual(self.value + other.value, self.turns + other.turns)
-
-    def __sub__(self, other: Dual) -> Dual:
-        return Dual(self.value - other.value, self.turns - other.turns)
-
-    def __mul__(self, other: Dual) -> Dual:
-        return Dual(
-            self.value * other.value, self.turns * other.value[..., None] + self.value[..., None] * other.turns
-        )  # fmt: skip
-
-    def __rmul__(self, factor: complex) -> Dual:
-        return Dual(factor * self.value, factor * self.turns)
-
-    def __truediv__(self, other: Dual) -> Dual:
-        value = self.value / other.value
-        return Dual(value, (self.turns - value[..., None] * other.turns) / other.value[..., None])
-
-    def conjugate(self) -> Dual:
-        """Return the conjugates."""
-        return Dual(np.conj(self.value), np.conj(self.turns))
-
-    def real(self) -> Dual:
-        """Return the real parts."""
-        return Dual(np.real(self.value), np.real(self.turns))
-
-    def root(self) -> Dual:
-        """Return the square roots."""
-        root = np.sqrt(np.maximum(self.value, 0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return Dual(root, self.turns / (2.0 * root[..., None]))
-
-    def polar(self) -> tuple[Dual, Dual]:
-        """Return amplitude X and phase of -i X exp(i phase), the integral of X sin(omega t + phase)."""
-        size = np.abs(self.value)
-        turn = self.turns * np.conj(self.value)[..., None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            amplitude = Dual(size, turn.real / size[..., None])
-            return amplitude, Dual(np.angle(1j * self.value), turn.imag / size[..., None] ** 2)
-
-
 class Impact(NamedTuple):
     """An impact: time, s, speed of approach, m/s, and derivatives (P,) of both."""
 
@@ -95,7 +58,8 @@ class Sensitivity:
 
     paths            of the numbers; derivatives are by a unit of each
     status, note     whether there are derivatives, and why not
-    values           figures by the names that a Response has; those of energies as "energy.friction"
+    values           quantities by the names that a Response has, "<name>.<label or number>" of those with a dimension;
+                     energies as "energy.friction", harmonics of other orders as "harmonic.3.amplitude"
     derivatives      (P,) of each figure
     names            (k,) of the coordinates of states
     state            (k,) of an orbit at the start of its period; of a run at its end

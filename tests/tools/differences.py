@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.quantities.quantity import labels, table
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
@@ -36,9 +37,6 @@ _ROUND_OFF = 3e-15
 STILL = 1e-6
 #: events per period after which a run is given up
 MOST_EVENTS = 200
-FIGURES = (
-    "amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic", "phase", "attached_mass_fraction"
-)  # fmt: skip
 ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
 
 
@@ -96,13 +94,13 @@ def observed(scene: Scene, known: Coordinates, start: RestartState | None) -> Ob
     results = {
         "state": known.state_of(response.final), "peak": response.peak,
         "impact_time": hits[:, 0], "impact_speed": hits[:, 1],
-        **{name: _one(getattr(response, name)) for name in FIGURES},
+        **{name: np.array([value]) for name, value in quantities_of(response).items()},
         **{f"energy.{name}": energies[[k]] for k, name in enumerate(ENERGIES)},
     }  # fmt: skip
     motion = np.array([max(float(response.amplitude_max), STILL * float(known.scale[0]))])
     fastest = np.array([np.abs(hits[:, 1]).max(initial=0.0) or 1.0])
     sizes = {"state": known.scale, "impact_time": np.array([1.0 / scene.frequency]), "impact_speed": fastest}
-    sizes |= dict.fromkeys(("peak", *FIGURES[:4]), motion) | dict.fromkeys(FIGURES[4:], np.ones(1))
+    sizes |= {"peak": motion} | {name: _size(name, results[name], motion) for name in results if name not in sizes}
     sizes |= dict.fromkeys([f"energy.{name}" for name in ENERGIES], np.array([np.abs(energies).max() or 1.0]))
     return Observed(results, Counter(_name(event) for event in response.event_list), sizes)
 
@@ -114,8 +112,25 @@ def impacts_of(response: Response) -> np.ndarray:
     return np.array([(event.time, abs(event.relative_velocity_before)) for event in found]).reshape(-1, 2)
 
 
-def _one(value: float | None) -> np.ndarray:
-    return np.array([np.nan if value is None else value])
+def quantities_of(response: Response) -> dict[str, float]:
+    """Return all quantities of a run that are numbers, those with one dimension as "<name>.<label or place>"."""
+    found = {}
+    for name, one in table().items():
+        value = None if one.text else getattr(response, name)
+        if value is not None and not one.dims:
+            found[name] = float(value)
+        elif value is not None and len(one.dims) == 1 and one.dims != ("section",):
+            names = labels(one.dims[0]) or range(len(value))
+            found |= {f"{name}.{label}": float(each) for label, each in zip(names, value, strict=True)}
+    return {name: value for name, value in found.items() if not np.isnan(value)}
+
+
+def _size(name: str, value: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Return the size of a result: of displacements that of the motion, 1 of fractions and angles of phases."""
+    one = table().get(name.split(".")[0])
+    if one is not None and one.unit == "m":
+        return motion
+    return np.ones(1) if one is None or one.unit == "1" or name == "phase" else np.abs(value) + (value == 0.0)
 
 
 def _name(event) -> tuple:

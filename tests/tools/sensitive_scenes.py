@@ -47,9 +47,22 @@ def scene_of(seed: int, folder: Path) -> tuple[str, Scene]:
         if rng.random() < 0.3:
             mass, stiffness = data["structure"]["mass"], data["structure"]["stiffness"]
             data["structure"]["damping"] = 2 * data["structure"].pop("damping_ratio") * math.sqrt(mass * stiffness)
+    _wear(data, np.random.default_rng([seed, 52]))
     data["solver"] = data.get("solver", {}) | {"max_events": MOST_EVENTS}
     data["time"] = {"periods": 100, "transient": 0}
     return kind, validate(Scene, data, "scene")
+
+
+def _wear(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Let contacts wear, or say what touches, in some scenes."""
+    if rng.random() < 0.5:
+        rates = rng.uniform(0.5, 2.0, 3)
+        data["wear"] = {"rate": rates[0] * 1e-13, "impact_rate": rates[1] * 1e-9, "area": rates[2] * 1e-4}
+        data["wear"]["impact_exponent"] = float(rng.uniform(0.6, 2.0))
+        data["wear"] = {key: float(value) for key, value in data["wear"].items()}
+    contact = data.setdefault("contact", {"law": "newton"})
+    if rng.random() < 0.5 and contact["law"] in ("newton", "poisson"):
+        contact["pair"] = {"young": float(rng.uniform(1e9, 2e11)), "radius": float(rng.uniform(0.01, 0.1))}
 
 
 def _sliders(kind: str, seed: int, rng: np.random.Generator, folder: Path) -> dict[str, Any]:

@@ -25,11 +25,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.tools.differences import ENERGIES, FIGURES, MOST_EVENTS, Difference, by_numbers
+from tests.tools.differences import MOST_EVENTS, Difference, by_numbers
 from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.orbits import find_orbit
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.quantities.quantity import table as quantities
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity
@@ -171,12 +172,12 @@ def _checked(kind: str, subject: str, scene: Scene, given: Orbit | Scene, period
 
 def claimed(found: Sensitivity, weights: np.ndarray) -> dict[str, np.ndarray]:
     """Return the derivatives as numbers change by some weights (P,), by the names of the differences."""
-    names = (*FIGURES, *(f"energy.{name}" for name in ENERGIES))
+    moved = weights != 0.0
     return {
         "state": found.state_derivative @ weights, "peak": found.peak_derivative @ weights,
         "impact_time": found.impact_time_derivative @ weights,
         "impact_speed": np.sign(found.impact_speed) * (found.impact_speed_derivative @ weights),
-        **{name: np.atleast_1d(found.derivatives[name] @ weights) for name in names if name in found.derivatives},
+        **{name: np.atleast_1d(turns[moved] @ weights[moved]) for name, turns in found.derivatives.items()},
     }  # fmt: skip
 
 
@@ -185,12 +186,18 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
     ours = _by_instant(found.impact_time, found.impact_speed)
     theirs = _by_instant(base["impact_time"], base["impact_speed"])
     for name, claim in claimed(found, weights).items():
+        if name not in reference.derivative or (found.note and (name == "peak" or _of_largest(name))):
+            continue  # not of a run; two summits of one height: on one side
         exact = reference.derivative[name]
-        if found.note and name in ("peak", "amplitude_mean", "amplitude_max"):
-            continue  # two summits of one height: on one side
         if "rests" in found.note and np.isnan(claim).any():
             continue  # there is an orbit for each place of rest
-        if name.startswith("impact"):
+        if np.isnan(claim).all() and "begin to deflect" in found.note:
+            continue  # distances count from elsewhere on either side
+        if found.values.get(name) == 0.0 and not claim.any() and _of_largest(name):
+            continue  # bodies in touch strike at round-off
+        if name.startswith("tilt_") and not np.isclose(found.values[name], base[name][0], rtol=1e-9):
+            continue  # the engine notes tilts at the nodes of cubics
+        if name in ("impact_time", "impact_speed"):
             if not len(ours):  # compliant contacts have none
                 continue
             claim, exact = claim[ours], exact[theirs]
@@ -202,6 +209,13 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
         each = Error(error, path, name, reference.error[name])
         worst = max(worst, each, key=lambda one: (one.off, one.size))
     return worst
+
+
+def _of_largest(name: str) -> bool:
+    """Whether a figure is the largest of some values."""
+    one = quantities().get(name.split(".")[0])
+    largest = ("peak", "peaks", "distance", "distances", "tilt", "sectors", "contacts", "wear")
+    return one is not None and not set(one.needs).isdisjoint(largest)
 
 
 def _by_instant(time: np.ndarray, speed: np.ndarray) -> np.ndarray:
