@@ -321,7 +321,9 @@ def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, Array | Columns | Rows | Ragged | Own | Coded | Unit)), None)
+        layout = next(
+            (note for note in notes if isinstance(note, Array | Columns | Rows | Ragged | Own | Coded | Unit)), None
+        )
         found[item.name] = (kind, layout)
     return found
 

@@ -13,7 +13,7 @@ from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES, names_along
 from vanedamp.coupling.quantities import stress as of_stress
-from vanedamp.coupling.quantities.quantity import Measured, table
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
@@ -193,6 +193,11 @@ class Branches(Measured, Record, Plotted):
         assert self.scene.orbit is not None
         return self.scene.orbit.parameter
 
+    @property
+    def scalars(self) -> dict[str, Quantity]:
+        """The quantities that are one number a point, in their order."""
+        return {name: one for name, one in table().items() if name in self.quantities and not (one.dims or one.text)}
+
     def unit(self, declared: str) -> str:
         """Return the unit of a declared field, of which some stand for that of a number."""
         paths = {"parameter": self.parameter, "second": self.second}
@@ -229,7 +234,9 @@ class Branches(Measured, Record, Plotted):
         known = [part.quantities[name] for part in parts if name in part.quantities]
         ends = {"min": np.fmin, "max": np.fmax}
         found = [{name: end.reduce(values) for name, end in ends.items()} for values in known]
-        return [{name: np.where(np.isnan(value), None, value).tolist() for name, value in each.items()} for each in found]
+        return [
+            {name: np.where(np.isnan(value), None, value).tolist() for name, value in each.items()} for each in found
+        ]
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""

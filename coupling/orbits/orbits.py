@@ -91,7 +91,9 @@ def orbits(
     data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
 
     def found() -> Branches:
-        known = (f"branch {number}: {note}" for number, branch in enumerate(diagram.branches) if (note := unknown(branch)))
+        known = (
+            f"branch {number}: {note}" for number, branch in enumerate(diagram.branches) if (note := unknown(branch))
+        )
         notes = (*search.warnings, *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ()), *known]))
         names, scale = tuple(search.map.names), frozen(search.map.scale)
         return Branches(
