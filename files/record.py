@@ -146,7 +146,7 @@ class Record(Displayed):
         own = self.dimensions()
         return tuple(dim for name in declared for dim in own.get(name, (name,)))
 
-    def unit(self, declared: str) -> str:
+    def unit_in_file(self, declared: str) -> str:
         """Return the unit of declared fields, some of which stand for that of a number, such as a parameter's."""
         return declared
 
@@ -185,7 +185,7 @@ class Record(Displayed):
             if isinstance(layout, Rows):
                 whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
                 rows = [row for each in column for row in each]
-                found |= row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit)
+                found |= row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
                 found[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
             elif isinstance(layout, Columns):
                 for name, values in joined(column, counts).items():
@@ -196,11 +196,11 @@ class Record(Displayed):
                 stored = values.astype(np.int8) if layout.dtype is bool else values
                 for part, each in _parts(stored, layout.imaginary).items():
                     name, dims = prefix + (layout.name or field) + part, (prefix + dim, *layout.dims[1:])
-                    found[name] = store.Variable(each, dims, self.unit(layout.unit))
+                    found[name] = store.Variable(each, dims, self.unit_in_file(layout.unit))
             else:
                 dtype, unit, dims = _column(of, layout)
-                name = prefix + (isinstance(layout, Array) and layout.name or field)
-                found[name] = store.Variable(np.array(column, dtype), (thing, *dims), self.unit(unit))
+                name = prefix + _name(field, layout)
+                found[name] = store.Variable(np.array(column, dtype), (thing, *dims), self.unit_in_file(unit))
         sizes = {dim: size for one in found.values() for dim, size in zip(one.dims, np.shape(one.values), strict=False)}
         for name, one in found.items():  # of no rows, arrays have lost their further dimensions
             if np.ndim(one.values) < len(one.dims):
@@ -353,7 +353,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
     whose = values.get(f"{thing}_of_{dim}", np.zeros(0, int))
     columns: dict[str, Sequence[Any]] = {}
     for field, (of, layout) in declared(kind).items():
-        name = prefix + (isinstance(layout, Array) and layout.name or field)
+        name = prefix + _name(field, layout)
         if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
             columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
         elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
@@ -395,6 +395,10 @@ def _part(
     return given
 
 
+def _name(field: str, layout: Layout) -> str:
+    return (layout.name if isinstance(layout, Array) else "") or field
+
+
 def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
     """Return type, unit and further dimensions of a column of fields."""
     if isinstance(layout, Array):
@@ -427,7 +431,7 @@ def _optional(cls: Any) -> set[str]:
 def row_variables(
     rows: Iterable[Any], kind: type, dim: str, unit_of: Callable[[str], str] = str
 ) -> dict[str, store.Variable]:
-    """Return the variables of rows of a class (Rows). unit_of: returns the unit of a declared one (Record.unit)."""
+    """Return the variables of rows of a class (Rows). unit_of: returns that of a declared one (Record.unit_in_file)."""
     rows = list(rows)
     return {
         f"{dim}_{name}": store.Variable(

@@ -106,10 +106,11 @@ class Branch(Measured):
         columns = dict(zip(BranchPoint._fields, zip(*points, strict=True), strict=True))
         quantities = stacked(columns.pop("quantities"))
         layouts = {name: layout for name, (_, layout) in declared(cls).items() if isinstance(layout, Array)}
-        arrays = {name: frozen(column, layouts[name].dtype) for name, column in columns.items()}
+        arrays: dict[str, Any] = {name: frozen(column, layouts[name].dtype) for name, column in columns.items()}
+        of_branch, of_special = source or (-1, -1)
         return cls(
-            periods=periods, special=tuple(special), end=end, quantities=quantities,
-            **dict(zip(("source_branch", "source_special"), source or (), strict=False)), **arrays,
+            periods=periods, special=tuple(special), end=end, quantities=quantities, source_branch=of_branch,
+            source_special=of_special, **arrays,
         )  # fmt: skip
 
     @property
@@ -145,7 +146,9 @@ def unknown(branch: Branch) -> str:
 
 def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
     """Return the quantities of points as arrays over them."""
-    rows = [{name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points]
+    rows: list[dict[str, np.ndarray]] = [
+        {name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points
+    ]  # fmt: skip
     return {name: frozen(values, values.dtype) for name, values in joined(rows, [1] * len(rows)).items()}
 
 
@@ -198,7 +201,7 @@ class Branches(Measured, Record, Plotted):
         """The quantities that are one number a point, in their order."""
         return {name: one for name, one in table().items() if name in self.quantities and not (one.dims or one.text)}
 
-    def unit(self, declared: str) -> str:
+    def unit_in_file(self, declared: str) -> str:
         """Return the unit of a declared field, of which some stand for that of a number."""
         paths = {"parameter": self.parameter, "second": self.second}
         return unit_of(paths[declared]) if declared in paths else declared
@@ -232,10 +235,10 @@ class Branches(Measured, Record, Plotted):
     def _ends(parts: Sequence[Branch | Border], name: str) -> list[dict[str, Any]]:
         """Return the least and largest value of a quantity of each branch or border, of bodies and spots one each."""
         known = [part.quantities[name] for part in parts if name in part.quantities]
-        ends = {"min": np.fmin, "max": np.fmax}
-        found = [{name: end.reduce(values) for name, end in ends.items()} for values in known]
+        ends = [{"min": np.fmin.reduce(values), "max": np.fmax.reduce(values)} for values in known]
         return [
-            {name: np.where(np.isnan(value), None, value).tolist() for name, value in each.items()} for each in found
+            {end: np.where(np.isnan(value), np.array(None), value).tolist() for end, value in each.items()}
+            for each in ends
         ]
 
     def attributes(self) -> dict[str, Any]:

@@ -97,7 +97,7 @@ class Orbit(Measured, Displayed):
         names = ["status", "parameter", "periods", "residual", "iterations"]
         if self.status is OrbitStatus.OK:
             names += ["stable", "multipliers", "neutral", "symmetric"]
-        values = {name: getattr(self, name) for name in names} | self.quantities | {"state": self.state}
+        values = {name: getattr(self, name) for name in names} | dict(self.quantities) | {"state": self.state}
         if self.map is None:
             return values
         if self.status is OrbitStatus.UNDETERMINED and self.map.travelling is not None:

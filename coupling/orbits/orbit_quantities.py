@@ -1,4 +1,4 @@
-"""Quantities of orbits (coupling.quantities): those of a run over an orbit's own periods, which rates and means need."""
+"""Quantities of orbits (coupling.quantities): those of a run over an orbit's own periods."""
 
 from __future__ import annotations
 
@@ -73,7 +73,8 @@ def exponents_of(
     largest = float(rates[0]) if len(rates) else np.nan
     return {
         "status": status, "motion": "periodic" if known else "undecided", "exponent": largest,
-        "confidence": 0.0 if len(rates) else np.nan, "exponent_per_period": largest * period, "exponents": rates.tolist(),
+        "confidence": 0.0 if len(rates) else np.nan, "exponent_per_period": largest * period,
+        "exponents": rates.tolist(),
     }  # fmt: skip
 
 

@@ -171,11 +171,11 @@ def branches_figure(
             if not own.any():
                 continue
             x = np.where(kept, wide * branch.parameter, np.nan)
-            below = [(2, quantity, values, "%{y:.6g}") for quantity, values in _below(branches, branch).items()]
-            for row, quantity, values, shown in ((1, "", 1e6 * branch.amplitude_mean, "%{y:.6g} µm"), *below):
+            below = [(2, named, values, "%{y:.6g}") for named, values in _below(branches, branch).items()]
+            for row, named, values, shown in ((1, "", 1e6 * branch.amplitude_mean, "%{y:.6g} µm"), *below):
                 figure.add_scatter(
-                    x=x, y=np.where(kept, values, np.nan), mode="lines", meta=quantity or None,
-                    visible=quantity in ("", *list(_shown(branches))[:1]),
+                    x=x, y=np.where(kept, values, np.nan), mode="lines", meta=named or None,
+                    visible=named in ("", *list(_shown(branches))[:1]),
                     name=f"{name}, {kind}", legendgroup=name, showlegend=row == 1, row=row, col=1,
                     line=look | {"dash": dash, "width": width},
                     hovertemplate=f"{name}, {kind}, %{{x:.10g}}: {shown}<extra></extra>",
@@ -289,8 +289,8 @@ def _branches_table(branches: Branches) -> Table:
         flags = zip(branch.stable.tolist(), branch.undetermined.tolist(), strict=True)
         for values, states in zip(np.column_stack([*columns, largest]).tolist(), flags, strict=True):
             rows.append([number, branch.periods, *values, *states])
-    states = ("largest_multiplier", "stable", "undetermined")
-    return ["branch", "periods", branches.parameter, *names, *states], rows
+    last = ("largest_multiplier", "stable", "undetermined")
+    return ["branch", "periods", branches.parameter, *names, *last], rows
 
 
 def _multipliers_figure(branches: Branches) -> go.Figure:

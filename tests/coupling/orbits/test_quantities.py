@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
-
 from tests.coupling.orbits.test_scenes import BODY, STOP
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.exponents.lyapunov import lyapunov
@@ -41,8 +40,9 @@ def test_a_linear_motion_has_the_quantities_of_its_sine(tables, mass):
     orbit = find_orbit(scene(**LINEAR, **tables))
     motion = FORCE * receptance(mass)
     known = {
-        "amplitude_mean": abs(motion), "amplitude_max_dynamic": abs(motion), "amplitude_rms": abs(motion) / math.sqrt(2),
-        "amplitude_harmonic": abs(motion), "phase": np.angle(motion), "static_deflection": 0.0, "impacts_per_period": 0.0,
+        "amplitude_mean": abs(motion), "amplitude_max_dynamic": abs(motion), "static_deflection": 0.0,
+        "amplitude_rms": abs(motion) / math.sqrt(2), "amplitude_harmonic": abs(motion), "phase": np.angle(motion),
+        "impacts_per_period": 0.0,
         "amplitude_undamped": abs(FORCE * receptance(1.0)), "amplitude_fixed": abs(motion),
         "exponent": -DAMPING / (2 * mass),
     }  # fmt: skip
@@ -89,7 +89,7 @@ def followed(data):
 
 
 def test_an_orbit_has_the_quantities_of_the_run_that_settles_on_it(data):
-    """Of all of the table that both have, and there is none that the run has and the orbit has not, without a reason."""
+    """All of the table: there is none that the run has and the orbit has not, without a reason."""
     orbit, run = find_orbit(data), simulate(data.replace({"orbit": None, "time": {"periods": 6000, "transient": 5900}}))
     assert orbit.stable and {run.wear_depth_rate, run.contact_utilisation}.isdisjoint([None, 0.0])
     for name, one in table().items():
