@@ -10,10 +10,10 @@ import pytest
 import tomli_w
 
 from tests.studies.report.test_forced_response import made
+from vanedamp.coupling.quantities.quantity import family
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.designs import is_choice
-from vanedamp.coupling.sweep.sweep import MEASURES
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import worst_start as module
 from vanedamp.studies.cli import main
@@ -143,7 +143,7 @@ def test_order_by_plain_loops(seed):
 
 def test_one_start_is_said():
     axes = {"cavity.c1.gap": [1e-5, 2e-5], "excitation.frequency": [1.0, 2.0, 3.0]}
-    sweep = made(axes, **{name: np.ones((2, 3)) for name in MEASURES})
+    sweep = made(axes, **{one.name: np.ones((2, 3)) for one in family("amplitude")})
     assert all(design.sentence.endswith("; one start only") for design in designs(forced_responses(sweep)))
 
 

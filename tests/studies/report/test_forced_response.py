@@ -11,7 +11,7 @@ import xarray
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.store import finite
 from vanedamp.files.toml_input import validate
@@ -31,9 +31,12 @@ def made(axes, **curves):
     """A sweep over these axes with given measures, all others zero."""
     shape = tuple(len(values) for values in axes.values())
     scene = validate(Scene, DATA | {"sweep": {path: list(values) for path, values in axes.items()}}, "scene.toml")
-    arrays = {name: np.zeros(shape) for name in MEASURES} | {"energy_share": np.full((*shape, len(LOSSES)), 0.25)}
+    row = Row(scene)
+    arrays = row.arrays(np.zeros((int(np.prod(shape)), row.width)), shape)
+    arrays["energy_share"] = np.full(arrays["energy_share"].shape, 0.25)
+    arrays |= {name: curves.pop(name) for name in arrays.keys() & curves.keys()}
     texts = {"status": np.full(shape, "ok", object), "classification": np.full(shape, "periodic-1", object)}
-    return Sweep(scene, {path: np.asarray(values) for path, values in axes.items()}, **arrays | texts | curves)
+    return Sweep(scene, {path: np.asarray(values) for path, values in axes.items()}, arrays, **texts | curves)
 
 
 def test_curve_along_the_frequency():
