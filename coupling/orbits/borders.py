@@ -14,7 +14,6 @@ from vanedamp.coupling.orbits.border_path import BorderPath, Named
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint, stacked
 from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
-from vanedamp.coupling.orbits.orbit_quantities import quantities_of
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.orbits.surface import Surface
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -203,7 +202,7 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
         kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
         state=frozen([surface.state(place.border) for place in places]),
         multipliers=frozen([values**2 if surface.mirrored else values for values in found], complex),
-        quantities=stacked([quantities_of(surface.at(place.y), surface.state(place.y)) for place in places]),
+        quantities=stacked([surface.at(place.y).quantities(surface.state(place.y)) for place in places]),
         orbits=frozen([each.orbits for each in counts], int),
         stable_orbits=frozen([each.stable for each in counts], int),
         special=tuple(_point(surface, index, named) for index, named in sorted(special, key=lambda entry: entry[0])),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vanedamp.coupling.orbits.orbit_quantities import orbit_run
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
 from vanedamp.coupling.scene.registration import meets_body
@@ -42,7 +41,7 @@ class OrbitHistory:
 
 def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
     """Return the motion that a period map passes from a state (k,), an orbit's at the start of its period."""
-    response = orbit_run(period_map, state, events=True, samples_per_period=SAMPLES)
+    response = period_map.run(state, events=True, samples_per_period=SAMPLES)
     # the orbit ends where it began
     time = np.append(response.time, period_map.periods / period_map.scene.frequency)
     displacement, slip = (

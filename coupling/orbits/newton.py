@@ -21,7 +21,6 @@ from scipy.linalg import lstsq
 from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
-from vanedamp.coupling.orbits.orbit_quantities import exponents_of, quantities_of
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.quantities.quantity import Measured, table
 from vanedamp.coupling.scene.units import unit_of
@@ -178,9 +177,8 @@ class Orbit(Measured, Displayed):
         """Its quantities by name, from one run over its periods (orbit_quantities); none of one that was not found."""
         if self.status is not OrbitStatus.OK or self.map is None:
             return {}
-        period = 1.0 / self.map.scene.frequency
-        exponents = exponents_of(*self._multipliers, self.periods, period, self.section.passage.status.value)
-        return quantities_of(self.map.over(self.periods), self.state, exponents)
+        status = self.section.passage.status.value
+        return self.map.over(self.periods).quantities(self.state, *self._multipliers, status)
 
     def __dir__(self) -> Iterable[str]:
         """Return the names of attributes, those of all quantities among them: what it has takes a run to know."""

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.orbits.multipliers import decided
-from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.quantities.quantity import labels, table
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.scene.scene import Time
-from vanedamp.coupling.simulation import simulate
 
 _ONE_FREQUENCY = "an orbit has one frequency"
 #: why orbits have no quantities that need something, by its name
@@ -30,33 +26,21 @@ _LEFT = 1e-6
 LEAVES = "a run over their periods ends early or leaves them, so unstable are they"
 
 
-def orbit_run(along: PeriodMap, state: np.ndarray, events: bool = False, samples_per_period: int = 0) -> Response:
-    """Return the run that a period map passes from a state (k,), an orbit's at the start of its period."""
-    whole = replace(along.scene, time=Time(periods=along.periods, transient=0), sweep={}, orbit=None)
-    return simulate(whole, events, samples_per_period, along.restart_of(state))
-
-
-def quantities_of(along: PeriodMap, state: np.ndarray, exponents: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def quantities_of(run: Response, missed: float, exponents: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the quantities of an orbit by name; nan where they are unknown, all of a run that does not stay on it.
 
-    exponents: as vanedamp.lyapunov has them, of the orbit's multipliers (`exponents_of`); None: unknown.
+    run: over the orbit's periods, from its state; missed: how far from there it ends, over the size of the state, nan
+    where it ends early; exponents: `exponents_of` the orbit; None: unknown.
     """
-    run = orbit_run(along, state)
     known: dict[str, Any] = {} if exponents is None else {"lyapunov": exponents}
-    stays = run.final is not None and _apart(along, along.state_of(run.final), state) < _LEFT
     found = dict[str, Any]()
     for name, one in table().items():
         if WITHOUT.keys().isdisjoint(one.needs):
             value = one.of(known) if one.exists(known) else getattr(run, name)
             if value is not None or name in run.quantities:
-                found[name] = np.nan if value is None else value
-    return found if stays else {name: value if table()[name].text else value * np.nan for name, value in found.items()}
-
-
-def _apart(along: PeriodMap, state: np.ndarray, other: np.ndarray) -> float:
-    """Return how far two states (k,) are apart, over their size."""
-    off, size = (np.abs(each / along.scale).max(initial=0.0) for each in (state - other, other))
-    return float(off / (1.0 + size))
+                unknown = value is None or not (missed < _LEFT or one.text)
+                found[name] = value if not unknown else np.full(np.shape(value), np.nan)[()]
+    return found
 
 
 def exponents_of(

@@ -11,7 +11,7 @@ from tests.coupling.orbits.test_scenes import BODY, STOP
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.exponents.lyapunov import lyapunov
 from vanedamp.coupling.orbits.branch import Branches, stacked, unknown
-from vanedamp.coupling.orbits.orbit_quantities import LEAVES, WITHOUT, quantities_of
+from vanedamp.coupling.orbits.orbit_quantities import LEAVES, WITHOUT
 from vanedamp.coupling.orbits.orbits import find_orbit, orbit_at, orbits
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.simulation import simulate
@@ -161,7 +161,7 @@ def test_quantities_of_an_orbit_that_no_run_stays_on_are_unknown():
     growth, given = abs(orbit.multipliers[0]), [1]
     assert growth > 2.0 and not orbit.stable
     while True:
-        longer = quantities_of(orbit.map.over(given[-1] + 3), orbit.state)
+        longer = orbit.map.over(given[-1] + 3).quantities(orbit.state)
         if np.isnan(longer["amplitude_rms"]):
             break
         given.append(given[-1] + 3)
