@@ -23,6 +23,13 @@ _NAMED = 3
 
 #: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
+#: what ensembles do not have, and why
+_ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
+_PEAK = "the peak without bodies is in `reduction`, others are not kept"
+NOT_IN_ENSEMBLES = {
+    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
+    "fixed_top": _PEAK,
+}  # fmt: skip
 #: dimensions over which the largest is kept
 _REDUCED = {"damper", "hot_spot", "sector"}
 PEAK, REDUCTION = "peak_amplitude", "reduction"

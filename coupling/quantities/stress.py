@@ -54,13 +54,14 @@ def _strength(name: str, about: str, unit: str = "1", **more: Any) -> Quantity:
     return _of_spots(name, about, lambda spot: spot.strength.get(name, np.nan), unit, **more)
 
 
-QUANTITIES = [
-    *(one for name in SCALARS for one in _scalar(name)),
-    _strength("utilisation", "amplitude over the fatigue strength, mean stress included", spread=True, limited=True),
-    _strength("utilisation_max", "the same by the largest amplitude of a period"),
-    _strength("yield_utilisation", "largest stress over the yield strength"),
-    _strength("damage_per_hour", "damage by Miner's rule", "1/h", spread=True, limited=True),
-]
+QUANTITIES = [one for name in SCALARS for one in _scalar(name)]
+von_mises = QUANTITIES.pop(0)
+utilisation = _strength(
+    "utilisation", "amplitude over the fatigue strength, mean stress included", spread=True, limited=True
+)
+utilisation_max = _strength("utilisation_max", "the same by the largest amplitude of a period")
+yield_utilisation = _strength("yield_utilisation", "largest stress over the yield strength")
+damage_per_hour = _strength("damage_per_hour", "damage by Miner's rule", "1/h", spread=True, limited=True)
 
 
 @quantity("Pa", ("hot_spot", "stress_component"))

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Literal
+from dataclasses import field, fields
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.response.spot_stress import MEASURES
+from vanedamp.coupling.quantities import amplitude, stress, wear
+from vanedamp.coupling.quantities.quantity import table
+from vanedamp.coupling.quantities.stress import MEASURES as STRESSES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spots import Spots, spots_of
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import STRICT, InputError, Positive
 
-Measure = Literal["amplitude_mean", "amplitude_max", "stress", "life", "wear"]
+#: what may count of a run, and be limited, by the quantity that it is
+MEASURES = {
+    "amplitude_mean": amplitude.amplitude_mean_dynamic.name, "amplitude_max": amplitude.amplitude_max_dynamic.name,
+    "stress": stress.von_mises.name, "life": stress.damage_per_hour.name, "wear": wear.wear_depth_rate.name,
+}  # fmt: skip
+_LIMITS = MEASURES | {"amplitude": MEASURES["amplitude_mean"], "utilisation": stress.utilisation.name}
 #: hours of operation that damage and wear refer to
 SERVICE = 10_000.0
 
@@ -34,18 +41,35 @@ class Limits:
     """shortest median life of a hot spot [h]"""
     wear: Positive | None = None
     """fastest growth of the depth of wear at a contact [m/h]"""
+    quantities: dict[str, Positive] = field(default_factory=dict)
+    """largest value of any quantity, by its name in results, in its unit there"""
 
     @property
     def given(self) -> dict[str, float]:
         """The limits that are given, by name."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "quantities"}
+        return {name: value for name, value in values.items() if value is not None} | self.quantities
 
 
-def check_measured(scene: Scene, measure: Measure, limits: Limits) -> None:
+def check_measured(scene: Scene, measure: str, limits: Limits) -> None:
     """Raise InputError where runs of a scene do not have what counts or is limited."""
-    spots = spots_of(scene)
-    for name, key in [(measure, "measure"), *((name, f"limits.{name}") for name in limits.given)]:
+    spots, own = spots_of(scene), Row(scene).quantities
+    named = [(measure, "measure"), *((name, f"limits.quantities.{name}") for name in limits.quantities)]
+    for name, key in named:
+        if name in MEASURES and key == "measure":
+            continue
+        if name not in table():
+            known = ", ".join([*MEASURES, *(one for one in table() if one in own)])
+            raise InputError(f"optimise.{key}: unknown quantity {name!r}; there are {known}")
+        if name not in own:
+            about = table()[name].about
+            raise InputError(f"optimise.{key}: runs of this scene have no {name}, which is {about}")
+        if name not in limits.quantities:
+            raise InputError(f"optimise.{key}: what counts is relative to its limit; give limits.quantities.{name}")
+    for name, key in [
+        (measure, "measure"),
+        *((name, f"limits.{name}") for name in limits.given if name not in limits.quantities),
+    ]:
         if name in ("stress", "utilisation", "life") and spots is None:
             raise InputError(
                 f'optimise.{key}: stress is that of a reduced model with hot spots; take structure.model = "rom" and '
@@ -79,10 +103,10 @@ def _undamped(scene: Scene, spots: Spots) -> float:
     linear = linear_stresses(scene, spots)
     if linear is None:
         raise InputError("excitation.waveform: a stress without bodies is that of a sum of sines; give harmonics")
-    return float(linear["undamped"][:, MEASURES.index("von_mises")].max())
+    return float(linear["undamped"][:, STRESSES.index("von_mises")].max())
 
 
-def counted(measure: Measure, limits: Limits, found: Mapping[str, np.ndarray], runs: int) -> np.ndarray:
+def counted(measure: str, limits: Limits, found: Mapping[str, np.ndarray], runs: int) -> np.ndarray:
     """Return of runs, by their quantities (p, ...), what counts, the same without bodies, and by how much they exceed
     their limits (p, 3): the largest relative excess, 0 within all limits, 1 where it is not known. nan: not known.
     """  # fmt: skip
@@ -92,17 +116,15 @@ def counted(measure: Measure, limits: Limits, found: Mapping[str, np.ndarray], r
         values = found.get(name, none)
         return values.max(axis=tuple(range(1, values.ndim)))
 
-    damage, wear, undamped = largest("damage_per_hour"), largest("wear_depth_rate"), largest("amplitude_undamped")
-    pairs = {
-        "amplitude_mean": (largest("amplitude_mean_dynamic"), undamped),
-        "amplitude_max": (largest("amplitude_max_dynamic"), undamped),
-        "stress": (largest("stress_von_mises"), largest("stress_von_mises_undamped")),
-        "life": (damage, none), "wear": (wear, none),
+    def value(name: str) -> np.ndarray:
+        return largest(_LIMITS.get(name, name))
+
+    of = MEASURES.get(measure, measure)
+    without = {
+        MEASURES["amplitude_mean"]: amplitude.amplitude_undamped.name,
+        MEASURES["amplitude_max"]: amplitude.amplitude_undamped.name, MEASURES["stress"]: f"{of}_undamped",
     }  # fmt: skip
-    used = {
-        "amplitude": pairs["amplitude_mean"][0], "stress": pairs["stress"][0], "utilisation": largest("utilisation"),
-        "wear": wear,
-    }  # fmt: skip
-    excess = [damage * limit if name == "life" else used[name] / limit for name, limit in limits.given.items()]
+    pair = largest(of), largest(without[of]) if of in without else none
+    excess = [value(name) * limit if name == "life" else value(name) / limit for name, limit in limits.given.items()]
     over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(runs)
-    return np.column_stack([*pairs[measure], np.where(np.isnan(over), 1.0, over)])  # a limit is not kept unseen
+    return np.column_stack([*pair, np.where(np.isnan(over), 1.0, over)])  # a limit is not kept unseen

@@ -326,7 +326,7 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum) -> str:
         "stress": f"of the stress without bodies ({study.reference / 1e6:.4g} MPa)",
         "life": f"of the worst hot spot's life used in {SERVICE:g} h",
         "wear": f"of X worn off in {SERVICE:g} h",
-    }[table.measure]
+    }.get(table.measure, f"of the limit of {table.measure}")
     text = f"{_format_design(nominal.design, study)}: {nominal.amplitude:.3g} {of}, {table.over_band} of the band"
     if asdict(table.tolerances) != NO_DEVIATION:
         text += (

@@ -25,7 +25,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, ends, file_in, placed, reference_amplitude, scene_in
 from vanedamp.studies.machining import fine_gap
-from vanedamp.studies.optimisation.measures import SERVICE, Limits, Measure, check_measured, reference_stress
+from vanedamp.studies.optimisation.measures import SERVICE, Limits, check_measured, reference_stress
 
 #: longest transient that is proposed, in periods
 _MOST_PERIODS = 10_000_000
@@ -108,9 +108,10 @@ class Optimise(Band):
     """map over mass ratio and gap ratio"""
     limits: Limits = field(default_factory=Limits)
     """what designs must keep (default: nothing)"""
-    measure: Measure = "amplitude_mean"
+    measure: str = "amplitude_mean"
     """what counts of a run: "amplitude_mean" or "amplitude_max" of its periods, without static deflection; "stress" at
-    the worst hot spot; "life", its damage, or "wear", the deepest over X, in 10,000 h"""
+    the worst hot spot; "life", its damage, or "wear", the deepest over X, in 10,000 h; or any quantity of a run that
+    limits.quantities names, the largest of bodies, hot spots and sectors over its limit"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"
@@ -272,6 +273,8 @@ def _reference(scene: Scene, band: np.ndarray, table: Optimise, resonance: Reson
         within = table.over_band == "worst" and band[0] <= resonance.frequency <= band[-1]
         frequencies = [*band.tolist(), *([resonance.frequency] if within else [])]
         return reference_stress([scene.replace(drive(scene, frequency)) for frequency in frequencies], table.over_band)
+    if table.measure in table.limits.quantities:
+        return table.limits.quantities[table.measure]
     return (amplitude if table.measure == "wear" else 1.0) / SERVICE
 
 

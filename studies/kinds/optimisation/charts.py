@@ -13,7 +13,8 @@ _COUNTS = {"stress": "stress", "life": "damage of 1 in 10,000 h", "wear": "depth
 def optimisation_figure(record: Optimisation) -> go.Figure:
     """Draw contours of the reduction over mass ratio and gap, both optima marked."""
     table = record.study["optimise"]
-    of = f"{table['over_band']} {_COUNTS.get(table['measure'], 'amplitude')} in the band"
+    counts = "amplitude" if table["measure"].startswith("amplitude") else table["measure"]
+    of = f"{table['over_band']} {_COUNTS.get(counts, counts)} in the band"
     count = record.nominal.design.bodies
     figure = go.Figure(
         go.Contour(

@@ -62,6 +62,14 @@ def test_measure_is_that_of_the_runs(file, measure, tmp_path):
     assert optimisation_figure(record).data
 
 
+def test_any_quantity_counts_relative_to_its_limit(file):
+    study = Study.of(tables(file, measure="wear_work_rate", limits={"quantities": {"wear_work_rate": 2e-2}}))
+    record = optimise(study)
+    rates = [sum(contact.work_rate for contact in run.wear) for run in runs_of(study, record.nominal.design)]
+    assert record.nominal.amplitude == pytest.approx(max(rates) / 2e-2, rel=1e-9)
+    assert "of the limit of wear_work_rate" in record.sentence and optimisation_figure(record).data
+
+
 def test_stress_without_bodies_is_the_reference(file):
     """That of the linear structure at resonance."""
     study = Study.of(tables(file, measure="stress"))
@@ -100,6 +108,9 @@ def _rates(study, record):
     [
         ({"structure": RIGID}, "optimise.measure: stress"),
         ({"optimise": {"limits": {"utilisation": -1.0}}}, "greater than 0"),
+        ({"optimise": {"limits": {"quantities": {"warmth": 1.0}}}}, "unknown quantity 'warmth'; there are ampl"),
+        ({"optimise": {"measure": "contact_force"}}, "have no contact_force, which is largest force of an impact"),
+        ({"optimise": {"measure": "wear_work_rate"}}, "give limits.quantities.wear_work_rate"),
         ({"wear": None, "optimise": {"limits": {"wear": 1e-9}}}, "optimise.limits.wear: wear is not counted"),
         ({"wear": {"rate": 1e-15}, "optimise": {"limits": {"wear": 1e-9}}}, "optimise.limits.wear: the patch"),
     ],

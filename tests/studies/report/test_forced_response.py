@@ -9,6 +9,7 @@ import pytest
 import tomli_w
 import xarray
 
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.row import Row
@@ -34,7 +35,7 @@ def made(axes, **curves):
     row = Row(scene)
     arrays = row.arrays(np.zeros((int(np.prod(shape)), row.width)), shape)
     arrays["energy_share"] = np.full(arrays["energy_share"].shape, 0.25)
-    arrays |= {name: curves.pop(name) for name in arrays.keys() & curves.keys()}
+    arrays |= {name: curves.pop(name) for name in table().keys() & curves.keys()}
     texts = {"status": np.full(shape, "ok", object), "classification": np.full(shape, "periodic-1", object)}
     return Sweep(scene, {path: np.asarray(values) for path, values in axes.items()}, arrays, **texts | curves)
 
@@ -66,7 +67,7 @@ def test_onset_is_where_walls_are_hit():
     """A block that hits its floor from the second point on, and a wall from the third."""
     curve, walls = np.ones(3), np.array([[0.0], [0.0], [1.0]])
     curves = {"amplitude_undamped": curve, "amplitude_mean_dynamic": curve, "impacts_per_period": np.arange(3.0)}
-    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, in_plane={"wall_impacts": walls}, **curves)
+    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, wall_impacts=walls, **curves)
     found = forced_responses(sweep)[0].headline
     assert (found.onset, found.touched_below) == (3.0, 2.0)
 

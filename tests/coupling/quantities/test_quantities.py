@@ -1,0 +1,165 @@
+"""Each quantity is said once: formulas of numbers and of many scenes; a new one is everywhere at once."""
+
+import ast
+import csv
+import math
+import pkgutil
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import vanedamp as vd
+from docs._ext.quantities import KINDS, lacks, reason
+from vanedamp.coupling.quantities import quantity as quantities
+from vanedamp.coupling.quantities.quantity import FAMILIES, evaluated, quantity, table
+from vanedamp.coupling.quantities.sums import COMPLEX, ENERGIES, SUMS, sources_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.record import Columns, Record, declared
+from vanedamp.files.toml_input import validate
+from vanedamp.studies import kinds
+from vanedamp.studies.cli import main
+
+ROOT = Path(__file__).parents[3]
+SCENE = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "excitation": {"frequency": 15.9, "resonance_amplitude": 1e-3},
+    "cavity": [{"name": "c", "gap": 4e-4}],
+    "damper": [{"cavity": "c", "mass": 0.05, "friction": 0.2, "restitution": 0.6}],
+    "contact": {"law": "newton", "pair": {"young": 2e11, "radius": 0.01, "yield_strength": 1e9}},
+    "wear": {"rate": 1e-15, "impact_rate": 1e-13, "area": 1e-6},
+    "time": {"periods": 60, "transient": 40},
+}
+
+
+def scene(**changes):
+    return validate(Scene, SCENE | changes, "scene")
+
+
+class Jerk:
+    """A family of quantities, as of one file more."""
+
+    ORDER = 5
+
+    @quantity("m/s^3", spread=True, limited=True)
+    def largest_jerk(highest, omega):
+        """largest jerk of a sine of that amplitude"""
+        return omega**3 * highest
+
+
+@pytest.fixture
+def jerk(monkeypatch):
+    known = {"jerk": Jerk} | FAMILIES.all()
+    monkeypatch.setattr(quantities, "FAMILIES", SimpleNamespace(all=lambda: known, own=lambda: known))
+    table.cache_clear()
+    yield Jerk.largest_jerk.name
+    monkeypatch.undo()
+    table.cache_clear()
+
+
+def test_a_quantity_of_one_file_is_in_runs(jerk, tmp_path, capsys):
+    run = vd.simulate(scene())
+    expected = (2 * math.pi * 15.9) ** 3 * run.amplitude_max
+    assert getattr(run, jerk) == pytest.approx(expected, rel=1e-12)
+    assert run.to_json()[jerk] == getattr(run, jerk) and f"{jerk}:" in str(run) and "m/s^3" in str(run)
+    run.save(tmp_path / "run.h5")
+    assert getattr(vd.Response.load(tmp_path / "run.h5"), jerk) == getattr(run, jerk)
+    assert run.to_xarray().attrs[jerk] == getattr(run, jerk)
+    assert main(["info", str(tmp_path / "run.h5")]) == 0
+    assert jerk in capsys.readouterr().out
+
+
+def test_a_quantity_of_one_file_is_in_sweeps_and_ensembles(jerk, tmp_path):
+    over = {"excitation.frequency": [15.7, 15.9, 16.1]}
+    found = vd.sweep(scene(sweep=over))
+    assert getattr(found, jerk) == pytest.approx((2 * np.pi * np.array([15.7, 15.9, 16.1])) ** 3 * found.amplitude_max)
+    assert found.to_json()[jerk] == getattr(found, jerk).tolist() and found.to_json()["units"][jerk] == "m/s^3"
+    assert found.to_xarray()[jerk].attrs["units"] == "m/s^3" and jerk in found._repr_html_()
+    found.save(tmp_path / "sweep.h5")
+    assert main(["export", str(tmp_path / "sweep.h5"), "-o", str(tmp_path / "sweep.csv")]) == 0
+    with open(tmp_path / "sweep.csv", encoding="utf-8") as file:
+        assert f"{jerk} [m/s^3]" in next(csv.reader(file))
+    spread = scene(damper=[SCENE["damper"][0] | {"friction": [0.1, 0.3]}], ensemble={"samples": 4}, sweep=over)
+    found = vd.ensemble(spread)
+    assert found.quantile[jerk].shape == (5, 3) and np.isfinite(found.quantile[f"peak_{jerk}"]).all()
+
+
+def test_formulas_take_numbers_and_arrays_of_scenes_alike():
+    rng = np.random.default_rng(1)
+    rows = rng.uniform(0.5, 2.0, (7, len(SUMS)))
+    many = evaluated(sources_of(rows))
+    for place, row in enumerate(rows):
+        for name, value in evaluated(sources_of(row)).items():
+            np.testing.assert_array_equal(many[name][place], value, err_msg=name)
+
+
+def test_sums_have_a_place_each():
+    assert len({*SUMS}) == len(SUMS) and set(COMPLEX + ENERGIES).isdisjoint(
+        sources_of(np.zeros(len(SUMS))).keys() - {*COMPLEX}
+    )
+
+
+# where they are: what is not there is explained, and what is there is not
+
+
+def results():
+    """A record of each kind, of a scene that has as much as it can, and the quantities that it has."""
+    run = vd.simulate(scene())
+    found = {"run": {name for name in table() if getattr(run, name) is not None}}
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_result_lacks_is_explained(kind):
+    needed = {name for one in table().values() for name in (one.name, *one.needs, *one.dims)}
+    assert lacks(kind).keys() <= needed
+    assert all(len(why) > 10 for why in lacks(kind).values())
+    assert any(reason(one, kind) is None for one in table().values())
+
+
+# rules of the code
+
+
+def product():
+    listed = subprocess.run(
+        ["git", "ls-files", "coupling", "studies", "rom", "modal", "files", "meshes"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    for name in listed.stdout.split():
+        if name.endswith(".py") and not name.startswith("coupling/quantities/"):
+            yield name, ast.parse((ROOT / name).read_text(encoding="utf-8"))
+
+
+UNITS = {"m", "1", "rad", "Pa", "N", "m/s", "m/h", "m^3/h", "W", "1/h", "1/s", "Hz", "J"}
+#: units of the keys of other tables: of measured data, and of contacts at one speed
+OTHERS = {"studies/identification/data.py", "coupling/contacts/numbers.py", "files/formats/lab_units.py"}
+
+
+def test_a_quantity_has_its_unit_in_one_file():
+    """No other file lists names of quantities with units, or declares a field of that name."""
+    names, again = {*table()}, []
+    for name, tree in product():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Dict) and name not in OTHERS:
+                pairs = zip(node.keys, node.values, strict=True)
+                again += [
+                    (name, key.value)
+                    for key, value in pairs
+                    if isinstance(key, ast.Constant) and key.value in names
+                    and isinstance(value, ast.Constant) and value.value in UNITS
+                ]  # fmt: skip
+    assert again == []
+
+
+def test_records_are_not_written_by_hand():
+    """A record of a kind declares its fields: what `to_json` and `of` do beyond that is little."""
+    counted = {}
+    for kind in map(kinds.kind, kinds.names()):
+        record = pkgutil.resolve_name(kind.RECORD)
+        if issubclass(record, Record):
+            own = [item for item in declared(record).values() if type(item[1]).__name__ == "Own"]
+            counted[record.__name__] = len(own) / max(len(declared(record)), 1)
+    assert counted and max(counted.values()) <= 0.6, counted
+    assert any(isinstance(item[1], Columns) for item in declared(vd.Sweep).values())
