@@ -13,12 +13,13 @@ from vanedamp.coupling.response.response import Response
 
 _ONE_FREQUENCY = "an orbit has one frequency"
 #: why orbits have no quantities that need something, by its name
-WITHOUT = {
+NOT_IN_ORBITS = {
     "confidence": "means over an orbit's own periods are exact",
     "transient": "the state of an orbit is its section",
     "undamped_top": _ONE_FREQUENCY,
     "fixed_top": _ONE_FREQUENCY,
 }
+NOT_IN_BORDERS = NOT_IN_ORBITS | {"lyapunov": "one multiplier of a border is critical"}
 #: scaled distance of a run's end from its start from which on it has left an unstable orbit: round-off grows by the
 #: largest multiplier, and quantities are wrong by as much
 _LEFT = 1e-6
@@ -35,7 +36,7 @@ def quantities_of(run: Response, missed: float, exponents: Mapping[str, Any] | N
     known: dict[str, Any] = {} if exponents is None else {"lyapunov": exponents}
     found = dict[str, Any]()
     for name, one in table().items():
-        if WITHOUT.keys().isdisjoint(one.needs):
+        if NOT_IN_ORBITS.keys().isdisjoint(one.needs):
             value = one.of(known) if one.exists(known) else getattr(run, name)
             if value is not None or name in run.quantities:
                 unknown = value is None or not (missed < _LEFT or one.text)

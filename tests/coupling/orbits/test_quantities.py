@@ -11,7 +11,7 @@ from tests.coupling.orbits.test_scenes import BODY, STOP
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.exponents.lyapunov import lyapunov
 from vanedamp.coupling.orbits.branch import Branches, stacked, unknown
-from vanedamp.coupling.orbits.orbit_quantities import LEAVES, WITHOUT
+from vanedamp.coupling.orbits.orbit_quantities import LEAVES, NOT_IN_ORBITS
 from vanedamp.coupling.orbits.orbits import find_orbit, orbit_at, orbits
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.simulation import simulate
@@ -95,7 +95,7 @@ def test_an_orbit_has_the_quantities_of_the_run_that_settles_on_it(data):
     for name, one in table().items():
         if (value := getattr(run, name)) is None:
             continue
-        if not WITHOUT.keys().isdisjoint(one.needs):
+        if not NOT_IN_ORBITS.keys().isdisjoint(one.needs):
             assert name not in orbit.quantities
         elif name != "energy_residual":
             assert getattr(orbit, name) == pytest.approx(value, rel=1e-9, abs=1e-15, nan_ok=True), name
