@@ -8,11 +8,13 @@ import pytest
 
 import vanedamp as vd
 from tests.coupling.orbits.test_scenes import BODY, STOP
-from tests.tools.closed_form_scenes import scene
+from tests.tools.closed_form_scenes import ball, scene
 from vanedamp.coupling.exponents.lyapunov import lyapunov
+from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.branch import Branches, stacked, unknown
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES, NOT_IN_ORBITS
 from vanedamp.coupling.orbits.orbits import find_orbit, orbit_at, orbits
+from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import load_any, save
@@ -24,6 +26,7 @@ LINEAR = {
     "time": {"periods": 1, "transient": 0},
     "orbit": {"start": "linear"},
 }
+PAIR = {"young": 2e11, "radius": 0.05, "yield_strength": 6e8}
 BODIES = {
     "cavity": [{"name": "c", "gap": 100.0}],
     "damper": [{"cavity": "c", "mass": 0.2, "friction": 1.0, "normal_load": 100.0}],
@@ -73,13 +76,28 @@ def test_a_coulomb_damper_wears_as_den_hartog_has_it():
     assert orbit.energy_share == pytest.approx([0.0, 1.0, 0.0, 0.0])
 
 
+def test_a_ball_that_flies_for_two_periods_has_half_an_impact_a_period():
+    """It leaves with V = g T, the table has the speed v: V - v = e (V + v), as Holmes 1982 has it for one period."""
+    e, ratio, g, omega = 0.5, 2.2, 10.0, 2 * math.pi
+    phase = math.acos(2 * math.pi * (1 - e) / (1 + e) / ratio)
+    later, size = 1.0 - phase / omega, ratio * g / omega**2
+    height = g * later - g * later**2 / 2 + size * math.sin(phase)
+    table = {"cavity": [{"name": "c", "gap": 20.0}], "contact": {"law": "newton", "pair": PAIR}}
+    data = ball(e, ratio, damper=[{"cavity": "c", "mass": 1.0, "restitution": e, "position": -10.0}], **table)
+    state = np.array([height - 10.0, g - g * later - size * omega])
+    orbit = newton.find_orbit(period_map(data, periods=2), state)
+    assert orbit.periods == 2 and orbit.state == pytest.approx(state, rel=1e-9)
+    assert orbit.impacts_per_period == 0.5 and orbit.energy_share == pytest.approx([0.0, 0.0, 1.0, 0.0])
+    assert orbit.impact_speed_max == pytest.approx(2 * g / (1 + e), rel=1e-9)
+    assert orbit.amplitude_mean == pytest.approx(size) and orbit.amplitude_rms == pytest.approx(size / math.sqrt(2))
+
+
 @pytest.fixture(scope="module")
 def data():
     """A body that hits both walls once a period, with all that a rigid model can have: wear, forces of contacts."""
     orbit = {"from": 102.0, "to": 101.9, "step": 0.04, "max_points": 3}
-    pair = {"young": 2e11, "radius": 0.05, "yield_strength": 6e8}
     wear = {"rate": 1e-12, "length": 0.01, "height": 0.01, "width": 0.01}
-    return scene(**BODY | {"orbit": orbit}, wear=wear, contact={"law": "newton", "pair": pair})
+    return scene(**BODY | {"orbit": orbit}, wear=wear, contact={"law": "newton", "pair": PAIR})
 
 
 @pytest.fixture(scope="module")
