@@ -67,6 +67,7 @@ class ReducedModel(Record):
     """additional interface displacement per unit interface force, u = selection q + G f: a massless boundary; None
     without"""
     outputs: Annotated[tuple[str, ...], Array(("output",), dtype=object, name="output", json="outputs")] = ()
+    """names of the outputs"""
     output_rows: Annotated[np.ndarray | None, Array(("output", "column"))] = None
     """functionals of the outputs: stresses or displacements, own units"""
     output_residual: Annotated[np.ndarray | None, Array(("output", "force"))] = None
@@ -93,6 +94,7 @@ class ReducedModel(Record):
     rotation_axis: Annotated[np.ndarray | None, Array(("axis",))] = None
     """unit vector, with rotation_point the axis that it rotates about; or None"""
     rotation_point: Annotated[np.ndarray | None, Array(("axis",), "m")] = None
+    """on that axis"""
     greatest_speed: float = 0.0
     """up to which the basis holds [rad/s]"""
 

@@ -12,6 +12,9 @@ import numpy as np
 from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
 from vanedamp.coupling.ensembles.record import PEAK, REDUCTION, Ensemble, complete, kept
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic, amplitude_undamped
+from vanedamp.coupling.quantities.energy import penetration
+from vanedamp.coupling.quantities.linear_peaks import undamped_peak
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sweep.grid import resonance_axis
@@ -46,7 +49,8 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
     results = {name: np.where(ok, found[name], np.nan) for name in found if table()[name].spread}
     of_curves = _of_curves(points, results)
     # indices of all results at every point of a grid would take far longer than the runs
-    told = {"amplitude_mean_dynamic": results["amplitude_mean_dynamic"]} if grid.axes else results
+    mean = amplitude_mean_dynamic.name
+    told = {mean: results[mean]} if grid.axes else results
     count, seed = len(points.samples), points.scene.sampled.seed
     return Ensemble(
         scene=points.scene,
@@ -57,7 +61,7 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
         quantile={name: frozen(quantiles(values, count)) for name, values in (results | of_curves).items()},
         indices={name: frozen(indices(values, count, seed)) for name, values in (told | of_curves).items()},
         provenance=provenance
-        | warnings_in(grid, found["penetration"])
+        | warnings_in(grid, found[penetration.name])
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),
     )
@@ -73,13 +77,13 @@ def _of_curves(points: Members, results: Mapping[str, np.ndarray]) -> dict[str, 
     swept, _ = resonance_axis(points.base, points.grid.axes)
     along = () if swept is None else (1 + list(points.grid.axes).index(swept),)
 
-    whole = complete(np.isfinite(results["amplitude_mean_dynamic"]), points.base, points.grid.axes)
+    whole = complete(np.isfinite(results[amplitude_mean_dynamic.name]), points.base, points.grid.axes)
 
     def highest(name: str) -> np.ndarray:
         return np.where(whole, np.fmax.reduce(results[name], axis=along), np.nan)
 
-    peak = highest("amplitude_mean_dynamic")
-    undamped = points.peaks().get("undamped_peak", highest("amplitude_undamped"))
+    peak = highest(amplitude_mean_dynamic.name)
+    undamped = points.peaks().get(undamped_peak.name, highest(amplitude_undamped.name))
     usable = (undamped > 0.0) & np.isfinite(undamped)
     reduction = 1.0 - np.divide(peak, undamped, out=np.full(peak.shape, np.nan), where=usable)
     further = {f"peak_{name}": highest(name) for name in results if table()[name].limited}

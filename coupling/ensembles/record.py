@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
@@ -139,7 +140,7 @@ class Ensemble(Record, Plotted):
         swept = resonance_axis(self.scene, self.axes)[0]
         if swept is None or len(self.axes[swept]) < 2:
             return ""
-        mean = np.where(self.status == "ok", self.members["amplitude_mean_dynamic"], -np.inf)
+        mean = np.where(self.status == "ok", self.members[amplitude_mean_dynamic.name], -np.inf)
         curves = np.moveaxis(mean, 1 + list(self.axes).index(swept), -1)[(slice(None), *place)]
         top = self.axes[swept][curves.argmax(axis=-1)]
         share = float(np.isin(top, (self.axes[swept].min(), self.axes[swept].max())).mean())

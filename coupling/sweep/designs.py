@@ -6,6 +6,7 @@ from collections.abc import Hashable, Sequence
 
 import numpy as np
 
+from vanedamp.coupling.quantities.linear_peaks import undamped_peak
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
@@ -47,7 +48,7 @@ def relative_amplitudes(sweep: Sweep, heights: np.ndarray) -> np.ndarray:
     swept, top = resonance_axis(sweep.scene, sweep.axes)[0], sweep.amplitude_undamped
     if swept is not None:
         at = list(sweep.axes).index(swept)
-        known = sweep.peaks.get("undamped_peak")
+        known = sweep.peaks.get(undamped_peak.name)
         top = top.max(axis=at, keepdims=True) if known is None else np.expand_dims(known, at)
     found: np.ndarray = heights / np.where(np.isfinite(top) & (top > 0.0), top, np.nan)
     return found

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, amplitude_mean_dynamic
+from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.response.moved_start import Mean, as_one, moved, neighbours
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.sweep.record import Sweep
@@ -18,7 +20,7 @@ from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.coupling.system.sectors import unrolled
 
 #: measures of a second run that are kept
-_KEPT = ("amplitude_mean_dynamic", "amplitude_mean_confidence", "impacts_per_period")
+_KEPT = tuple(one.name for one in (amplitude_mean_dynamic, amplitude_mean_confidence, impacts_per_period))
 #: sections at which neighbours that never part are looked for
 _SECTIONS = 33
 

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import amplitude_mean, amplitude_mean_dynamic
+from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import frozen
 
@@ -15,7 +17,7 @@ _BODY = ("position", "velocity", "lift", "lift_velocity", "tilt", "tilt_rate")
 #: tables that say how a run begins
 _TABLES = ("initial", "continuation")
 #: measures that tell steady states apart, and the size below which their differences count as absolute ones
-_FINGERPRINT = {"amplitude_mean_dynamic": 0.0, "attached_mass_fraction": 1.0, "impacts_per_period": 1.0}
+_FINGERPRINT = {amplitude_mean_dynamic.name: 0.0, attached_mass_fraction.name: 1.0, impacts_per_period.name: 1.0}
 
 
 class SteadyState(NamedTuple):
@@ -96,7 +98,7 @@ def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarr
         return np.zeros(0, int), []
     classification = sweep.classification.ravel()[place]
     measures = {name: np.nan_to_num(getattr(sweep, name).ravel()[place]) for name in _FINGERPRINT}
-    amplitude = measures["amplitude_mean_dynamic"]
+    amplitude = measures[amplitude_mean_dynamic.name]
     confidence = np.nan_to_num(sweep.amplitude_mean_confidence.ravel()[place])
     relative = np.divide(confidence, amplitude, out=np.zeros_like(amplitude), where=amplitude > 0)
     half = np.maximum(tolerance / 2, np.where(classification == "non-periodic", relative, 0.0))
@@ -111,7 +113,7 @@ def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarr
         own = label == number
         means = {
             name: float(np.nan_to_num(getattr(sweep, name).ravel()[place][own]).mean())
-            for name in ("amplitude_mean", "attached_mass_fraction", "impacts_per_period")
+            for name in (amplitude_mean.name, attached_mass_fraction.name, impacts_per_period.name)
         }
         found.append(SteadyState(classification[own][0], **means, runs=int(own.sum())))
     return label, found

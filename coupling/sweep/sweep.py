@@ -15,6 +15,7 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import wall_warnings
+from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
@@ -112,7 +113,7 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
-        | warnings_in(grid, found["penetration"])
+        | warnings_in(grid, found[penetration.name])
         | ({} if grid.estimate is None else {"estimate": grid.estimate})
         | ({} if grid.advice is None else {"advice": grid.advice}),
     )

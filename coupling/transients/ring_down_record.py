@@ -45,6 +45,7 @@ class RingDown(Record, Plotted):
     scene: SceneField
     """with its [ring_down] table"""
     status: Status
+    """how the motion ended, or the steady response before"""
     linear: LinearMode
     """the mode without bodies"""
     duration: float
@@ -64,6 +65,7 @@ class RingDown(Record, Plotted):
     energy_residual: float
     """imbalance of the energies, relative to its largest term"""
     wall_time_s: float
+    """time that it took [s]"""
     rest_time: float | None = None
     """at which the mode comes to rest; None if it moves to the end [s]"""
     drive: dict[str, Any] | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Sequence
 from enum import Enum
 from importlib import import_module
@@ -33,16 +34,20 @@ class Fields(Directive):
             texts = _texts(record)
             rows = [[_code(record[one].value), with_literals(texts[one])] for one in names or texts]
             return [table_node(("Value", "Meaning"), rows, (25, 75))]
-        found = described(record, names)
-        header, widths = ["Name", "Unit", "Meaning"], [25, 10, 65]
-        if in_file := any(one.dims for one in found):
-            header, widths = ["Variable", "Dimensions", *header[1:]], [20, 15, 10, 55]
-        rows = [
-            [_code(one.name), *([[nodes.Text(one.dims)]] if in_file else []), [nodes.Text(one.unit)],
-             with_literals(one.meaning)]
-            for one in found
-        ]  # fmt: skip
-        return [table_node(header, rows, widths)]
+        return [fields_table(described(record, names))]
+
+
+def fields_table(found: Sequence[Described]) -> nodes.table:
+    """Return the table of fields of a record."""
+    header, widths = ["Name", "Unit", "Meaning"], [25, 10, 65]
+    if in_file := any(one.dims for one in found):
+        header, widths = ["Variable", "Dimensions", *header[1:]], [20, 15, 10, 55]
+    rows = [
+        [_code(one.name), *([[nodes.Text(one.dims)]] if in_file else []), [nodes.Text(one.unit)],
+         with_literals(one.meaning)]
+        for one in found
+    ]  # fmt: skip
+    return table_node(header, rows, widths)
 
 
 class Described(NamedTuple):
@@ -71,12 +76,33 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
 
 
 def _texts(record: type) -> dict[str, str]:
-    """Return the docstrings after the fields of a class."""
-    return {
-        field: " ".join(" ".join(lines).split())
-        for (owner, field), lines in ModuleAnalyzer.for_module(record.__module__).find_attr_docs().items()
-        if owner == record.__name__
-    }
+    """Return the docstrings after the fields of a class, and of its bases."""
+    found = {"provenance": "versions and further data of the caller (JSON-able)"}
+    for base in reversed(record.__mro__[:-1]):
+        if base.__module__.startswith("vanedamp"):
+            for (owner, field), lines in ModuleAnalyzer.for_module(base.__module__).find_attr_docs().items():
+                if owner == base.__name__:
+                    found[field] = " ".join(" ".join(lines).split())
+    return found
+
+
+class ResultRecords(Directive):
+    """`{result-records}`: the fields of the records of all kinds, but those that are given."""
+
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        found: list[nodes.Node] = []
+        for kind in filter(None, map(kinds.kind, kinds.names())):
+            record = pkgutil.resolve_name(kind.RECORD)
+            if kind.NAME in " ".join(self.content).split() or not issubclass(record, Record):
+                continue
+            section = nodes.section(ids=[f"result-{kind.NAME}"], names=[f"result-{kind.NAME}"])
+            section += nodes.title("", "", *_code(kind.NAME))
+            section += nodes.paragraph("", f"{kind.ABOUT[:1].upper()}{kind.ABOUT[1:]}.")
+            section += fields_table(described(record))
+            found.append(section)
+        return found
 
 
 class ResultKinds(Directive):
@@ -104,4 +130,5 @@ def _code(text: str) -> list[nodes.Node]:
 def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("fields", Fields)
     app.add_directive("result-kinds", ResultKinds)
+    app.add_directive("result-records", ResultRecords)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

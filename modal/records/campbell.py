@@ -84,6 +84,7 @@ class Campbell(Record, Plotted):
     solved: Annotated[np.ndarray, Array(("solution",), "rad/s", name="solved_speed", json="solved")]
     """speeds at which the full structure was solved"""
     orders: Annotated[tuple[float, ...], Array(("engine_order",), name="engine_order", json="orders")]
+    """engine orders"""
     crossings: Annotated[tuple[Crossing, ...], Rows("crossing")]
     """with the engine orders, by speed"""
     approaches: Annotated[tuple[Approach, ...], Rows("approach")]

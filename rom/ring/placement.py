@@ -39,8 +39,11 @@ class Ring(Record):
     directions: _Vectors
     """this and the next three: as in ReducedModel, of sector 0"""
     normals: _Vectors
+    """across them, towards the bodies"""
     positions: Annotated[np.ndarray, Array(("interface", "direction"), "m")]
+    """places"""
     arms: Annotated[np.ndarray, Array(("interface",), "m")]
+    """distances of bodies from the interface"""
     base_load: _Load
     """of sector 0, by an acceleration of the base along x, y, z of its frame"""
     part_load: _Load

@@ -63,6 +63,7 @@ class MistuningStudy(Record):
 
     KIND: ClassVar[str] = "mistuning"
     sectors: int
+    """N"""
     label: str
     """interface label where forces act and responses are taken"""
     orders: Annotated[np.ndarray, Array(_OverOrders, dtype=np.int64)]
@@ -92,7 +93,9 @@ class MistuningStudy(Record):
     stiffness: _OfDraw
     """deviations of the first draw"""
     mass: _OfDraw
+    """the same of its masses"""
     damping: _OfDraw
+    """the same of its damping"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -42,6 +42,7 @@ class CalibrationRecord(Record):
     part: Annotated[tuple[str, ...], Array(("part",), dtype=object)] = ()
     """names of the tuned parts of the stiffness"""
     factor: _OfParts = field(default_factory=empty)
+    """by which the part is stiffer than it was"""
     factor_deviation: _OfParts = field(default_factory=empty)
     """relative, for 0.1 % of the frequencies"""
     target_hz: Annotated[np.ndarray, Array(("target",), "Hz", name="target_frequency")] = field(default_factory=empty)
@@ -49,8 +50,11 @@ class CalibrationRecord(Record):
     before_hz: Annotated[np.ndarray, Array(("target",), "Hz", name="frequency_before")] = field(default_factory=empty)
     """computed before tuning"""
     after_hz: Annotated[np.ndarray, Array(("target",), "Hz", name="frequency_after")] = field(default_factory=empty)
+    """by the tuned model"""
     mac_before: _OfTargets = field(default_factory=empty)
+    """of the shapes with the measured ones, as the case had it"""
     mac_after: _OfTargets = field(default_factory=empty)
+    """the same of the tuned model"""
     sensitivity: Annotated[np.ndarray, Array(("target", "part"))] = field(default_factory=empty)
     """of the logarithms of frequencies to those of factors"""
     label: Annotated[tuple[str, ...], Array(("label",), dtype=object)] = ()

@@ -133,6 +133,7 @@ class Identification(Record, Plotted):
     minima: Annotated[np.ndarray, Array(("minimum", "number"))]
     """where the searches ended"""
     minima_misfit: Annotated[np.ndarray, Array(("minimum",))]
+    """what is left there"""
     channels: tuple[Mapping[str, str], ...]
     """names of what was measured"""
     deviation: Annotated[np.ndarray, Array(("channel",))]
@@ -140,6 +141,7 @@ class Identification(Record, Plotted):
     estimated: Annotated[np.ndarray, Array(("channel",), dtype=bool)]
     """whether the deviations are those of the residuals"""
     data_channel: Annotated[np.ndarray, Array(("datum",), dtype=np.int64)]
+    """place of each datum in the channels"""
     data_at: _Data
     """Hz or s"""
     data_value: _Data
@@ -155,6 +157,7 @@ class Identification(Record, Plotted):
     counts: Mapping[str, int]
     """engine runs ("runs"), evaluations of period maps ("passages")"""
     wall_time_s: float
+    """time that it took [s]"""
     scene: _Scene
     """with the best numbers"""
     proposal: _Proposal = None

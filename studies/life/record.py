@@ -28,15 +28,21 @@ class LifeRecord(Record):
     contacts: tuple[Contact, ...]
     """that wear: body, side and corner, area of the patch, share of the cavity"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
+    """of the band"""
     time: Annotated[np.ndarray, Array(("time",), "h")]
+    """hours of operation"""
     depth: Annotated[np.ndarray, Array(("time", "contact"), "m")]
     """of both partners of a contact; nan where its patch is not known"""
     depth_band: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    """half width by confidence and steps"""
     depth_error: Annotated[np.ndarray, Array(("time", "contact"), "m")]
     """of the steps"""
     depth_rate: Annotated[np.ndarray, Array(("time", "contact"), "m/h")]
+    """growth of the depth"""
     depth_rate_confidence: Annotated[np.ndarray, Array(("time", "contact"), "m/h")]
+    """half width of its 95 % confidence interval"""
     gap: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
+    """of each cavity"""
     gap_band: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
     """by confidence and steps"""
     play: Annotated[np.ndarray, Array(("time", "cavity"), "m")]
@@ -46,12 +52,14 @@ class LifeRecord(Record):
     reduction: _Moments
     """of what counts of the band"""
     reduction_band: _Moments
+    """half width of it"""
     amplitude: Annotated[np.ndarray, Array(("time", "frequency"))]
     """over the reference; nan where a run failed"""
     hours: tuple[float | None, float | None, float | None]
     """when the reduction is lost: of its curve, of the lower and of the upper bound; None: not within the hours; 0:
     never reached [h]"""
     runs: int
+    """number of runs"""
     trouble: int
     """of the runs, those with another status than ok"""
     sentence: str

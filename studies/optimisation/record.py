@@ -93,12 +93,15 @@ class Optimisation(Record):
     robust: _Optimum
     """the best within the tolerances"""
     map_mass_ratio: Annotated[np.ndarray, Array(("map_mass_ratio",))]
+    """of the bodies over the structure"""
     map_gap_ratio: Annotated[np.ndarray, Array(("map_gap_ratio",))]
+    """gap over X"""
     map_amplitude: Annotated[np.ndarray, Array(("map_mass_ratio", "map_gap_ratio"))]
     """of designs as they are, with the bodies of `nominal`"""
     history_design: Annotated[np.ndarray, Array(("evaluation", "variable"))]
     """designs in the order in which they were tried"""
     history_amplitude: _Tried
+    """what each counts by, over the reference; beyond its limits 1 plus the excess"""
     history_robust: _Tried
     """whether an amplitude is within the tolerances (1) or as designed (0)"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
@@ -108,6 +111,7 @@ class Optimisation(Record):
     nominal_response: _OverBand
     """nan where a run is not ok"""
     robust_response: _OverBand
+    """the same of `robust`"""
     scenes: int
     """number of runs"""
     trouble: int

@@ -33,6 +33,8 @@ SCENE = {
     "time": {"periods": 60, "transient": 40},
 }
 
+LONG = {"periods": 400, "transient": 300, "tolerance": 0.2}
+
 
 def scene(**changes):
     return validate(Scene, SCENE | changes, "scene")
@@ -81,7 +83,7 @@ def test_a_quantity_of_one_file_is_in_sweeps_and_ensembles(jerk, tmp_path):
     assert main(["export", str(tmp_path / "sweep.h5"), "-o", str(tmp_path / "sweep.csv")]) == 0
     with open(tmp_path / "sweep.csv", encoding="utf-8") as file:
         assert f"{jerk} [m/s^3]" in next(csv.reader(file))
-    spread = scene(damper=[SCENE["damper"][0] | {"friction": [0.1, 0.3]}], ensemble={"samples": 4}, sweep=over)
+    spread = scene(ranges={"damper.0.friction": (0.1, 0.3)}, ensemble={"samples": 4}, sweep=over, time=LONG)
     found = vd.ensemble(spread)
     assert found.quantile[jerk].shape == (5, 3) and np.isfinite(found.quantile[f"peak_{jerk}"]).all()
 
