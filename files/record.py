@@ -8,7 +8,8 @@
         status: str
 
 A field is an array (Array), arrays by name (Columns), a tuple of small records of one class, whose fields are columns
-(Rows), or plain data that pydantic knows: an attribute of the file.
+(Rows), a tuple of parts that have arrays of different lengths (Ragged), or plain data that pydantic knows: an attribute
+of the file.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import cache
 from typing import (
     TYPE_CHECKING,
@@ -48,7 +49,7 @@ class Array(NamedTuple):
     """An array of a record.
 
     dims: names of its dimensions; unit: "1" without; dtype: of its elements, object for texts, complex for a pair of
-    variables, _real and _imaginary; name: in the file ("": that of the field); json: in JSON ("": that in the file);
+    variables, _real and `imaginary`; name: in the file ("": that of the field); json: in JSON ("": that in the file);
     attribute: whether the file has it as an attribute. A field with a default may miss in files; what is None or
     `empty` is not written.
     """
@@ -59,6 +60,7 @@ class Array(NamedTuple):
     name: str = ""
     json: str = ""
     attribute: bool = False
+    imaginary: str = "_imaginary"
 
 
 class Rows(NamedTuple):
@@ -75,6 +77,18 @@ class Columns(NamedTuple):
 
     known: Callable[[], Mapping[str, Any]]
     dims: tuple[str, ...] = ()
+    prefix: str = ""
+
+
+class Ragged(NamedTuple):
+    """A tuple of dataclasses with declared fields, each with rows of its own number along `dim`.
+
+    The rows of all stand one after the other, and "<thing>_of_<dim>" says whose each is. What has no rows is a variable
+    along `thing`; Rows have "<dim of the rows>_<thing>" in the same way. prefix: of names, and of `dim`, in the file.
+    """
+
+    thing: str
+    dim: str
     prefix: str = ""
 
 
@@ -95,7 +109,7 @@ class Coded(NamedTuple):
     decode: Callable[[Any, str], Any]
 
 
-Layout = Array | Columns | Rows | Own | Coded | None
+Layout = Array | Columns | Rows | Ragged | Own | Coded | Unit | None
 
 
 def empty() -> np.ndarray:
@@ -132,6 +146,10 @@ class Record(Displayed):
         own = self.dimensions()
         return tuple(dim for name in declared for dim in own.get(name, (name,)))
 
+    def unit_in_file(self, declared: str) -> str:
+        """Return the unit of declared fields, some of which stand for that of a number, such as a parameter's."""
+        return declared
+
     def derived(self) -> dict[str, Any]:
         """Return what JSON has besides the fields, or in place of one."""
         return {}
@@ -143,7 +161,7 @@ class Record(Displayed):
             value = getattr(self, name)
             if isinstance(layout, Array) and not layout.attribute and not _missing(value, name in optional):
                 stored = np.asarray(value, np.int8 if layout.dtype is bool else layout.dtype)
-                for part, values in _parts(stored).items():
+                for part, values in _parts(stored, layout.imaginary).items():
                     found[(layout.name or name) + part] = store.Variable(values, self.dims(layout.dims), layout.unit)
             elif isinstance(layout, Columns):
                 for each, values in value.items():
@@ -152,9 +170,44 @@ class Record(Displayed):
                     found[layout.prefix + each] = store.Variable(values, dims, one.unit)
             elif isinstance(layout, Rows):
                 found |= row_variables(value, get_args(kind)[0], layout.dim)
+            elif isinstance(layout, Ragged) and (value or name not in optional):
+                found |= self._ragged_variables(value, get_args(kind)[0], layout)
         return found | {
             dim: store.Variable(np.array(list(names), object), (dim,)) for dim, names in self.labels().items()
         }
+
+    def _ragged_variables(self, parts: Sequence[Any], kind: type, ragged: Ragged) -> dict[str, store.Variable]:
+        """Return the variables of parts (Ragged)."""
+        found, (thing, dim, prefix) = dict[str, store.Variable](), ragged
+        counts = [0] * len(parts)
+        for field, (of, layout) in declared(kind).items():
+            column = [getattr(part, field) for part in parts]
+            if isinstance(layout, Rows):
+                whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
+                rows = [row for each in column for row in each]
+                found |= row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
+                found[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
+            elif isinstance(layout, Columns):
+                for name, values in joined(column, counts).items():
+                    one = layout.known()[name]
+                    found[prefix + layout.prefix + name] = store.Variable(values, (prefix + dim, *one.dims), one.unit)
+            elif isinstance(layout, Array) and layout.dims[0] == dim:
+                values, counts = np.concatenate(column), [len(own) for own in column]
+                stored = values.astype(np.int8) if layout.dtype is bool else values
+                for part, each in _parts(stored, layout.imaginary).items():
+                    name, dims = prefix + (layout.name or field) + part, (prefix + dim, *layout.dims[1:])
+                    found[name] = store.Variable(each, dims, self.unit_in_file(layout.unit))
+            else:
+                dtype, unit, dims = _column(of, layout)
+                name = prefix + _name(field, layout)
+                found[name] = store.Variable(np.array(column, dtype), (thing, *dims), self.unit_in_file(unit))
+        sizes = {dim: size for one in found.values() for dim, size in zip(one.dims, np.shape(one.values), strict=False)}
+        for name, one in found.items():  # of no rows, arrays have lost their further dimensions
+            if np.ndim(one.values) < len(one.dims):
+                shape = [sizes.get(each, 0) for each in one.dims]
+                found[name] = one._replace(values=np.reshape(one.values, shape))
+        found[f"{thing}_of_{dim}"] = store.Variable(np.repeat(np.arange(len(parts)), counts), (prefix + dim,))
+        return found
 
     def plain(self, names: Container[str] | None = None) -> dict[str, Any]:
         """Return the fields that are neither arrays nor rows, as plain data. names: of those wanted; None: all."""
@@ -163,7 +216,7 @@ class Record(Displayed):
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
-            if not isinstance(layout, Array | Columns | Rows | Own) and (names is None or name in names)
+            if not isinstance(layout, Array | Columns | Rows | Ragged | Own) and (names is None or name in names)
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -194,7 +247,7 @@ class Record(Displayed):
             if name not in wanted:
                 continue
             if isinstance(layout, Array) and value is not None:
-                for part, values in _parts(np.asarray(value)).items():
+                for part, values in _parts(np.asarray(value), layout.imaginary).items():
                     found[(layout.json or layout.name or name) + part] = values.tolist()
             elif isinstance(layout, Columns):
                 found |= {layout.prefix + each: values.tolist() for each, values in value.items()}
@@ -238,17 +291,17 @@ class Record(Displayed):
                 if field in optional and name not in held and f"{name}_real" not in held:
                     continue
                 if layout.dtype is complex:
-                    given[field] = held[f"{name}_real"] + 1j * held[f"{name}_imaginary"]
+                    given[field] = held[f"{name}_real"] + 1j * held[name + layout.imaginary]
                 else:
                     given[field] = tuple(np.asarray(held[name]).tolist()) if _is_tuple(kind) else held[name]
             elif isinstance(layout, Columns):
                 given[field] = {
-                    name: store.frozen(values[layout.prefix + name], one.dtype)
-                    for name, one in layout.known().items()
-                    if layout.prefix + name in values
+                    name: store.frozen(array, one.dtype) for name, (array, one) in _named(values, layout).items()
                 }
             elif isinstance(layout, Rows):
                 given[field] = rows_of(values, get_args(kind)[0], layout.dim)
+            elif isinstance(layout, Ragged):
+                given[field] = _parts_of(values, get_args(kind)[0], layout)
             elif not isinstance(layout, Own) and (field in attributes or field not in optional):
                 value = attributes.get(field) if type(None) in get_args(kind) else attributes[field]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
@@ -268,14 +321,95 @@ def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, Array | Columns | Rows | Own | Coded)), None)
+        layout = next(
+            (note for note in notes if isinstance(note, Array | Columns | Rows | Ragged | Own | Coded | Unit)), None
+        )
         found[item.name] = (kind, layout)
     return found
 
 
-def _parts(values: np.ndarray) -> dict[str, np.ndarray]:
+def joined(columns: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -> dict[str, np.ndarray]:
+    """Return arrays by name one after the other; nan, or no text, where one of some counts of rows has none."""
+    found = dict[str, np.ndarray]()
+    for name, one in {name: values for each in columns for name, values in each.items()}.items():
+        nothing = "" if one.dtype == object else np.nan
+        rows = (
+            each[name] if name in each else np.full((count, *one.shape[1:]), nothing, one.dtype)
+            for each, count in zip(columns, counts, strict=True)
+        )
+        found[name] = np.concatenate(list(rows))
+    return found
+
+
+def _named(values: Mapping[str, Any], layout: Columns, prefix: str = "") -> dict[str, tuple[Any, Any]]:
+    """Return the arrays of a file that a table knows, with their entries in it, by name."""
+    known = {name: (prefix + layout.prefix + name, one) for name, one in layout.known().items()}
+    return {name: (values[at], one) for name, (at, one) in known.items() if at in values}
+
+
+def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any, ...]:
+    """Return the parts in the variables of a file (Ragged)."""
+    thing, dim, prefix = ragged
+    whose = values.get(f"{thing}_of_{dim}", np.zeros(0, int))
+    columns: dict[str, Sequence[Any]] = {}
+    for field, (of, layout) in declared(kind).items():
+        name = prefix + _name(field, layout)
+        if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
+            columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
+        elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
+            columns[field] = rows_of(values, get_args(of)[0], prefix + layout.dim)
+        elif name in values:
+            columns[field] = values[name]
+    of_things = [len(columns[field]) for field in columns if not _has_rows(kind, field, dim)]
+    return tuple(
+        kind(**_part(values, kind, ragged, columns, number, whose == number))
+        for number in range(of_things[0] if of_things else int(whose.max(initial=-1)) + 1)
+    )
+
+
+def _has_rows(kind: Any, field: str, dim: str) -> bool:
+    layout = declared(kind)[field][1]
+    return isinstance(layout, Rows | Columns) or (isinstance(layout, Array) and layout.dims[0] == dim)
+
+
+def _part(
+    values: Mapping[str, Any], kind: Any, ragged: Ragged, columns: Mapping[str, Sequence[Any]], number: int,
+    own: np.ndarray,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the fields of one of the parts in a file, whose rows are `own`."""
+    given = dict[str, Any]()
+    for field, (of, layout) in declared(kind).items():
+        if isinstance(layout, Columns):
+            named = _named(values, layout, ragged.prefix)
+            given[field] = {name: store.frozen(array[own], one.dtype) for name, (array, one) in named.items()}
+        elif field not in columns:
+            continue
+        elif isinstance(layout, Rows):
+            whose = values[f"{ragged.prefix}{layout.dim}_{ragged.thing}"]
+            given[field] = tuple(columns[field][place] for place in np.flatnonzero(whose == number))
+        elif isinstance(layout, Array) and layout.dims[0] == ragged.dim:
+            given[field] = store.frozen(np.asarray(columns[field])[own], layout.dtype)
+        else:
+            value = np.asarray(columns[field][number], _column(of, layout)[0])
+            given[field] = tuple(value.tolist()) if _is_tuple(of) else value.item() if value.ndim == 0 else value
+    return given
+
+
+def _name(field: str, layout: Layout) -> str:
+    return (layout.name if isinstance(layout, Array) else "") or field
+
+
+def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
+    """Return type, unit and further dimensions of a column of fields."""
+    if isinstance(layout, Array):
+        return layout.dtype, layout.unit, layout.dims
+    dtype = object if kind is str else np.int64 if kind is int else kind
+    return dtype, layout.unit if isinstance(layout, Unit) else "1", ()
+
+
+def _parts(values: np.ndarray, imaginary: str) -> dict[str, np.ndarray]:
     """Return an array by the endings of its names: a complex one as a pair."""
-    return {"_real": values.real, "_imaginary": values.imag} if np.iscomplexobj(values) else {"": values}
+    return {"_real": values.real, imaginary: values.imag} if np.iscomplexobj(values) else {"": values}
 
 
 def _is_frozen(value: Any, dtype: Any) -> bool:
@@ -294,29 +428,32 @@ def _optional(cls: Any) -> set[str]:
     return {item.name for item in dataclasses.fields(cls) if not (item.default is item.default_factory is none)}
 
 
-def row_variables(rows: Iterable[Any], kind: type, dim: str) -> dict[str, store.Variable]:
-    """Return the variables of rows of a class (Rows)."""
+def row_variables(
+    rows: Iterable[Any], kind: type, dim: str, unit_of: Callable[[str], str] = str
+) -> dict[str, store.Variable]:
+    """Return the variables of rows of a class (Rows). unit_of: returns that of a declared one (Record.unit_in_file)."""
     rows = list(rows)
     return {
-        f"{dim}_{name}": store.Variable(np.array([getattr(row, name) for row in rows], dtype), (dim,), unit)
-        for name, (dtype, unit) in _columns(kind).items()
+        f"{dim}_{name}": store.Variable(
+            np.array([getattr(row, name) for row in rows], dtype), (dim, *dims), unit_of(unit)
+        )
+        for name, (dtype, unit, dims) in _columns(kind).items()
     }
 
 
 def rows_of(values: Mapping[str, Any], kind: Callable[..., Row], dim: str) -> tuple[Row, ...]:
     """Return the rows of a class in the variables of a file."""
-    return tuple(map(kind, *(values[f"{dim}_{name}"].tolist() for name in _columns(kind))))
+    columns = (
+        map(store.frozen, values[f"{dim}_{name}"]) if dims else values[f"{dim}_{name}"].tolist()
+        for name, (_, _, dims) in _columns(kind).items()
+    )
+    return tuple(map(kind, *columns))
 
 
 @cache
-def _columns(kind: Any) -> dict[str, tuple[Any, str]]:
-    """Return type and unit of every field of the dataclass of rows."""
-    found = {}
-    for name, hint in get_type_hints(kind, include_extras=True).items():
-        dtype, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-        unit = next((note.unit for note in notes if isinstance(note, Unit)), "1")
-        found[name] = (object if dtype is str else np.int64 if dtype is int else dtype, unit)
-    return found
+def _columns(kind: Any) -> dict[str, tuple[Any, str, tuple[str, ...]]]:
+    """Return type, unit and further dimensions of every field of the dataclass of rows."""
+    return {name: _column(of, layout) for name, (of, layout) in declared(kind).items()}
 
 
 @cache

@@ -153,7 +153,7 @@ def _exponents(
                 none = frozen(())
                 return Exponents(status, Motion.UNDECIDED, none, none, 0, 0, len(derivatives), period)
             states.append(passage.state)
-            derivatives.append(passage.derivative)
+            derivatives.append(passage.scaled(motion.scale))
             if progress is not None:
                 progress(len(derivatives), periods)
         found = _found(np.array(derivatives), np.array(states) / motion.scale)

@@ -11,7 +11,7 @@ import numpy as np
 from vanedamp.coupling.orbits.border import Border, BorderPoint
 from vanedamp.coupling.orbits.border_newton import Place, place_of, solved
 from vanedamp.coupling.orbits.border_path import BorderPath, Named
-from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint, stacked
 from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
@@ -197,15 +197,13 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
     special = [(len(before) + index, named) for index, named in ahead.named]
     special += [] if back is None else [(len(before) - 1 - index, named) for index, named in back.named]
     found = [multipliers(surface.derivative(place.passage))[0] for place in places]
-    impacts = [sum(name.count("impact ") for name in place.passage.sequence) / periods for place in places]
     counts = [_counts(place) for place in places]
     return Border(
         kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
         state=frozen([surface.state(place.border) for place in places]),
         multipliers=frozen([values**2 if surface.mirrored else values for values in found], complex),
-        amplitude_mean=frozen([place.passage.peaks.mean() for place in places]),
-        amplitude_max=frozen([place.passage.peaks.max() for place in places]),
-        impacts_per_period=frozen(impacts), orbits=frozen([each.orbits for each in counts], int),
+        quantities=stacked([surface.at(place.y).quantities(surface.state(place.y)) for place in places]),
+        orbits=frozen([each.orbits for each in counts], int),
         stable_orbits=frozen([each.stable for each in counts], int),
         special=tuple(_point(surface, index, named) for index, named in sorted(special, key=lambda entry: entry[0])),
         ends=("closed" if back is None else back.end, ahead.end),

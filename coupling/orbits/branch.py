@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border, borders_of
-from vanedamp.coupling.orbits.border import variables as border_variables
-from vanedamp.coupling.orbits.newton import MEASURES, Orbit
+from vanedamp.coupling.orbits.border import Border
+from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.orbit_quantities import LEAVES, names_along
+from vanedamp.coupling.quantities import stress as of_stress
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, table
 from vanedamp.coupling.response.scene_record import SceneField
-from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Own, Record
-from vanedamp.files.store import Variable, frozen
-
-FLAGS = ("stable", "symmetric", "undetermined")
-#: types of the arrays over the points of a branch; others are floats
-_TYPES = {"multipliers": complex, "neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
+from vanedamp.files.record import Array, Columns, Ragged, Record, Rows, Unit, declared, joined
+from vanedamp.files.store import frozen
 
 
 class BranchPoint(NamedTuple):
@@ -31,74 +29,73 @@ class BranchPoint(NamedTuple):
     multipliers: np.ndarray
     neutral: int
     stable: bool
-    amplitude_mean: float
-    amplitude_max: float
-    impacts_per_period: float
     sequence: str
     symmetric: bool
     undetermined: bool
+    quantities: Mapping[str, Any]
 
     @classmethod
     def of(cls, orbit: Orbit) -> BranchPoint:
         """Return an orbit as a branch keeps it."""
         return cls(
-            orbit.parameter, orbit.state, orbit.multipliers, orbit.neutral, orbit.stable, orbit.amplitude_mean,
-            orbit.amplitude_max, orbit.impacts_per_period, "; ".join(orbit.passage.sequence), orbit.symmetric,
-            orbit.undetermined,
+            orbit.parameter, orbit.state, orbit.multipliers, orbit.neutral, orbit.stable,
+            "; ".join(orbit.passage.sequence), orbit.symmetric, orbit.undetermined, orbit.quantities,
         )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
-    """A bifurcation, a change of the event sequence or the end of a branch.
-
-    index: of the branch's point before it; kind: "fold", "period doubling", "neimark-sacker", "pitchfork", "grazing",
-    "sequence" or "end"; note: what happens there; state: (k,) at the start of the period.
-    """
+    """A bifurcation, a change of the event sequence or the end of a branch."""
 
     index: int
-    parameter: float
+    """of the branch's point before it"""
+    parameter: Annotated[float, Unit("parameter")]
+    """there"""
     kind: str
+    """what it is: "fold", "period doubling", "neimark-sacker", "pitchfork", "grazing", "sequence" or "end" (docs)"""
     note: str
-    state: np.ndarray
+    """what happens there"""
+    state: Annotated[np.ndarray, Array(("coordinate",))]
+    """(k,) at the start of the period"""
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Measured):
     """A branch of m orbits with states of k coordinates, in the order in which it was followed.
 
-    periods             of the excitation that its orbits take
-    parameter           (m,)
-    state               (m, k) at the start of a period, in the units of Branches.names
-    multipliers         (m, k) complex, the largest first
-    neutral             (m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight
-    stable              (m,) whether all others lie inside the unit circle; False where that decides nothing
-    amplitude_mean      (m,) m, mean of the periods' largest displacements of the response, as a sweep's
-    amplitude_max       (m,) m
-    impacts_per_period  (m,)
-    sequence            (m,) names of the events in order, joined by "; "
-    symmetric           (m,) whether an orbit is its own mirror image half a period later
-    undetermined        (m,) whether stability is open: events meet or graze, and multipliers hold on one side only
-    special             bifurcations, changes of the sequence, and the end
-    end                 why it was not followed further
-    source              the branch, and its special point, from which this one bifurcates; None for the first
+    All quantities of its orbits (docs/quantities.md) are attributes, arrays over the points, and so are their families.
     """
 
     periods: int
-    parameter: np.ndarray
-    state: np.ndarray
-    multipliers: np.ndarray
-    neutral: np.ndarray
-    stable: np.ndarray
-    amplitude_mean: np.ndarray
-    amplitude_max: np.ndarray
-    impacts_per_period: np.ndarray
-    sequence: np.ndarray
-    symmetric: np.ndarray
-    undetermined: np.ndarray
-    special: tuple[SpecialPoint, ...]
+    """of the excitation that its orbits take"""
+    parameter: Annotated[np.ndarray, Array(("point",), "parameter")]
+    """(m,)"""
+    state: Annotated[np.ndarray, Array(("point", "coordinate"))]
+    """(m, k) at the start of a period, in the units of Branches.names"""
+    multipliers: Annotated[
+        np.ndarray, Array(("point", "multiplier"), dtype=complex, name="multiplier", imaginary="_imag")
+    ]
+    """(m, k) complex, the largest first"""
+    neutral: Annotated[np.ndarray, Array(("point",), dtype=int)]
+    """(m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight"""
+    stable: Annotated[np.ndarray, Array(("point",), dtype=bool)]
+    """(m,) whether all others lie inside the unit circle; False where that decides nothing"""
+    sequence: Annotated[np.ndarray, Array(("point",), dtype=object)]
+    """(m,) names of the events in order, with "; " between them"""
+    symmetric: Annotated[np.ndarray, Array(("point",), dtype=bool)]
+    """(m,) whether an orbit is its own mirror image half a period later"""
+    undetermined: Annotated[np.ndarray, Array(("point",), dtype=bool)]
+    """(m,) whether stability is open: events meet or graze, and multipliers hold on one side only"""
+    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
+    """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
+    special: Annotated[tuple[SpecialPoint, ...], Rows("special")]
+    """bifurcations, changes of the sequence, and the end"""
     end: str
-    source: tuple[int, int] | None = None
+    """why it was not followed further"""
+    source_branch: int = -1
+    """from which it bifurcates; -1: from none"""
+    source_special: int = -1
+    """number of its special point there"""
 
     @classmethod
     def of(
@@ -107,14 +104,28 @@ class Branch:
     ) -> Branch:  # fmt: skip
         """Return the branch of some points."""
         columns = dict(zip(BranchPoint._fields, zip(*points, strict=True), strict=True))
-        arrays = {name: frozen(column, _TYPES.get(name, float)) for name, column in columns.items()}
-        return cls(periods=periods, special=tuple(special), end=end, source=source, **arrays)
+        quantities = stacked(columns.pop("quantities"))
+        layouts = {name: layout for name, (_, layout) in declared(cls).items() if isinstance(layout, Array)}
+        arrays: dict[str, Any] = {name: frozen(column, layouts[name].dtype) for name, column in columns.items()}
+        of_branch, of_special = source or (-1, -1)
+        return cls(
+            periods=periods, special=tuple(special), end=end, quantities=quantities, source_branch=of_branch,
+            source_special=of_special, **arrays,
+        )  # fmt: skip
+
+    @property
+    def source(self) -> tuple[int, int] | None:
+        """The branch, and its special point, from which this one bifurcates; None for the first."""
+        return None if self.source_branch < 0 else (self.source_branch, self.source_special)
 
     @property
     def points(self) -> list[BranchPoint]:
         """Its orbits one by one."""
-        columns = (getattr(self, name) for name in BranchPoint._fields)
-        return [BranchPoint(*entry) for entry in zip(*columns, strict=True)]
+        columns = (getattr(self, name) for name in BranchPoint._fields[:-1])
+        quantities = (
+            {name: values[at] for name, values in self.quantities.items()} for at in range(len(self.parameter))
+        )
+        return [BranchPoint(*entry) for entry in zip(*columns, quantities, strict=True)]
 
     def to_json(self) -> dict[str, Any]:
         """Return a summary as plain data."""
@@ -126,28 +137,52 @@ class Branch:
         }  # fmt: skip
 
 
+def unknown(branch: Branch) -> str:
+    """Say how many orbits of a branch have no quantities, and why; "" if all have."""
+    numbers = [values.reshape(len(values), -1) for name, values in branch.quantities.items() if not table()[name].text]
+    count = int(np.isnan(np.hstack(numbers)).all(axis=1).sum()) if numbers else 0
+    return f"{count} of {len(branch.parameter)} orbits have no quantities: {LEAVES}" if count else ""
+
+
+def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+    """Return the quantities of points as arrays over them."""
+    rows: list[dict[str, np.ndarray]] = [
+        {name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points
+    ]  # fmt: skip
+    return {name: frozen(values, values.dtype) for name, values in joined(rows, [1] * len(rows)).items()}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches(Record, Plotted):
+class Branches(Measured, Record, Plotted):
     """Branches of periodic orbits of a scene over one of its numbers.
 
-    scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
-    were found; iterations: of Newton's method; warnings: to be read before results are used; provenance: versions and
-    further data of the caller (JSON-able); borders: of special points over `second`; stress: (points, s, 8) Pa,
-    amplitudes of stress at s hot spots, by response.spot_stress.MEASURES, of the points of all branches one after the
-    other; None without hot spots.
+    All quantities are attributes, arrays over the points of all branches one after the other.
     """
 
     KIND: ClassVar[str] = "orbits"
     IN_JSON = ("iterations", "warnings")
     scene: SceneField
+    """with its [orbit] table"""
     names: Annotated[tuple[str, ...], Array(("coordinate",), dtype=object, name="coordinate", json="names")]
+    """(k,) of the coordinates of states"""
     scale: Annotated[np.ndarray, Array(("coordinate",))]
-    branches: Annotated[tuple[Branch, ...], Own()]
+    """(k,) their sizes"""
+    branches: Annotated[tuple[Branch, ...], Ragged("branch", "point")]
+    """in the order in which they were found"""
     iterations: int
+    """of Newton's method"""
     warnings: tuple[str, ...] = ()
+    """to be read before results are used"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    borders: Annotated[tuple[Border, ...], Own()] = ()
-    stress: Annotated[np.ndarray | None, Array(("point", "hot_spot", "stress_measure"), "Pa")] = None
+    """versions and further data of the caller (JSON-able)"""
+    borders: Annotated[tuple[Border, ...], Ragged("border", "point", "border_")] = ()
+    """of special points over `second`"""
+
+    @cached_property
+    def quantities(self) -> Mapping[str, np.ndarray]:  # type: ignore[override]
+        """Quantities by name, of the points of all branches one after the other."""
+        own = self.branches
+        return joined([branch.quantities for branch in own], [len(branch.parameter) for branch in own])
 
     @property
     def second(self) -> str:
@@ -161,8 +196,22 @@ class Branches(Record, Plotted):
         assert self.scene.orbit is not None
         return self.scene.orbit.parameter
 
+    @property
+    def scalars(self) -> dict[str, Quantity]:
+        """The quantities that are one number a point, in their order."""
+        return {name: one for name, one in table().items() if name in self.quantities and not (one.dims or one.text)}
+
+    def unit_in_file(self, declared: str) -> str:
+        """Return the unit of a declared field, of which some stand for that of a number."""
+        paths = {"parameter": self.parameter, "second": self.second}
+        return unit_of(paths[declared]) if declared in paths else declared
+
+    def labels(self) -> dict[str, Any]:
+        """Return the names along dimensions that have some."""
+        return names_along(self.quantities, self.provenance.get("hot_spots", {}))
+
     def derived(self) -> dict[str, Any]:
-        """Return a summary of branches, special points and borders."""
+        """Return a summary of branches, special points, borders and quantities."""
         special = [
             {
                 "branch": number, "index": point.index, "parameter": point.parameter, "kind": point.kind,
@@ -175,42 +224,22 @@ class Branches(Record, Plotted):
             "parameter": self.parameter, "unit": unit_of(self.parameter),
             "branches": [branch.to_json() for branch in self.branches], "special_points": special,
             "second": self.second, "borders": [border.to_json() for border in self.borders],
+            "quantities": {
+                name: {"unit": one.unit, "branches": self._ends(self.branches, name),
+                       "borders": self._ends(self.borders, name)}
+                for name, one in table().items() if name in self.quantities and not one.text
+            },
         }  # fmt: skip
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file: the points of all branches one after the other, special points, branches."""
-        unit, branches = unit_of(self.parameter), self.branches
-        special = [(number, point) for number, branch in enumerate(branches) for point in branch.special]
-        sources = [(-1, -1) if branch.source is None else branch.source for branch in branches]
-        points = {name: np.concatenate([getattr(branch, name) for branch in branches]) for name in BranchPoint._fields}
-        points |= {name: points[name].astype(np.int8) for name in FLAGS}
-        points["branch_of_point"] = np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches])
-        state, multipliers, units = points.pop("state"), points.pop("multipliers"), {"parameter": unit} | MEASURES
-        of_special = {
-            "special_branch": np.array([number for number, _ in special], int),
-            "special_index": np.array([point.index for _, point in special], int),
-            "special_kind": np.array([point.kind for _, point in special], object),
-            "special_note": np.array([point.note for _, point in special], object),
-        }
-        of_branches = {
-            "periods": np.array([branch.periods for branch in branches], int),
-            "end": np.array([branch.end for branch in branches], object),
-            "source_branch": np.array([source[0] for source in sources], int),
-            "source_special": np.array([source[1] for source in sources], int),
-        }
-        states = np.reshape([point.state for _, point in special], (len(special), len(self.names)))
-        return super().variables() | {
-            "state": Variable(state, ("point", "coordinate")),
-            "multiplier_real": Variable(multipliers.real, ("point", "multiplier")),
-            "multiplier_imag": Variable(multipliers.imag, ("point", "multiplier")),
-            **{name: Variable(values, ("point",), units.get(name, "1")) for name, values in points.items()},
-            "special_parameter": Variable([point.parameter for _, point in special], ("special",), unit),
-            "special_state": Variable(states, ("special", "coordinate")),
-            **{name: Variable(values, ("special",)) for name, values in of_special.items()},
-            **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
-            **({} if self.stress is None else stress_axes(list(self.provenance["hot_spots"]))),
-            **border_variables(self.borders, (unit, unit_of(self.second)), len(self.names)),
-        }
+    @staticmethod
+    def _ends(parts: Sequence[Branch | Border], name: str) -> list[dict[str, Any]]:
+        """Return the least and largest value of a quantity of each branch or border, of bodies and spots one each."""
+        known = [part.quantities[name] for part in parts if name in part.quantities]
+        ends = [{"min": np.fmin.reduce(values), "max": np.fmax.reduce(values)} for values in known]
+        return [
+            {end: np.where(np.isnan(value), np.array(None), value).tolist() for end, value in each.items()}
+            for each in ends
+        ]
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
@@ -219,25 +248,10 @@ class Branches(Record, Plotted):
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Branches:
         """Return the record in the variables and attributes of a file."""
-        values = dict(values) | {"multipliers": values["multiplier_real"] + 1j * values["multiplier_imag"]}
-        branches = []
-        for number, periods in enumerate(values["periods"]):
-            own = values["branch_of_point"] == number
-            arrays = {name: frozen(values[name][own], _TYPES.get(name, float)) for name in BranchPoint._fields}
-            special = [
-                SpecialPoint(
-                    int(values["special_index"][s]), float(values["special_parameter"][s]), values["special_kind"][s],
-                    values["special_note"][s], frozen(values["special_state"][s]),
-                )
-                for s in np.flatnonzero(values["special_branch"] == number)
-            ]  # fmt: skip
-            source = int(values["source_branch"][number]), int(values["source_special"][number])
-            branches.append(
-                Branch(
-                    periods=int(periods), special=tuple(special), end=values["end"][number],
-                    source=None if source[0] < 0 else source, **arrays,
-                )
-            )  # fmt: skip
-        return cls(
-            branches=tuple(branches), borders=borders_of(values), **cls.given(values, attributes, path),
-        )  # fmt: skip
+        earlier = dict[str, Any]()
+        if (stress := values.get("stress")) is not None:  # of earlier files, all amplitudes as one array
+            names = [of_stress.stress_amplitude.name, *(f"stress_{name}" for name in of_stress.SCALARS)]
+            count = len(of_stress.COMPONENTS)
+            parts = (stress[..., :count], *np.moveaxis(stress[..., count:], -1, 0))
+            earlier = dict(zip(names, parts, strict=True))
+        return cls(**cls.given(earlier | dict(values), attributes, path))

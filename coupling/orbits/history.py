@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.response import Event, Response
 from vanedamp.coupling.scene.registration import meets_body
-from vanedamp.coupling.scene.scene import Time
-from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import frozen
 
 #: samples of an excitation period
@@ -43,11 +41,9 @@ class OrbitHistory:
 
 def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
     """Return the motion that a period map passes from a state (k,), an orbit's at the start of its period."""
-    scene, periods = period_map.scene, period_map.periods
-    whole = replace(scene, time=Time(periods=periods, transient=0), sweep={}, orbit=None)
-    response = simulate(whole, events=True, samples_per_period=SAMPLES, start=period_map.restart_of(state))
+    response = period_map.run(state, events=True, samples_per_period=SAMPLES)
     # the orbit ends where it began
-    time = np.append(response.time, periods / scene.frequency)
+    time = np.append(response.time, period_map.periods / period_map.scene.frequency)
     displacement, slip = (
         np.concatenate([each, each[:1]]) for each in (response.displacement, response.body_displacement)
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -22,12 +22,11 @@ from vanedamp.coupling.derivatives.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.quantities.quantity import Measured, table
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Displayed
 from vanedamp.files.toml_input import InputError
 
-#: measures of an orbit and their units
-MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
 #: what to do where sectors have events at one instant
 WAVE = "[orbit] wave = true finds the travelling wave of a tuned ring"
 #: coordinates of a state that are printed one by one
@@ -72,8 +71,8 @@ class Section(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orbit(Displayed):
-    """A periodic orbit, or the last state of a search for one.
+class Orbit(Measured, Displayed):
+    """A periodic orbit, or the last state of a search for one. All its quantities are attributes (docs/quantities.md).
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
     excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest fraction of the scale
@@ -96,8 +95,8 @@ class Orbit(Displayed):
         """Return the results that are printed, by name: of an orbit that was not found, how the search ended."""
         names = ["status", "parameter", "periods", "residual", "iterations"]
         if self.status is OrbitStatus.OK:
-            names += ["stable", "multipliers", "neutral", "symmetric", *MEASURES]
-        values = {name: getattr(self, name) for name in names} | {"state": self.state}
+            names += ["stable", "multipliers", "neutral", "symmetric"]
+        values = {name: getattr(self, name) for name in names} | dict(self.quantities) | {"state": self.state}
         if self.map is None:
             return values
         if self.status is OrbitStatus.UNDETERMINED and self.map.travelling is not None:
@@ -111,7 +110,7 @@ class Orbit(Displayed):
 
     def printed_units(self) -> Mapping[str, str]:
         """Return the units of the results that have one, by name."""
-        units = {name: unit for name, unit in MEASURES.items() if unit != "1"}
+        units = {name: table()[name].unit for name in self.quantities if table()[name].unit != "1"}
         if self.map is not None:
             mode = "m" if self.map.scene.structure.model == "rigid" else "kg^0.5 m"
             for name in self.map.names:
@@ -173,20 +172,17 @@ class Orbit(Displayed):
         """Whether all multipliers but the neutral ones lie inside the unit circle, and decide the stability."""
         return not self.undetermined and bool(np.all(np.abs(decided(*self._multipliers)) < 1.0))
 
-    @property
-    def amplitude_mean(self) -> float:
-        """Mean of the periods' largest displacements of the response, m."""
-        return float(self.passage.peaks.mean())
+    @cached_property
+    def quantities(self) -> Mapping[str, Any]:  # type: ignore[override]
+        """Its quantities by name, from one run over its periods (orbit_quantities); none of one that was not found."""
+        if self.status is not OrbitStatus.OK or self.map is None:
+            return {}
+        status = self.section.passage.status.value
+        return self.map.over(self.periods).quantities(self.state, *self._multipliers, status)
 
-    @property
-    def amplitude_max(self) -> float:
-        """Largest displacement of the response, m."""
-        return float(self.passage.peaks.max())
-
-    @property
-    def impacts_per_period(self) -> float:
-        """Impacts in one period of the excitation."""
-        return sum(name.count("impact ") for name in self.passage.sequence) / self.periods
+    def __dir__(self) -> Iterable[str]:
+        """Return the names of attributes, those of all quantities among them: what it has takes a run to know."""
+        return [*object.__dir__(self), *table()]
 
 
 class Point(NamedTuple):

@@ -14,12 +14,11 @@ from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.borders import Borders
-from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.orbits.branch import Branches, unknown
 from vanedamp.coupling.orbits.checkpoint import Checkpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
-from vanedamp.coupling.orbits.orbit_stress import orbit_stresses
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
 from vanedamp.coupling.orbits.waves import find_wave
 from vanedamp.coupling.response.evaluation import periods_of
@@ -88,10 +87,14 @@ def orbits(
     diagram = Diagram(search.map, search.table, search.low, search.to, search.starts)
     borders = search.borders()
     described = replace(scene, orbit=search.table)
-    data = dict(provenance or {})
+    spots = hot_spots_in_file(search.first.structure)
+    data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
 
     def found() -> Branches:
-        notes = (*search.warnings, *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ())]))
+        known = (
+            f"branch {number}: {note}" for number, branch in enumerate(diagram.branches) if (note := unknown(branch))
+        )
+        notes = (*search.warnings, *dict.fromkeys([*diagram.notes, *(borders.notes if borders else ()), *known]))
         names, scale = tuple(search.map.names), frozen(search.map.scale)
         return Branches(
             described, names, scale, tuple(diagram.branches), diagram.iterations, notes, data,
@@ -113,9 +116,7 @@ def orbits(
         if borders is not None:
             points = sum(len(branch.parameter) for branch in diagram.branches)
             borders.follow(diagram.branches, lambda done, total: changed(points + done, points + total))
-    spots = hot_spots_in_file(search.first.structure)
-    known = replace(found(), stress=orbit_stresses(search.map, diagram.branches))
-    return replace(known, provenance=data | {"hot_spots": spots}) if spots else known
+    return found()
 
 
 def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> Orbit:

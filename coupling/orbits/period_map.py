@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -22,14 +23,16 @@ from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, r
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.orbits.orbit_quantities import exponents_of, quantities_of
 from vanedamp.coupling.response.records import new_records
-from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart import at_speed_of, fitted
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.scene.rotation import SPEEDS
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
 
@@ -128,6 +131,29 @@ class PeriodMap:
         if reached is None:
             return None
         return replace(self, begin=(self.begin + periods) % 1.0, _earlier=[]), reached[0]
+
+    def run(self, state: np.ndarray, events: bool = False, samples_per_period: int = 0) -> Response:
+        """Return the run over the map's periods from a state (k,), arguments as in coupling.simulation.simulate."""
+        whole = replace(self.scene, time=Time(periods=self.periods, transient=0), sweep={}, orbit=None)
+        return simulate(whole, events, samples_per_period, self.restart_of(state))
+
+    def quantities(
+        self, state: np.ndarray, multipliers: np.ndarray | None = None, neutral: int = 0, status: str = "ok"
+    ) -> dict[str, Any]:
+        """Return the quantities of an orbit over the map's periods, with a state (k,); see orbit_quantities.
+
+        multipliers: (k,) of which some are neutral; None: it has no exponents; status: of their derivative.
+        """
+        run, missed = self.run(state), math.nan
+        if run.final is not None:
+            off, size = (
+                np.abs(each / self.scale).max(initial=0.0) for each in (self.state_of(run.final) - state, state)
+            )
+            missed = float(off / (1.0 + size))
+        exponents = None
+        if multipliers is not None:
+            exponents = exponents_of(multipliers, neutral, self.periods, 1.0 / self.scene.frequency, status)
+        return quantities_of(run, missed, exponents)
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) that a run has left."""

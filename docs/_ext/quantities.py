@@ -18,6 +18,8 @@ KINDS = {
     "run": "vanedamp.coupling.response.response:NOT_IN_RUNS",
     "sweep": "vanedamp.coupling.sweep.row:NOT_IN_SWEEPS",
     "ensemble": "vanedamp.coupling.ensembles.record:NOT_IN_ENSEMBLES",
+    "orbit, branch": "vanedamp.coupling.orbits.orbit_quantities:NOT_IN_ORBITS",
+    "border": "vanedamp.coupling.orbits.orbit_quantities:NOT_IN_BORDERS",
 }
 
 

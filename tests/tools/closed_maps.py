@@ -36,6 +36,10 @@ class ClosedMap:
     def names(self) -> tuple[str, ...]:
         return tuple(f"x{place}" for place in range(len(self.scale)))
 
+    def quantities(self, state: np.ndarray, *_: object) -> dict[str, float]:
+        """Of a motion between states there is nothing but its largest displacements."""
+        return {"amplitude_mean": float(self(state).peaks.mean())}
+
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         derivative, crossings, clearance, peaks = np.eye(len(state)), [], (math.inf, ""), []
         start = np.asarray(state, float)
@@ -180,6 +184,10 @@ class ImpactOscillator:
 
     def rate(self, x: np.ndarray, t: float) -> np.ndarray:
         return np.array([x[1], self.value * math.cos(t) - self.damping * x[1] - x[0]])
+
+    def quantities(self, state: np.ndarray, *_: object) -> dict[str, float]:
+        """Of a motion between states there is nothing but its largest displacements."""
+        return {"amplitude_mean": float(self(state).peaks.mean())}
 
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         end, now, x, derivative = 2 * math.pi * self.periods, 0.0, np.asarray(state, float), np.eye(2)

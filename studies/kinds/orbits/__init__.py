@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.studies.facts import Fact, Found
 
@@ -23,6 +25,10 @@ def facts(record: Found) -> Iterator[Fact]:
         f"{branch['points']} orbits from {branch['parameter_min']:.6g} to {branch['parameter_max']:.6g} "
         f"{found['unit']}, {branch['stable_points']} stable" for branch in found["branches"]
     ])  # fmt: skip
+    for name, one in branches.scalars.items():
+        if one.spread:
+            low, high = np.fmin.reduce(branches.quantities[name]), np.fmax.reduce(branches.quantities[name])
+            yield Fact(name, f"{low:.6g} to {high:.6g}", one.unit.removesuffix("1"), one.about)
     yield Fact("special_points", dict(Counter(point["kind"] for point in found["special_points"])))
     yield Fact("borders", [
         f"{border['kind']}, {border['points']} points over {branches.second}" for border in found["borders"]

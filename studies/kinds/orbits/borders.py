@@ -124,13 +124,13 @@ def maps_of(branches: Branches, sweeps: Mapping[str, Sweep]) -> dict[str, Panel]
 
 def borders_table(branches: Branches) -> Table:
     """Return a row per point, borders counted from 0, in SI units."""
-    rows = []
+    rows, names = [], [name for name in branches.scalars if all(name in each.quantities for each in branches.borders)]
     for number, border in enumerate(branches.borders):
-        columns = np.column_stack([border.parameter, border.second, border.amplitude_mean, border.impacts_per_period])
+        columns = np.column_stack([border.parameter, border.second, *(border.quantities[name] for name in names)])
         sides = np.hstack([border.orbits, border.stable_orbits]).tolist()
         rows += [
             [number, border.kind, *values, *counts] for values, counts in zip(columns.tolist(), sides, strict=True)
         ]
     counts = ("orbits_below", "orbits_above", "stable_below", "stable_above")
-    header = ["border", "kind", branches.parameter, branches.second, "amplitude_mean", "impacts_per_period", *counts]
+    header = ["border", "kind", branches.parameter, branches.second, *names, *counts]
     return header, rows

@@ -74,6 +74,7 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     beside = sweeps_beside(branches.scene, branches.parameter, page.results.kinds["sweep"])
     figure = branches_figure(branches, {page.names[other]: points for other, points in beside.items()})
     shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
+    shown["quantities"] = _ranges(branches)
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
     shown["chart"] = page.chart("branches", figure, *_branches_table(branches), [*files, *beside])
     shown["multipliers"] = page.chart(
@@ -110,6 +111,18 @@ def _row(branches: Branches, number: int) -> dict[str, Any]:
         parent, place = branch.source
         source = f"{branches.branches[parent].special[place].kind} on branch {parent}"
     return {"name": branch_name(number, branch), "branch": branch, "special": special, "source": source}
+
+
+def _ranges(branches: Branches) -> dict[str, list[str]]:
+    """Return the sentence and the range on every branch of each quantity that is one number, for people."""
+    found = {}
+    for name, one in branches.scalars.items():
+        ends = [(np.fmin.reduce(own), np.fmax.reduce(own)) for each in branches.branches
+                for own in [each.quantities.get(name, np.full(1, np.nan))]]  # fmt: skip
+        if np.isfinite(ends).any():
+            words = [" to ".join(dict.fromkeys(quantity(float(end), one.unit) for end in each)) for each in ends]
+            found[name.replace("_", " ")] = [one.about, *words]
+    return found
 
 
 def _histories(branches: Branches) -> tuple[dict[str, OrbitHistory], str]:
@@ -157,19 +170,54 @@ def branches_figure(
             kept = _drawn(own)
             if not own.any():
                 continue
-            measures = ((1e6 * branch.amplitude_mean, "%{y:.6g} µm"), (branch.impacts_per_period, "%{y:.4g} impacts"))
-            for row, (values, shown) in enumerate(measures, start=1):
+            x = np.where(kept, wide * branch.parameter, np.nan)
+            below = [(2, named, values, "%{y:.6g}") for named, values in _below(branches, branch).items()]
+            for row, named, values, shown in ((1, "", 1e6 * branch.amplitude_mean, "%{y:.6g} µm"), *below):
                 figure.add_scatter(
-                    x=np.where(kept, wide * branch.parameter, np.nan), y=np.where(kept, values, np.nan), mode="lines",
+                    x=x, y=np.where(kept, values, np.nan), mode="lines", meta=named or None,
+                    visible=named in ("", *list(_shown(branches))[:1]),
                     name=f"{name}, {kind}", legendgroup=name, showlegend=row == 1, row=row, col=1,
                     line=look | {"dash": dash, "width": width},
                     hovertemplate=f"{name}, {kind}, %{{x:.10g}}: {shown}<extra></extra>",
                 )  # fmt: skip
     _add_special_points(figure, branches, wide)
     figure.update_yaxes(title_text="mean of peaks, µm", row=1, col=1)
-    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
     figure.update_xaxes(title_text=axis_title(branches.parameter, units), row=2, col=1)
+    _add_menu(figure, branches)
     return dressed(figure, height=720)
+
+
+def _shown(branches: Branches) -> dict[str, str]:
+    """Return the axis titles of quantities that the lower chart can show, by name; impacts first."""
+    known = {name: one for name, one in branches.scalars.items() if one.spread}
+    order = sorted(known, key=lambda name: known[name].family != "impacts")
+    return {name: axis_title(name, for_people(known[name].unit)[1]) for name in order}
+
+
+def _below(branches: Branches, branch: Branch) -> dict[str, np.ndarray]:
+    """Return the values of those quantities of a branch, for people."""
+    return {
+        name: for_people(branches.scalars[name].unit)[0] * branch.quantities[name]
+        for name in _shown(branches) if name in branch.quantities
+    }  # fmt: skip
+
+
+def _add_menu(figure: go.Figure, branches: Branches) -> None:
+    """Let the lower chart show one of its quantities."""
+    shown, own = _shown(branches), [place for place, trace in enumerate(figure.data) if trace.meta]
+    figure.update_yaxes(title_text=next(iter(shown.values()), ""), row=2, col=1)
+    buttons = [
+        {
+            "label": name.replace("_", " "), "method": "update",
+            "args": [
+                {"visible": [figure.data[place].meta == name for place in own]}, {"yaxis2.title.text": title}, own
+            ],
+        }
+        for name, title in shown.items()
+    ]  # fmt: skip
+    place = {"x": 0.0, "xanchor": "left", "y": 0.26, "yanchor": "bottom", "pad": {"b": 4}}
+    if len(buttons) > 1:
+        figure.update_layout(updatemenus=[{"buttons": buttons} | place])
 
 
 def joined(records: Sequence[Branches]) -> Branches:
@@ -178,8 +226,8 @@ def joined(records: Sequence[Branches]) -> Branches:
     for record in records:
         first = len(branches)
         for branch in record.branches:
-            source = None if branch.source is None else (branch.source[0] + first, branch.source[1])
-            branches.append(replace(branch, source=source))
+            source = -1 if branch.source is None else branch.source_branch + first
+            branches.append(replace(branch, source_branch=source))
     warnings = dict.fromkeys(warning for record in records for warning in record.warnings)
     return replace(records[0], branches=tuple(branches), warnings=tuple(warnings))
 
@@ -232,15 +280,17 @@ def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> N
 
 def _branches_table(branches: Branches) -> Table:
     """Return a row per point, branches counted from 0, in SI units."""
-    measures = ("amplitude_mean", "amplitude_max", "impacts_per_period", "largest_multiplier", "stable", "undetermined")
+    names = list(branches.scalars)
     rows = []
     for number, branch in enumerate(branches.branches):
-        columns = (branch.parameter, branch.amplitude_mean, branch.amplitude_max, branch.impacts_per_period)
+        unknown = np.full(len(branch.parameter), np.nan)
+        columns = (branch.parameter, *(branch.quantities.get(name, unknown) for name in names))
         largest = np.abs(branch.multipliers).max(axis=1, initial=0.0)
         flags = zip(branch.stable.tolist(), branch.undetermined.tolist(), strict=True)
         for values, states in zip(np.column_stack([*columns, largest]).tolist(), flags, strict=True):
             rows.append([number, branch.periods, *values, *states])
-    return ["branch", "periods", branches.parameter, *measures], rows
+    last = ("largest_multiplier", "stable", "undetermined")
+    return ["branch", "periods", branches.parameter, *names, *last], rows
 
 
 def _multipliers_figure(branches: Branches) -> go.Figure:

@@ -46,6 +46,16 @@ def test_a_linear_oscillator_has_the_real_parts_of_its_eigenvalues(tables, neutr
     assert found.motion is Motion.PERIODIC and found.repeats == 1 and found.periods == 32
 
 
+def test_a_fast_oscillator_has_no_neutral_direction():
+    """In SI units displacement and velocity differ by 1e5, and derivatives of one by the other by 1e10."""
+    structure = {"model": "rigid", "mass": 1.0, "stiffness": 1e10, "damping": 400.0}
+    data = scene(
+        structure=structure, excitation={"frequency": 1.2e4, "force": 1.0}, time={"periods": 600, "transient": 500}
+    )
+    found = lyapunov(data, 64)
+    assert found.neutral == 0 and found.exponents == pytest.approx([-200.0, -200.0], rel=1e-8)
+
+
 def test_an_overdamped_oscillator_has_two():
     found = lyapunov(oscillator(8.0), 64)
     assert found.exponents == pytest.approx([-2 + math.sqrt(2.5), -2 - math.sqrt(2.5)], abs=1e-10)

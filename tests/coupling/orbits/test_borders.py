@@ -228,6 +228,9 @@ def test_the_peak_of_a_linear_response_follows_its_damping():
     assert border.kind == "peak" and border.second[[0, -1]] == pytest.approx([0.1, 0.12])
     assert 2 * math.pi * border.parameter == pytest.approx(np.sqrt(1 - border.second**2 / 2), rel=1e-9)
     assert (border.orbits == 1).all() and (border.stable_orbits == 1).all()
+    peak = 1.0 / (border.second * np.sqrt(1 - border.second**2 / 4))
+    assert border.amplitude_mean == pytest.approx(peak, rel=1e-12) and border.amplitude_harmonic == pytest.approx(peak)
+    assert border.amplitude_rms == pytest.approx(peak / math.sqrt(2), rel=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -242,8 +245,9 @@ def test_borders_are_read_as_they_were_written_and_continue_after_a_stop(grazing
     read = Branches.load(tmp_path / "whole.h5")
     assert read.to_json() == whole.to_json() and read.second == "stop.0.gap"
     (border,), (kept,) = whole.borders, read.borders
-    for name in ("parameter", "second", "state", "multipliers", "amplitude_mean", "orbits", "stable_orbits"):
+    for name in ("parameter", "second", "state", "multipliers", "orbits", "stable_orbits", *border.quantities):
         np.testing.assert_array_equal(getattr(border, name), getattr(kept, name))
+    assert kept.amplitude_rms == pytest.approx(kept.second / math.sqrt(2), rel=1e-6)  # grazes where it fills the gap
     points = sum(len(branch.parameter) for branch in whole.branches)
 
     def stop(done, total):

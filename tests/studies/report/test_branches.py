@@ -157,7 +157,7 @@ def test_report_shows_branches_over_the_points_of_sweeps(hitting, followed, tmp_
 
 def test_branches_of_several_files_are_numbered_through(followed):
     (branch,) = followed.branches
-    second = replace(followed, branches=(branch, replace(branch, source=(0, 0))), warnings=("w",))
+    second = replace(followed, branches=(branch, replace(branch, source_branch=0, source_special=0)), warnings=("w",))
     whole = joined([second, second, followed])
     assert isinstance(whole, Branches)
     assert [each.source for each in whole.branches] == [None, (0, 0), None, (2, 0), None]
