@@ -104,14 +104,14 @@ def run_of(
         samples,
         isinstance(scene.structure, Rom),
         deflects(scene, system),
-        _impact_exponent(scene),
+        impact_exponent(scene),
         outputs,
     )
     records = records if watch is None else watch.records(records)
     return method.begin(scene, system, records, events, start_of(scene, system, start))
 
 
-def _impact_exponent(scene: Scene) -> float | None:
+def impact_exponent(scene: Scene) -> float | None:
     """Return the exponent of impacts that wear; where a ring wants them counted by body any; None: not counted."""
     if scene.wear is not None:
         return scene.wear.impact_exponent

@@ -197,13 +197,13 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
     status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
     extent: dict[str, Any] = {}
     if run.plane is not None:
-        in_plane = _in_plane(run.plane, slice(first, done))
+        in_plane = in_plane_of(run.plane, slice(first, done))
         status = Status.TILTED if _tilted(in_plane, run.plane.bound) and status in _USABLE else status
         sums |= in_plane
         if records.samples_per_period:
             extent["in_plane"] = run.plane.samples(records.samples[: done * records.samples_per_period, 0])
     if scene.wear is not None and records.worn.shape[1]:  # a ring-down does not count it
-        extent |= _worn(scene, _contact_work(scene, run, first), energy["friction"])
+        extent |= _worn(scene, contact_work(scene, run, first), energy["friction"])
     if records.outputs.shape[1]:
         extent["sectors"] = response_by_sector(scene, system, records, run.rows, slice(first, done))
     return Response(
@@ -230,7 +230,7 @@ def _worn(scene: Scene, work: tuple[ContactWork, ...], friction: float) -> dict[
     return {"contact_work": work, "wear": contact_wear(scene, work), "warnings": ledger_warning(work, friction)}
 
 
-def _contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
+def contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, ...]:
     """Return the work of each contact of a run, exact engine, over its periods from `first` on."""
     records, rows, window = run.records, run.rows, slice(first, run.periods)
     struck = _struck(run)
@@ -282,7 +282,7 @@ def _series(system: System, records: Records, done: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _in_plane(plane: Plane, window: slice) -> dict[str, np.ndarray]:
+def in_plane_of(plane: Plane, window: slice) -> dict[str, np.ndarray]:
     """Return what quantities need of planar bodies (b,), over the evaluated periods; nan for sliders."""
     slider = np.where(np.isnan(plane.neglected), np.nan, 1.0)
     return {

@@ -43,21 +43,27 @@ def with_contacts(scene: Scene, response: Response, events: bool) -> Response:
     """Return the response of a scene with the strength of its contacts, and warnings. events: keep their list."""
     pair = scene.contact.pair
     assert pair is not None
-    contact = pair.contact
-    assert contact is not None
-    begin = response.transient / response.frequency
     kept = response.event_list if events else ()
     try:
-        found: dict[_Key, list[Impact]] = {}
-        for impact in impacts_of(contact, not scene.contact.rigid, response.event_list, begin):
-            found.setdefault(impact.key, []).append(impact)
-        strengths = tuple(_strength(impacts, contact, pair.first_yield) for impacts in found.values())
+        strengths = contacts_of(scene, response.event_list, response.transient / response.frequency)
     except ValueError as error:
         return replace(response, event_list=kept, warnings=(*response.warnings, f"contact.pair: {error}"))
     return replace(
         response, contacts=strengths, event_list=kept,
         warnings=response.warnings + tuple(_warnings(strengths, pair.restitution_speeds)),
     )  # fmt: skip
+
+
+def contacts_of(scene: Scene, events: Sequence[Event], begin: float = 0.0) -> tuple[ContactStrength, ...]:
+    """Return the strength of the contacts by their impacts from a time on, s. Raises ValueError beyond Hertz' law."""
+    pair = scene.contact.pair
+    assert pair is not None
+    contact = pair.contact
+    assert contact is not None
+    found: dict[_Key, list[Impact]] = {}
+    for impact in impacts_of(contact, not scene.contact.rigid, events, begin):
+        found.setdefault(impact.key, []).append(impact)
+    return tuple(_strength(impacts, contact, pair.first_yield) for impacts in found.values())
 
 
 def impacts_of(contact: Contact, compliant: bool, events: Sequence[Event], begin: float) -> Iterator[Impact]:
