@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from vanedamp.coupling.quantities.sums import SUMS, sources_of
 from vanedamp.coupling.response.by_sector import response_by_sector
 from vanedamp.coupling.response.evaluation import Outcome, contact_work, in_plane_of
 from vanedamp.coupling.response.event_log import events_of
-from vanedamp.coupling.response.figures import measure, measured_of
+from vanedamp.coupling.response.figures import Measured, measure, measured_of
 from vanedamp.coupling.response.records import DETACHES, IMPACT
 from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS
 from vanedamp.coupling.response.wear import contact_wear
@@ -37,11 +38,18 @@ class Periods:
         self._rows, self._planes = list[np.ndarray](), list[Mapping[str, np.ndarray]]()
         self._of_parts = dict[Quantity, list[Any]]()
         self._waiting: tuple[Scene, Outcome] | None = None
+        #: what figures need of the system, as long as it is the same but for the excitation's frequency
+        self._measured: Measured | None = None
+        self._J = np.zeros(0)
 
     def add(self, scene: Scene, run: Outcome) -> None:
         """Take a run of one period of a scene."""
-        row = np.empty(len(SUMS))
-        measure(measured_of(scene, run.system), run.records, 0, 1, np.nan, row)
+        row, system = np.empty(len(SUMS)), run.system
+        if self._measured is None or system.J is not self._J:
+            self._measured, self._J = measured_of(scene, system), system.J
+        clock = np.array([system.omega, system.period])
+        measured = self._measured._replace(clock=clock, frequency=system.frequency)
+        measure(measured, run.records, 0, 1, np.nan, row)
         self._rows.append(row)
         if run.plane is not None:
             self._planes.append(in_plane_of(run.plane, slice(0, 1)))
@@ -56,11 +64,12 @@ class Periods:
             return
         (scene, run), self._waiting = self._waiting, None
         if later is not None:
-            run = replace(run, log=[_ended(run, later.log)])
-        parts = _parts(scene, run)
-        for one in table().values() if not self._of_parts else list(self._of_parts):
-            if one.exists(parts):
-                self._of_parts.setdefault(one, []).append(one.of(parts))
+            run = replace(run, log=_ended(run, later.log))
+        if parts := _parts(scene, run):
+            if not self._of_parts:
+                self._of_parts = {one: [] for one in table().values() if one.exists(parts)}
+            for one, values in self._of_parts.items():
+                values.append(one.of(parts))
 
     def quantities(self, further: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Return the quantities (p, ...) of the periods; what no period knows is left out.
@@ -113,19 +122,15 @@ def _contacts(scene: Scene, run: Outcome) -> Any:
         return None
 
 
-def _ended(run: Outcome, later: Sequence[np.ndarray]) -> np.ndarray:
+def _ended(run: Outcome, later: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
     """Return the log of a period with the ends, in the log of the next one, of impacts that it leaves open."""
-    log, after = (np.concatenate(chunks) if chunks else None for chunks in (run.log, later))
-    if log is None:
-        return np.zeros((0, 0)) if after is None else after[:0]
-    last = {int(entry[2]): entry[1] for entry in log if entry[1] in (IMPACT, DETACHES)}
+    last = {int(entry[2]): entry[1] for log in run.log for entry in log if entry[1] in (IMPACT, DETACHES)}
     ends: dict[int, np.ndarray] = {}
-    for entry in () if after is None else after:
+    for entry in itertools.chain(*later):
         row = int(entry[2])
         if entry[1] == DETACHES and last.get(row) == IMPACT and np.isfinite(run.rows.spring[row]):
-            ends.setdefault(row, entry)
-    moved = [np.r_[entry[0] + run.system.period, entry[1:]] for entry in ends.values()]
-    return np.concatenate([log, np.reshape(moved, (-1, log.shape[1]))])
+            ends.setdefault(row, np.r_[entry[0] + run.system.period, entry[1:]])
+    return [*run.log, *([np.array(list(ends.values()))] if ends else [])]
 
 
 def single_periods(run: Outcome) -> Iterator[Outcome]:
@@ -145,7 +150,9 @@ def single_periods(run: Outcome) -> Iterator[Outcome]:
         yield replace(run, records=type(records)(*arrays), periods=1, log=[own] if len(own) else [], plane=plane)
 
 
-def spots_of_periods(series: StressSeries, strengths: Mapping[str, Mapping[str, Any]], whole: bool = False) -> list[Any]:
+def spots_of_periods(
+    series: StressSeries, strengths: Mapping[str, Mapping[str, Any]], whole: bool = False
+) -> list[Any]:
     """Return what quantities need of hot spots: of each period, (p,), or of the whole motion as of a run.
 
     strengths: those of the motion (StressSeries.strengths), whose mean stress counts.
@@ -161,7 +168,9 @@ def spots_of_periods(series: StressSeries, strengths: Mapping[str, Mapping[str, 
             strength["utilisation"] = utilisation(level[material.criterion], mean, material)
             if whole:
                 strength["utilisation_max"] = most["utilisation"]
-            used = yield_utilisation(own[material.criterion].max() if whole else level[material.criterion], mean, material)
+            used = yield_utilisation(
+                own[material.criterion].max() if whole else level[material.criterion], mean, material
+            )
             strength |= {} if used is None else {"yield_utilisation": used}
         found.append(SimpleNamespace(
             **{scalar: level[scalar] for scalar in SCALARS}, **tops, strength=strength, mean=[], static=None,

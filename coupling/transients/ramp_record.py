@@ -96,6 +96,13 @@ class RampRun(Measured):
         }
 
     @property
+    def limits(self) -> list[tuple[Quantity, float, float]]:
+        """What is limited, such as wear, with its largest value in a period and its mean; stress is in `strength`."""
+        largest, mean = self.largest, self.mean
+        known = (one for name, one in table().items() if name in largest)
+        return [(one, float(largest[one.name]), float(mean[one.name])) for one in known if one.limited and not one.dims]
+
+    @property
     def _ordered(self) -> list[Quantity]:
         """Quantities whose values have an order."""
         return [one for name in self.quantities if (one := table()[name]).unit != "rad" or one.dims]
@@ -182,22 +189,14 @@ class Ramp(Measured, Record, Plotted):
                 "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
                 "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
                 "energy": dict(run.energy), "energy_residual": run.energy_residual,
-                "largest": _plain(run.largest), "mean": _plain(run.mean),
             } | ({} if run.stress is None else {"stress": self.tops_of_stress(run), "strength": self.strength(run)})
             for run in self.runs
         ]  # fmt: skip
+        measured = [{"largest": _plain(run.largest), "mean": _plain(run.mean)} for run in self.runs]
         return {
             "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
+            "quantities": measured,
         }  # fmt: skip
-
-    def told(self, run: RampRun) -> list[tuple[Quantity, Any, Any]]:
-        """Return quantities of limited values with their largest one and their mean over a run: the worst hot spot's."""
-        largest, mean = run.largest, run.mean
-        return [
-            (one, np.nanmax(largest[name]), np.nanmax(mean[name]))
-            for name, one in table().items()
-            if one.limited and name in largest
-        ]
 
     def tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
         """Return the largest amplitudes of von Mises and principal stress of a run, Pa, by hot spot if it has any."""
@@ -233,7 +232,8 @@ class Ramp(Measured, Record, Plotted):
         }
         found = {
             "run_of_period": Variable(np.repeat(np.arange(len(runs)), periods), ("period",)),
-            **{name: Variable(joined(name), ("period",), units) for name, units in SERIES.items()}, **measured,
+            **{name: Variable(joined(name), ("period",), units) for name, units in SERIES.items()},
+            **measured,
             "run_of_start": Variable(np.repeat(np.arange(len(runs)), np.add(periods, 1)), ("start",)),
             **{name: Variable(joined(name), ("start",), units) for name, units in STATES.items()},
             "rate": Variable([run.rate for run in runs], ("run",), unit),
@@ -252,8 +252,8 @@ class Ramp(Measured, Record, Plotted):
             none = np.zeros((0, len(spots), len(MEASURES)))
             stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
             found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
-        dims = {dim for name in self.quantities for dim in table()[name].dims if labels(dim)}
-        found |= {dim: Variable(np.array(labels(dim), object), (dim,)) for dim in dims}
+        own = {dim for name in self.quantities for dim in table()[name].dims if labels(dim)}
+        found |= {dim: Variable(np.array(labels(dim), object), (dim,)) for dim in own}
         if dampers:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
