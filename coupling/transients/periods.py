@@ -162,7 +162,7 @@ def spots_of_periods(
         own = dict(zip(MEASURES, amplitudes[:, place].T, strict=True))
         level = {measure: values.mean() if whole else values for measure, values in own.items()}
         tops = {f"{scalar}_max": own[scalar].max() if whole else np.nan for scalar in SCALARS}
-        strength: dict[str, Any] = {}
+        strength = dict.fromkeys(("utilisation", "yield_utilisation"), np.nan * level[SCALARS[0]])
         if material is not None:
             most, mean = strengths[name], strengths[name]["mean"]
             strength["utilisation"] = utilisation(level[material.criterion], mean, material)

@@ -185,7 +185,9 @@ class _Run:
     def advance(self) -> Iterator[int]:
         """Run all periods, or until one fails (`status`). Yields the number of those done."""
         for k in range(len(self.course.time)):
-            run = self._begin(k)
+            earlier, run = self.run, self._begin(k)
+            if earlier is not None and self.scene.yields and run.advance_to(0) is Status.OK:
+                _carry_impulses(run, earlier)
             self.status = run.advance_to(1)
             if self.status is not Status.OK:
                 return
@@ -217,7 +219,6 @@ class _Run:
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)
         reuse_subsystems(run, self.run)
-        _carry_impulses(run, self.run)
         self.run = run
         return run
 
@@ -292,9 +293,9 @@ class _Run:
 
 
 def _carry_impulses(run: Any, earlier: Any) -> None:
-    """Let compliant contacts that stay closed keep the impulses since they closed."""
+    """Let compliant contacts that stay closed over the end of a period keep the impulses since they closed."""
     for name in ("contact_impulse", "pushed"):  # of the engines of sliders, and of planar bodies
-        if earlier is not None and hasattr(run.state, name) and type(earlier) is type(run):
+        if hasattr(run.state, name):
             getattr(run.state, name)[:] = getattr(earlier.state, name)
 
 

@@ -84,16 +84,19 @@ class RampRun(Measured):
     @property
     def largest(self) -> dict[str, Any]:
         """Largest value of each quantity in a period of the run, by name; angles of a wave have none."""
-        return {one.name: np.nanmax(self.quantities[one.name], axis=0) for one in self._ordered}
+        return {one.name: np.fmax.reduce(self.quantities[one.name]) for one in self._ordered}
 
     @property
     def mean(self) -> dict[str, Any]:
         """Mean of each quantity over the time of the run, by name: of rates, what the run comes to per time."""
-        spans = 1.0 / self.frequency
-        return {
-            one.name: np.ma.average(np.ma.masked_invalid(self.quantities[one.name]), axis=0, weights=spans)
-            for one in self._ordered
-        }
+        return {one.name: self._mean(self.quantities[one.name]) for one in self._ordered}
+
+    def _mean(self, values: np.ndarray) -> Any:
+        """Return the mean over the time of the periods that are known; nan without any."""
+        known = np.isfinite(values)
+        spans = known / self.frequency.reshape(-1, *[1] * (values.ndim - 1))
+        total = spans.sum(axis=0)
+        return np.where(known, values, 0.0).T @ (1.0 / self.frequency) / np.where(total > 0.0, total, np.nan).T
 
     @property
     def limits(self) -> list[tuple[Quantity, float, float]]:

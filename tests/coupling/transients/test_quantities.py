@@ -1,4 +1,4 @@
-"""Quantities of ramps and ring-downs: against closed forms, the energy balance, and runs that a ramp does not disturb."""
+"""Quantities of ramps and ring-downs: against closed forms, energy balances, and runs that a ramp does not disturb."""
 
 import json
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
-from tests.coupling.transients.test_ramp import BODY, FORCE, MASS, OMEGA, ONE_MODE, RATIO, SLIDER, scene
+from tests.coupling.transients.test_ramp import BODY, FORCE, MASS, OMEGA, ONE_MODE, SLIDER, scene
 from tests.coupling.transients.test_ring_down import blow, oscillator
+from tests.tools.rings import Chain
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE
 from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS, has_meaning
@@ -39,7 +40,7 @@ def test_amplitudes_of_a_slow_ramp_are_those_of_the_linear_oscillator():
 
 @pytest.mark.parametrize("friction", [0.05, 0.3])
 def test_wear_of_a_ramp_is_its_friction_work(friction):
-    """Archard: K/H times the integral of normal force times slip speed, of which friction takes the coefficient's part."""
+    """Archard: K/H times the integral of normal force times slip speed, of which friction takes the coefficient."""
     data = BODY | {
         "damper": [{**SLIDER, "friction": friction}], "cavity": [{"name": "c", "gap": 1e-2}], "wear": {"rate": RATE},
     }  # fmt: skip
@@ -74,6 +75,25 @@ def test_force_of_an_impact_in_a_ramp_is_hertz():
     assert run.contact_force == pytest.approx([*force, 0.0], rel=1e-5)
     assert run.impact_speed_max == pytest.approx([speed, 0.5 * speed, 0.0], rel=1e-6)
     assert run.largest["contact_force"] == run.contact_force[0]
+
+
+def test_an_impact_over_the_end_of_a_period_is_whole():
+    """A body compresses a spring without loss for 0.1 ms: F = v (k m)^(1/2); the period ends halfway."""
+    mass, speed, lasts = 0.02, 0.2, 1e-4
+    stiffness = mass * (np.pi / lasts) ** 2
+    data = {
+        "structure": {"model": "rigid", "mass": 1e9, "stiffness": 1e9 * OMEGA**2, "damping_ratio": 0.01},
+        "excitation": {"frequency": 1000.0, "force": 1e-9}, "gravity": {"acceleration": 0.0},
+        "cavity": [{"name": "c", "gap": 1e-4}],
+        "damper": [{"cavity": "c", "mass": mass, "velocity": speed, "restitution": 1.0}],
+        "contact": {"law": "compliant", "stiffness": stiffness, "pair": PAIR}, "wear": {"impact_rate": 1e-9},
+    }  # fmt: skip
+    frequency = 1 / (2.5e-4 + lasts / 2)
+    (run,) = vd.ramp(scene({"from": frequency, "to": frequency * (1 + 1e-9), "periods": 2}, data)).runs
+    assert run.impacts.tolist() == [1, 0]
+    assert run.contact_force == pytest.approx([speed * np.sqrt(stiffness * mass), 0.0], rel=1e-6)
+    energy = 0.5 * mass * speed**2
+    assert run.wear_volume_rate == pytest.approx([1e-9 * energy * frequency * HOUR, 0.0], rel=1e-6)
 
 
 LAWS = {
@@ -149,9 +169,7 @@ def test_what_a_motion_lacks_is_what_has_no_meaning(tmp_path):
         "damper": [body], "cavity": [{"name": "c", "gap": 2e-4, "play": 1e-4}], "wear": WEAR, "contact": LAWS["rigid"],
     }  # fmt: skip
     found = vd.ramp(scene({"from": 98.0, "to": 102.0, "periods": 6, "both": True}, data))
-    rung = vd.ring_down(
-        validate(vd.Scene, data | {"ring_down": {"start": "impulse", "impulse": 2.0, "periods": 6}}, "x")
-    )
+    rung = vd.ring_down(validate(vd.Scene, data | {"ring_down": blow(2.0, 6)}, "x"))
     sources = {*OF_MOTION, *OF_PLANE, "wear", "contacts"}
     for kind, reasons in ((found, NOT_IN_RAMPS), (rung, NOT_IN_RING_DOWNS)):
         wanted = {name for name, one in table().items() if one.exists(sources) and has_meaning(one, reasons)}
@@ -165,3 +183,25 @@ def test_what_a_motion_lacks_is_what_has_no_meaning(tmp_path):
             np.testing.assert_array_equal(again.quantities[name], values)
     assert {len(values) for values in found.quantities.values()} == {12}
     assert np.array_equal(found.runs[1].tilt_max, found.tilt_max[6:])
+
+
+def test_sectors_of_a_ring_in_a_ramp(tmp_path):
+    """One body in a ring of six: its sector alone has impacts, and each has its amplitude in the run."""
+    chain = Chain(sectors=6, damping_ratio=0.01)
+    hertz = float(np.sqrt(chain.squares([2])[0]) / (2 * np.pi))
+    data = {
+        "structure": {"model": "ring", "file": str(chain.saved(tmp_path))},
+        "excitation": {"frequency": hertz, "force": 25.0, "at": "tip", "wave": 2},
+        "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": [4]}],
+        "damper": [{"cavity": "c", "mass": 0.01, "friction": 0.2, "restitution": 0.6}], "time": {"periods": 30},
+    }  # fmt: skip
+    given = validate(vd.Scene, data, "x")
+    ends = {"from": hertz, "to": hertz * (1 + 1e-13)}
+    (run,) = vd.ramp(given.replace({"ramp": ends | {"periods": 12}})).runs
+    whole = vd.simulate(given.replace({"time": {"periods": 12, "transient": 0}}))
+    assert run.sector_amplitude_max.shape == (12, 6)
+    assert run.largest["sector_amplitude_max"] == pytest.approx(whole.sectors.amplitude_max, rel=1e-6)
+    assert run.mean["sector_impacts_per_period"] == pytest.approx(whole.sectors.impacts_per_period, rel=1e-12)
+    assert np.flatnonzero(run.largest["sector_impacts_per_period"]).tolist() == [4]
+    found = vd.ring_down(given.replace({"ring_down": {"start": "steady", "periods": 5}}))
+    assert found.sector_amplitude_max.shape == (6,) and found.course["localisation"].shape == (5,)
