@@ -29,7 +29,6 @@ from benchmarks.sweep.simulation import Costs, simulated
 from benchmarks.sweep.worker import Job, scene
 from benchmarks.timing import format_spread, spread
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import write_json
 from vanedamp.studies.workers import available_cores
 
@@ -254,7 +253,9 @@ def _checkpoint() -> dict[str, float]:
         for size in sizes:
             made, path = scene(size, 5), Path(folder, f"{size}.partial")
             kept = Checkpoint(path, made, size, {})
-            kept.finished.put(np.arange(size), rng.normal(size=(size, len(COLUMNS))), np.zeros((size, 2), int), ["ok"])
+            kept.finished.put(
+                np.arange(size), rng.normal(size=kept.finished.values.shape), np.zeros((size, 2), int), ["ok"]
+            )
             took = []
             for _ in range(5):
                 kept._unsaved = True

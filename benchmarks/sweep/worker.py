@@ -27,9 +27,10 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import grid
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.schedule import run_tasks
 from vanedamp.coupling.sweep.sweep import sweep, warm_up
-from vanedamp.coupling.sweep.worker import COLUMNS, SweepTable, Task, TaskResult, run_points
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, run_points
 from vanedamp.files.store import write_json
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.workers import workers
@@ -134,7 +135,7 @@ def _tasks(job: Job, pool: Executor | None) -> dict[str, Any]:
     """Hand out tasks that run nothing and say that they took a second: what is left is what handing out costs."""
     assert pool is not None
     points = grid(scene(job.points, job.periods))
-    idle, finished = _Watched(pool, partial(_nothing, job.per_task)), SweepTable(points.size)
+    idle, finished = _Watched(pool, partial(_nothing, job.per_task)), SweepTable(points.size, Row(points.base))
     started, used = time.perf_counter(), time.process_time()
     for task, rest, result in run_tasks(points, finished, idle):
         finished.add(task, result, bool(rest))
@@ -159,7 +160,7 @@ def _single_points(job: Job) -> list[float]:
 def _nothing(per_task: int, base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     """Stand for a task of which `per_task` points take a second."""
     count = len(points)
-    return TaskResult(np.zeros((count, len(COLUMNS))), [("ok", "")] * count, None, count / per_task)
+    return TaskResult(np.zeros((count, Row(base).width)), [("ok", "")] * count, None, count / per_task)
 
 
 class _Watched(Executor):

@@ -23,6 +23,14 @@ _NAMED = 3
 
 #: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
+#: what ensembles do not have, and why
+_ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
+NOT_IN_ENSEMBLES = {
+    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY,
+    "undamped_top": "the peak without bodies is in `reduction`, others are not kept", "fixed_top": "counted in `reduction`, not kept",
+}  # fmt: skip
+#: dimensions over which the largest is kept
+_REDUCED = {"damper", "hot_spot", "sector"}
 PEAK, REDUCTION = "peak_amplitude", "reduction"
 
 
@@ -35,9 +43,10 @@ class Spread(NamedTuple):
 
 
 def kept() -> dict[str, Spread]:
-    """Return what is kept of all samples, by name: of hot spots that of the worst."""
-    found = {name: one for name, one in table().items() if not one.text and (one.spread or not one.dims)}
-    return {name: Spread(one.unit) for name, one in found.items()}
+    """Return what is kept of all samples, by name: of bodies, hot spots and sectors the largest."""
+    return {
+        name: Spread(one.unit) for name, one in table().items() if not one.text and _REDUCED.issuperset(one.dims)
+    }  # fmt: skip
 
 
 def spreads() -> dict[str, Spread]:
@@ -68,7 +77,8 @@ class Ensemble(Record, Plotted):
     samples: Annotated[Mapping[str, np.ndarray], Own()]
     """dotted path -> (s,) values of each range"""
     members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
-    """(s, *grid) quantities of all points (docs/quantities.md), of hot spots that of the worst; nan where none is"""
+    """(s, *grid) quantities of all points (docs/quantities.md), of bodies, hot spots and sectors the largest; nan where
+    none is"""
     status: Annotated[np.ndarray, Array(("sample", "grid"), dtype=object)]
     """of every point, as in a Sweep"""
     quantile: Annotated[Mapping[str, np.ndarray], Columns(spreads, ("quantile",), "quantile_")]

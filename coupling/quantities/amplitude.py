@@ -1,4 +1,7 @@
-"""Amplitudes of the displacement at `excitation.at`."""
+"""Amplitudes of the displacement at `excitation.at`.
+
+Formulas have real numbers only: numpy multiplies complex ones one by one and side by side with other last bits.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,15 @@ ORDER = 10
 
 
 @quantity("m", spread=True)
-def amplitude_max(peak: Any) -> Any:
+def amplitude_max(highest: Any) -> Any:
     """largest displacement, without its sign, at `excitation.at`"""
-    return peak
+    return highest
 
 
 @quantity("m", spread=True)
-def amplitude_mean(peaks: Any, periods: Any) -> Any:
+def amplitude_mean(heights: Any, counted: Any) -> Any:
     """mean of the largest displacements of the periods"""
-    return peaks / periods
+    return heights / counted
 
 
 @quantity("m")
@@ -43,29 +46,29 @@ def amplitude_max_dynamic(distance: Any) -> Any:
 
 
 @quantity("m", spread=True)
-def amplitude_mean_dynamic(distances: Any, periods: Any) -> Any:
+def amplitude_mean_dynamic(distances: Any, counted: Any) -> Any:
     """mean of the periods' largest distances from the static deflection, to be compared with linear amplitudes"""
-    return distances / periods
+    return distances / counted
 
 
 @quantity("m")
-def amplitude_rms(square: Any, periods: Any, period: Any) -> Any:
+def amplitude_rms(square: Any, counted: Any, period: Any) -> Any:
     """root mean square of the displacement"""
-    return np.sqrt(np.maximum(square / (periods * period), 0.0))
+    return np.sqrt(np.maximum(square / (counted * period), 0.0))
 
 
 @quantity("m")
-def amplitude_harmonic(harmonic: Any, periods: Any, period: Any) -> Any:
+def amplitude_harmonic(harmonic: Any, counted: Any, period: Any) -> Any:
     """amplitude X of its part X sin(2 pi f t + phase) at the excitation's frequency, order 1"""
-    wave = 2.0 / (periods * period) * harmonic
-    return np.hypot(wave.real, wave.imag)
+    share = 2.0 / (counted * period)
+    return np.hypot(share * harmonic.real, share * harmonic.imag)
 
 
 @quantity("rad")
-def phase(harmonic: Any, periods: Any, period: Any) -> Any:
+def phase(harmonic: Any, counted: Any, period: Any) -> Any:
     """phase of that part"""
-    wave = 2.0 / (periods * period) * harmonic
-    return np.arctan2(wave.real, 0.0 - wave.imag)  # 0.0 - x is no -0.0
+    share = 2.0 / (counted * period)
+    return np.arctan2(share * harmonic.real, 0.0 - share * harmonic.imag)  # 0.0 - x is no -0.0
 
 
 @quantity("m", spread=True)

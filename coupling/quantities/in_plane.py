@@ -16,9 +16,9 @@ def tilt_max(tilt: Any) -> Any:
 
 
 @quantity("1", ("damper",))
-def lift_share(lifted: Any, periods: Any, period: Any) -> Any:
+def lift_share(lifted: Any, counted: Any, period: Any) -> Any:
     """fraction of the time that each body is off its floor"""
-    return lifted / (periods * period)
+    return lifted / (counted * period)
 
 
 @quantity("1", ("damper",))
@@ -28,6 +28,6 @@ def linearisation(tilt: Any, neglected: Any) -> Any:
 
 
 @quantity("1", ("damper",))
-def wall_impacts(walls: Any, periods: Any) -> Any:
+def wall_impacts(walls: Any, counted: Any) -> Any:
     """mean number of impacts on its walls in a period, for each body; the others hit floors, ceilings and each other"""
-    return walls / periods
+    return walls / counted

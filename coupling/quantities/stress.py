@@ -6,6 +6,8 @@ An amplitude is the mean over the periods of half the range within a period; wit
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -28,15 +30,20 @@ def _of_spots(name: str, about: str, read: Callable[[Any], Any], unit: str = "Pa
     return Quantity(name, unit, ("hot_spot",), about, lambda stress: np.array([read(spot) for spot in stress]), **more)
 
 
+def _linear(name: str, curve: str, spot: Any) -> Any:
+    amplitudes = getattr(spot, curve)
+    return np.nan if amplitudes is None else amplitudes[name]
+
+
 def _scalar(name: str) -> list[Quantity]:
-    told = {"spread": True, "limited": True} if name == SCALARS[0] else {}
+    told = name == SCALARS[0]
     return [
-        _of_spots(f"stress_{name}", f"amplitude of {_WORDS[name]}", lambda spot: getattr(spot, name), **told),
-        _of_spots(f"stress_{name}_max", "the largest one of a period", lambda spot: getattr(spot, f"{name}_max")),
+        _of_spots(f"stress_{name}", f"amplitude of {_WORDS[name]}", attrgetter(name), spread=told, limited=told),
+        _of_spots(f"stress_{name}_max", "the largest one of a period", attrgetter(f"{name}_max")),
         *(
             _of_spots(
                 f"stress_{name}_{curve}", f"amplitude {words}; unknown under noise",
-                lambda spot, curve=curve: np.nan if getattr(spot, curve) is None else getattr(spot, curve)[name],
+                partial(_linear, name, curve),
             )
             for curve, words in _ALONE.items()
         ),

@@ -13,12 +13,13 @@ LOSSES = ENERGIES[1:5]
 #: complex sums: integrals over time of x exp(-i omega t), m s, and of the bodies' momentum, N s^2; loads of order 1 on
 #: the bodies, N
 COMPLEX = ("harmonic", "momentum", "load")
-#: the row of sums of a motion: periods (at least 1); period, s; omega, rad/s; largest |x|, m, and the sum of the
-#: periods' largest; half width of the mean's interval, m; static deflection, m; the largest distance from it and the
-#: sum of the periods' largest, m; integral of x^2, m^2 s; change of the bodies' momentum, N s; impacts; imbalance of
-#: energies, and energy that contacts have made, over what flowed; bodies' mass, kg, nan where no attached mass is felt
+#: the row of sums of a motion: periods that are counted (at least 1); period, s; omega, rad/s; largest |x|, m, and the
+#: sum of the periods' largest; half width of the mean's interval, m; static deflection, m; the largest distance from it
+#: and the sum of the periods' largest, m; integral of x^2, m^2 s; change of the bodies' momentum, N s; impacts;
+#: imbalance of energies, and energy that contacts have made, over what flowed; bodies' mass, kg, nan where no attached
+#: mass is felt
 SUMS = (
-    "periods", "period", "omega", "peak", "peaks", "confidence", "static", "distance", "distances", "square",
+    "counted", "period", "omega", "highest", "heights", "confidence", "static", "distance", "distances", "square",
     "momentum_change", "impacts", "unbalanced", "made", "carried",
     *(f"{name}_{part}" for name in COMPLEX for part in ("real", "imag")), *ENERGIES,
 )  # fmt: skip
@@ -28,13 +29,15 @@ def sources_of(row: np.ndarray) -> dict[str, Any]:
     """Return the sums of a row (S,) or of rows (k, S) by name, energies as one table."""
     found: dict[str, Any] = dict(zip(SUMS, np.moveaxis(row, -1, 0), strict=True))
     for name in COMPLEX:
-        found[name] = found.pop(f"{name}_real") + 1j * found.pop(f"{name}_imag")
+        real, imaginary = (found.pop(f"{name}_{part}") for part in ("real", "imag"))
+        found[name] = np.empty(np.shape(real), complex)
+        found[name].real, found[name].imag = real, imaginary
     return found | {"energy": {name: found.pop(name) for name in ENERGIES}}
 
 
 def nothing_known(row: np.ndarray) -> None:
     """Set what a motion that has diverged says nothing of to nan."""
-    row[[name not in ("periods", "period", "omega", "impacts") for name in SUMS]] = np.nan
+    row[[name not in ("counted", "period", "omega", "impacts") for name in SUMS]] = np.nan
 
 
 #: what every motion has: its sums, with linear amplitudes, m, and the overlap with rigid walls over the free travel

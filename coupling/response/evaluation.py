@@ -217,7 +217,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float, events: b
         transient=first,
         counters=run.counters,
         event_list=events_of(run.rows, run.log) if events else [],
-        quantities=_known(evaluated(sums | {"overlap": run.penetration} | _linear(scene, system)), status),
+        quantities=_known(evaluated(sums | {"overlap": run.penetration} | linear_parts(scene, system)), status),
         **_series(system, records, done),
         **extent,
     )
@@ -298,7 +298,7 @@ def _tilted(in_plane: Mapping[str, np.ndarray], bound: float) -> bool:
     return bool(np.any(in_plane["neglected"] * in_plane["tilt"] ** 2 > bound))
 
 
-def _linear(scene: Scene, system: System) -> dict[str, float]:
+def linear_parts(scene: Scene, system: System | None = None) -> dict[str, float]:
     """Return the amplitudes without bodies, and with every body fixed in its cavity, m; nan under noise."""
     known = scene.excitation.signal is None
     at = np.array([scene.frequency])

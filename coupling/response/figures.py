@@ -19,8 +19,8 @@ from vanedamp.coupling.system.system import System
 
 (
     PERIODS, SPAN, OMEGA, PEAK, PEAKS, CONFIDENCE, STATIC, DISTANCE, DISTANCES, SQUARE, CHANGE, IMPACTS, UNBALANCED,
-    MADE, CARRIED, HARMONIC, _, MOMENTUM, _, LOAD, _, ENERGY, *_,
-) = range(len(SUMS))  # fmt: skip
+    MADE, CARRIED, HARMONIC, _, MOMENTUM, _, LOAD, _, ENERGY,
+) = range(len(SUMS) - len(ENERGIES) + 1)  # fmt: skip
 #: classes of motion: the number of excitation periods after which it repeats, or
 NON_PERIODIC, NO_CONTACT, STUCK = 0, -1, -2
 

@@ -28,6 +28,11 @@ from vanedamp.rom.recovery import COMPONENTS
 _NESTED = ("wear", "contact_strength", "stress", "strength", "sectors")
 
 
+#: what runs do not have, and why
+_CURVE = "a run has one frequency; the curve of a sweep has peaks"
+NOT_IN_RUNS = {"undamped_top": _CURVE, "fixed_top": _CURVE}
+
+
 class Status(StrEnum):
     """How a run ended. Without `ok` the results cover only the periods that were completed."""
 
@@ -311,7 +316,7 @@ class Response(Measured, Record, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        own = self.derived()
+        own = {name: value for name, value in self.derived().items() if name not in self._plain}
         for name in own.keys() & {"wear", "contact_strength"}:
             own[name] = json.dumps(own[name])
         own |= {name: value for name, value in self._plain.items() if value is not None}

@@ -25,6 +25,10 @@ _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
 PEAKS = tuple(one.name for one in family("linear_peaks"))
 
 
+def _of_points() -> dict[str, Quantity]:
+    return {name: one for name, one in table().items() if name not in PEAKS}
+
+
 def _peaks() -> dict[str, Quantity]:
     return {name: table()[name] for name in PEAKS}
 
@@ -48,7 +52,7 @@ class Sweep(Measured, Record, Plotted):
     """of the sweep, with its [sweep] table"""
     axes: Annotated[Mapping[str, np.ndarray], Own()]
     """dotted path -> values"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("grid",))]
+    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",))]
     """by name; sections are those of the last evaluated periods"""
     status: Annotated[np.ndarray, Array(("grid",), dtype=object)]
     """"ok", another response.response.Status, or "error: ..." for a run that broke, without quantities"""
@@ -120,6 +124,10 @@ class Sweep(Measured, Record, Plotted):
             "grid": tuple(map(_dimension, self.axes)),
             "curves": tuple(_dimension(axis) for axis in self.axes if axis != swept),
         }
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data, quantities as nested lists (nan where there is none), without sections."""
+        return {name: values for name, values in super().to_json().items() if name not in self.sections}
 
     def derived(self) -> dict[str, Any]:
         """Return axes and units by path, and what the user is to know."""

@@ -17,6 +17,8 @@ from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file, ring_
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.store import read_only
 
+#: what sweeps do not have, and why
+NOT_IN_SWEEPS: dict[str, str] = {}
 #: texts of every point
 TEXTS = ("status", "classification")
 _SECTION = "section"
@@ -95,11 +97,11 @@ class Row:
         if name not in self.places:
             return np.full(rows.shape[:-1], np.nan)
         found: np.ndarray = rows[..., self.places[name]]
-        return found.reshape(*rows.shape[:-1], *self.shape(self.quantities[name]))
+        return found.reshape((*rows.shape[:-1], *self.shape(self.quantities[name])))
 
     def arrays(self, rows: np.ndarray, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
         """Return all quantities of rows (points, width) as arrays over a grid, and behind it their own dimensions."""
         return {
-            name: read_only(self.value(rows, name).reshape(*shape, *self.shape(one)))
+            name: read_only(self.value(rows, name).reshape((*shape, *self.shape(one))))
             for name, one in self.quantities.items()
         }

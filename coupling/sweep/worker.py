@@ -16,7 +16,7 @@ from vanedamp.coupling.exponents.lyapunov import NO_EXPONENT, lyapunov
 from vanedamp.coupling.numerics.compiler.jit import CacheError
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.quantities.sums import sources_of
-from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status
+from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status, linear_parts
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -184,6 +184,8 @@ def _run(
     except Exception as error:  # one broken point must not cost the others
         if isinstance(error, StoreError | CacheError) or not isinstance(error, OF_A_POINT):
             raise _stopped(error, ", ".join(f"{path} = {value}" for path, value in point.items())) from error
+        with suppress(*OF_A_POINT):
+            row.put_parts(values, linear_parts(maker.scene(point)))
         return None, broken(error, row).texts[0]
     return response.final, row.put(values, response, more)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import vanedamp as vd
+from tests.tools.changed import changed as with_values
 from tests.tools.input_files import BLOCK, SCENE, changed, rom_scene
 from tests.tools.op2_file import write_op2
 from tests.tools.random_scenes import random_reduced
@@ -298,7 +299,7 @@ def test_points_without_figures_keep_their_status(results, tmp_path):
     sweep = vd.Sweep.load(results / "sweep.h5")
     status, mean = sweep.status.copy(), sweep.amplitude_mean.copy()
     status[0, 1], mean[0, 1] = "error: broken, oh", np.nan
-    assert vd.export(replace(sweep, status=status, amplitude_mean=mean), tmp_path / "sweep.csv") == ()
+    assert vd.export(with_values(sweep, status=status, amplitude_mean=mean), tmp_path / "sweep.csv") == ()
     table = pandas.read_csv(tmp_path / "sweep.csv")
     assert table["status"][1] == "error: broken, oh"
     assert np.isnan(table["amplitude_mean [m]"][1])
@@ -423,7 +424,7 @@ def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_
     place = [0] * mean.ndim
     place[list(sweep.axes).index("excitation.frequency")] = 1
     mean[tuple(place)] = np.nan
-    told, *_ = vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
+    told, *_ = vd.export(with_values(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
     assert told == "left out: 1 points of curves without a figure"
     curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
     frequencies = sweep.axes["excitation.frequency"]
@@ -442,7 +443,7 @@ def test_universal_curves_run_upwards_and_statuses_are_told(results, tmp_path):
     status.flat[0] = "not_steady"
     down = {swept: np.flip(given.axes[swept])}
     turned = {name: np.flip(getattr(given, name), place) for name in ("amplitude_mean", "amplitude_undamped")}
-    told = vd.export(replace(given, axes=given.axes | down, status=status, **turned), tmp_path / "down.uff")
+    told = vd.export(with_values(given, axes=given.axes | down, status=status, **turned), tmp_path / "down.uff")
     bad = sum(one != "ok" for one in status.flat)
     assert told == (f"left out: the status; {bad} of {status.size} points are not ok, such as: not_steady",)
     vd.export(given, tmp_path / "up.uff")

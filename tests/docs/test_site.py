@@ -17,19 +17,16 @@ import pytest
 pytest.importorskip("sphinx", reason="needs the extra docs")
 pytest.importorskip("myst_parser", reason="needs the extra docs")
 
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, STRESSES, WORDS
-
 from docs._ext import commands, pages, python_api, toml_keys
 from docs._ext.fields import described
 from docs.check_site import faults
 from tests.tools.input_files import SCENE
 from tests.tools.processes import PATIENCE, ROOT, environment
 from tests.tools.schemas import shipped_schemas
+from vanedamp.coupling.quantities import quantity
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.record import PEAKS
-from vanedamp.coupling.sweep.worker import IN_PLANE, MEASURES
 from vanedamp.files.reference import options
 from vanedamp.files.store import load_any
 from vanedamp.studies import kinds
@@ -166,8 +163,7 @@ def test_fields_have_the_dimensions_and_units_of_the_file(name):
 
 def test_results_of_sweeps_are_listed():
     text = results("Sweep")
-    stresses = [name for name in STRESSES if not name.endswith("_max")]
-    for name in (*MEASURES, *IN_PLANE, *EXPONENTS, *WORDS, *SECTIONS, *stresses, *PEAKS):
+    for name in quantity.table():
         assert f"`{name}`" in text, name
 
 

@@ -55,7 +55,7 @@ def diagram_panels(sweep: Sweep) -> list[Panel]:
     quantities = {"structure": sweep.sections["section_displacement"]}
     slip = sweep.sections.get("section_slip")
     for body in range(0 if slip is None else slip.shape[-1]):
-        quantities[f"body {body + 1} in its cavity"] = slip[..., body]  # type: ignore[index]
+        quantities[f"body {body + 1} in its cavity"] = slip[..., body]
     for values in itertools.product(*(range(len(sweep.axes[path])) for path in others)):
         at = dict(zip(others, values, strict=True))
         place = tuple(order if path == axis else at[path] for path in paths)

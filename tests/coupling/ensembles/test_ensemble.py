@@ -9,7 +9,8 @@ from tests.tools.input_files import OSCILLATOR, RESONANCE
 from tests.tools.sweep_processes import DATA
 from vanedamp.coupling.ensembles.design import QUANTILES
 from vanedamp.coupling.ensembles.ensemble import ensemble
-from vanedamp.coupling.ensembles.record import AT_POINTS, OF_CURVES, STRENGTH, WEAR, Ensemble
+from vanedamp.coupling.ensembles.record import Ensemble, spreads
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
@@ -23,7 +24,7 @@ LINEAR = OSCILLATOR | {
     "structure": OSCILLATOR["structure"] | {"damping_ratio": 0.1}, "time": {"periods": 60, "transient": 50},
 }  # fmt: skip
 #: results of models with hot spots, and of scenes with wear
-FURTHER = {name for part in (STRENGTH, WEAR) for one in part for name in (one, f"peak_{one}")}
+LIMITED = {name for one in table().values() if one.limited for name in (one.name, f"peak_{one.name}")}
 RANGES = {"damper.0.friction": (0.1, 0.5), "cavity.0.gap": (1e-4, 5e-4)}
 
 
@@ -123,7 +124,7 @@ def test_a_record_comes_back(result, tmp_path):
     result.save(tmp_path / "ensemble.h5")
     found = Ensemble.load(tmp_path / "ensemble.h5")
     assert found.scene == result.scene and found.numbers == result.numbers
-    assert found.quantile.keys() == result.quantile.keys() == {*AT_POINTS, *OF_CURVES} - FURTHER
+    assert found.quantile.keys() == result.quantile.keys() == {*spreads()} - LIMITED
     for name in found.quantile:
         np.testing.assert_array_equal(found.quantile[name], result.quantile[name])
     np.testing.assert_array_equal(found.indices["reduction"], result.indices["reduction"])

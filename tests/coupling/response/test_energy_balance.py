@@ -9,11 +9,11 @@ import pytest
 from tests.coupling.engine.line.test_traps import cluster
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.response import records as recs
-from vanedamp.coupling.response.evaluation import Ended, evaluate, residual
-from vanedamp.coupling.response.figures import FIGURES, contact_gain
+from vanedamp.coupling.response.evaluation import STATUS_OF, Ended, closed_status, evaluate, residual
+from vanedamp.coupling.response.figures import contact_gain
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.sweep import worker
 
 
 def test_what_is_only_carried_along_is_no_flow():
@@ -55,9 +55,7 @@ def test_contacts_that_make_energy_end_a_run_and_a_point_of_a_sweep(entry):
         ledger[-1, entry] -= taken
         ledger[-1, recs.VISCOUS] += taken
         assert evaluate(scene, run.outcome(), Ended(Status.OK, 0), time.perf_counter()).status == status
-        figures = np.zeros(len(FIGURES))
-        figures[FIGURES.index("contact_gain")] = made
-        assert worker._status(codes.DONE, figures) == status
+        assert closed_status(STATUS_OF[codes.DONE], 0.0, made, OPEN_LEDGER) == status
 
 
 @pytest.mark.parametrize("missing", [0.0, 1e-4, np.nan])

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from vanedamp.coupling.sweep.further import sectors_of
 
 from tests.reference.comparison import follow
 from tests.tools.rings import Chain
@@ -13,6 +12,7 @@ from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_peaks
 from vanedamp.coupling.system.sectors import unrolled
@@ -180,8 +180,9 @@ def test_a_sweep_that_has_no_points_says_so(file, changes, message):
         sweep(scene(file, **changes))
 
 
-def test_no_points_have_no_sectors_but_their_number():
-    columns = dict(sectors_of(np.zeros((0, 2 + 5 * 6)), (0,)))
+def test_no_points_have_no_sectors_but_their_number(file):
+    row = Row(scene(file))
+    columns = row.arrays(np.zeros((0, row.width)), (0,))
     assert columns["sector_amplitude_mean"].shape == (0, 6)
     assert columns["localisation"].shape == (0,)
 

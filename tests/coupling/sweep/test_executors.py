@@ -17,6 +17,7 @@ import pytest
 from tests.tools.processes import PATIENCE, RANKS, environment, until
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep import worker as points
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.schedule import TaskSize
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import SweepError
@@ -204,7 +205,7 @@ def test_the_server_of_workers_compiles_nothing(tmp_path):
 
 
 def test_tasks_take_a_second_and_are_few_at_the_end():
-    table = points.SweepTable(10_000)
+    table = points.SweepTable(10_000, Row(scene()))
     size = TaskSize(table, 2)
     assert size() == 1
     size.learn(1, 1e-3)

@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 import xarray
-from vanedamp.coupling.sweep.further import EXPONENTS, SECTIONS, WORDS
 
 from tests.tools.sweep_processes import DATA, scene
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.exponents import lyapunov as module
 from vanedamp.coupling.exponents.lyapunov import lyapunov
+from vanedamp.coupling.quantities.quantity import family
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.coupling.sweep.worker import parts_of, width_of
 from vanedamp.files.toml_input import InputError
 
 AXES = {"cavity.c1.gap": [5e-4, 2e-4], "excitation.frequency": [15.6, 15.9]}
@@ -71,7 +71,8 @@ def test_measures_are_those_without_and_only_what_is_asked_for_is_kept(result, n
     np.testing.assert_array_equal(found.amplitude_mean, result.amplitude_mean)
     np.testing.assert_array_equal(found.energy_share, result.energy_share)
     assert bool(found.sections) == ("sections" in numbers) and bool(found.exponents) == ("exponents" in numbers)
-    assert set(found.sections) in (set(), set(SECTIONS)) and set(found.exponents) in (set(), {*EXPONENTS, *WORDS})
+    for part in ("sections", "exponents"):
+        assert set(getattr(found, part)) in (set(), {one.name for one in family(part)})
 
 
 def test_the_file_has_dimensions_and_units_and_reads_as_the_record(result, tmp_path):
@@ -104,12 +105,14 @@ def test_columns_of_a_point_follow_each_other():
     data = scene(sweep=AXES | {"sections": 3, "exponents": 32}, damper=[block], cavity=[
         {"name": "c1", "gap": 5e-4, "play": 1e-4},
     ])  # fmt: skip
-    parts = parts_of(data)
-    assert {name: part.stop - part.start for name, part in parts.items() if part.stop > part.start} == {
-        "in_plane": 4, "exponents": 6, "sections": 12,
-    }  # fmt: skip
-    assert parts["in_plane"].stop == parts["exponents"].start and parts["exponents"].stop == parts["sections"].start
-    assert width_of(data) == parts["sections"].stop
+    row = Row(data)
+    widths = dict.fromkeys(("in_plane", "exponents", "sections"), 0)
+    for name, place in row.places.items():
+        if row.quantities[name].family in widths:
+            widths[row.quantities[name].family] += place.stop - place.start
+    assert widths == {"in_plane": 4, "exponents": 4, "sections": 12} and len(row.texts) == 4
+    ends = [0, *(place.stop for place in row.places.values())]
+    assert [place.start for place in row.places.values()] == ends[:-1] and ends[-1] == row.width
 
 
 def test_points_of_a_checkpoint_keep_them(result, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 from tests.coupling.sweep.test_continuation import BISTABLE, DAMPING, EPS, HALF_GAP, one_to_one
 from tests.studies.report.test_report import charts
+from tests.tools.changed import changed
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.steady_states import is_start, steady_states
 from vanedamp.coupling.sweep.sweep import sweep
@@ -69,12 +70,12 @@ def test_states_are_told_apart_by_what_does_not_depend_on_the_last_period(basin)
         }.items()
     }  # fmt: skip
     by_position = lambda record, **options: steady_states(record, **options).label[0, 0].tolist()  # noqa: E731
-    periodic = replace(basin, amplitude_mean_dynamic=amplitude, **plain)
+    periodic = changed(basin, amplitude_mean_dynamic=amplitude, **plain)
     assert by_position(periodic) == [0, 0, 0, 1, 2]
     assert by_position(periodic, tolerance=0.001) == [0, 1, 2, 3, 4]
     chaotic = replace(periodic, classification=np.full(basin.shape, "non-periodic", object))
     assert by_position(chaotic) == [0, 0, 0, 0, 1]
-    impacts = replace(periodic, impacts_per_period=np.broadcast_to([2.0, 2.0, 3.0, 2.0, 2.0], basin.shape))
+    impacts = changed(periodic, impacts_per_period=np.broadcast_to([2.0, 2.0, 3.0, 2.0, 2.0], basin.shape))
     assert sorted(set(by_position(impacts))) == [0, 1, 2, 3]
     other = plain["classification"].copy()
     other[..., 1] = "periodic-4"
@@ -101,7 +102,8 @@ def test_report_shows_basins_and_how_many_states_there_are(basin, tmp_path):
     counted.save(tmp_path / "counted.h5")
     starts = replace(
         basin, axes={path: basin.axes[path] for path in BASIN if path != "excitation.frequency"}, peaks={},
-        **{name: getattr(basin, name)[:, 0] for name in vars(basin) if np.ndim(getattr(basin, name)) >= 3},
+        **{name: getattr(basin, name)[:, 0] for name in ("status", "classification")},
+        quantities={name: values[:, 0] for name, values in basin.quantities.items()},
     )  # fmt: skip
     starts.save(tmp_path / "starts.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")

@@ -10,10 +10,11 @@ import pytest
 import tomli_w
 
 from tests.studies.report.test_forced_response import made
+from tests.tools.changed import changed
+from vanedamp.coupling.quantities.quantity import family
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.designs import is_choice
-from vanedamp.coupling.sweep.sweep import MEASURES
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import worst_start as module
 from vanedamp.studies.cli import main
@@ -143,7 +144,7 @@ def test_order_by_plain_loops(seed):
 
 def test_one_start_is_said():
     axes = {"cavity.c1.gap": [1e-5, 2e-5], "excitation.frequency": [1.0, 2.0, 3.0]}
-    sweep = made(axes, **{name: np.ones((2, 3)) for name in MEASURES})
+    sweep = made(axes, **{one.name: np.ones((2, 3)) for one in family("amplitude")})
     assert all(design.sentence.endswith("; one start only") for design in designs(forced_responses(sweep)))
 
 
@@ -151,7 +152,7 @@ def test_files_that_differ_in_their_start_have_one_design():
     axes = {"excitation.frequency": [1.0, 2.0, 3.0]}
     low = made(axes, amplitude_mean_dynamic=np.array([0.1, 0.2, 0.1]), amplitude_undamped=np.ones(3))
     up = replace(low.scene, continuation=replace(low.scene.continuation, direction="up"))
-    high = replace(low, scene=up, amplitude_mean_dynamic=np.array([0.1, 0.6, 0.1]))
+    high = changed(low, scene=up, amplitude_mean_dynamic=np.array([0.1, 0.6, 0.1]))
     (design,) = designs([*forced_responses(low), *forced_responses(high)])
     assert (design.starts, design.worst.headline.peak_ratio) == (2, 0.6)
     heavy = replace(high, scene=low.scene.replace({"damper.mass": 0.07}))

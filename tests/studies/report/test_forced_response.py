@@ -9,9 +9,10 @@ import pytest
 import tomli_w
 import xarray
 
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.store import finite
 from vanedamp.files.toml_input import validate
@@ -31,9 +32,12 @@ def made(axes, **curves):
     """A sweep over these axes with given measures, all others zero."""
     shape = tuple(len(values) for values in axes.values())
     scene = validate(Scene, DATA | {"sweep": {path: list(values) for path, values in axes.items()}}, "scene.toml")
-    arrays = {name: np.zeros(shape) for name in MEASURES} | {"energy_share": np.full((*shape, len(LOSSES)), 0.25)}
+    row = Row(scene)
+    arrays = row.arrays(np.zeros((int(np.prod(shape)), row.width)), shape)
+    arrays["energy_share"] = np.full(arrays["energy_share"].shape, 0.25)
+    arrays |= {name: curves.pop(name) for name in table().keys() & curves.keys()}
     texts = {"status": np.full(shape, "ok", object), "classification": np.full(shape, "periodic-1", object)}
-    return Sweep(scene, {path: np.asarray(values) for path, values in axes.items()}, **arrays | texts | curves)
+    return Sweep(scene, {path: np.asarray(values) for path, values in axes.items()}, arrays, **texts | curves)
 
 
 def test_curve_along_the_frequency():
@@ -63,7 +67,7 @@ def test_onset_is_where_walls_are_hit():
     """A block that hits its floor from the second point on, and a wall from the third."""
     curve, walls = np.ones(3), np.array([[0.0], [0.0], [1.0]])
     curves = {"amplitude_undamped": curve, "amplitude_mean_dynamic": curve, "impacts_per_period": np.arange(3.0)}
-    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, in_plane={"wall_impacts": walls}, **curves)
+    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, wall_impacts=walls, **curves)
     found = forced_responses(sweep)[0].headline
     assert (found.onset, found.touched_below) == (3.0, 2.0)
 
