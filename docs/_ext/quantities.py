@@ -18,6 +18,8 @@ KINDS = {
     "run": "vanedamp.coupling.response.response:NOT_IN_RUNS",
     "sweep": "vanedamp.coupling.sweep.row:NOT_IN_SWEEPS",
     "ensemble": "vanedamp.coupling.ensembles.record:NOT_IN_ENSEMBLES",
+    "ramp": "vanedamp.coupling.transients.no_meaning:NOT_IN_RAMPS",
+    "ring-down": "vanedamp.coupling.transients.no_meaning:NOT_IN_RING_DOWNS",
 }
 
 

@@ -174,7 +174,7 @@ def test_what_a_motion_lacks_is_what_has_no_meaning(tmp_path):
     for kind, reasons in ((found, NOT_IN_RAMPS), (rung, NOT_IN_RING_DOWNS)):
         wanted = {name for name, one in table().items() if one.exists(sources) and has_meaning(one, reasons)}
         assert set(kind.quantities) == wanted
-        known = {name for one in table().values() for name in one.needs}
+        known = {name for one in table().values() for name in (one.name, *one.needs, *one.dims)}
         assert reasons.keys() <= known
         kind.save(tmp_path / "kind.h5")
         again = type(kind).load(tmp_path / "kind.h5")
