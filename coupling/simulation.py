@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vanedamp.coupling.methods.registry import WALLS, respond
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, amplitude_mean_dynamic
+from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.response.by_sector import sectors
 from vanedamp.coupling.response.evaluation import Fields, Observer, Outcome
 from vanedamp.coupling.response.moved_start import Mean, moved
@@ -60,12 +63,24 @@ def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0
         WALLS,
         samples(samples_per_period),
         *([EVENT_LIST] if events else []),
-        *([] if scene.wear is None else [wear(scene)]),
-        *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
+        *parts_of(scene),
         *([] if spots is None else [StressObserver(spots, samples_per_period)]),
-        *([CONTACTS] if wanted(scene) else []),
         TOGETHER,
     ]
+
+
+def parts_of(scene: Scene) -> list[Observer]:
+    """Return what keeps the parts that quantities of any motion of a scene need: wear, sectors, contact strength."""
+    return [
+        *([] if scene.wear is None else [wear(scene)]),
+        *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
+        *([CONTACTS] if wanted(scene) else []),
+    ]
+
+
+def exponent_of(observers: Sequence[Observer]) -> float | None:
+    """Return the exponent of the energies of impacts that observers need; None: none."""
+    return next((one.needs.exponent for one in observers if one.needs.exponent is not None), None)
 
 
 def _from_moved(
@@ -75,7 +90,8 @@ def _from_moved(
 
     None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
     """
-    hit = known["impacts_per_period"] or run.counters.get("impacts")  # the transient's choose a state as well
+    # those of the transient choose a state as well
+    hit = known["quantities"][impacts_per_period.name] or run.counters.get("impacts")
     if known["status"] is not Status.OK or not hit or not scene.damper:
         return {}
     tolerance = 2 * scene.time.tolerance
@@ -86,16 +102,16 @@ def _from_moved(
     else:
         start = replace(start, slip=frozen(places))
     try:
-        second = vars(respond(scene, start=start, progress=progress))
+        second = respond(scene, start=start, progress=progress)
     except InputError:  # a tilted body at a wall
         return {}
-    one, other = (_mean(each) for each in (known, second))
+    one, other = _mean(known["status"], known["quantities"]), _mean(second.status, second.quantities)
     agrees = one.agrees(other, tolerance)
-    names = "amplitude_mean_dynamic", "amplitude_mean_confidence", "impacts_per_period", "classification"
-    results = {"agrees": agrees, "status": other.status} | {name: second[name] for name in names}
+    names = (amplitude_mean_dynamic.name, amplitude_mean_confidence.name, impacts_per_period.name, "classification")
+    results = {"agrees": agrees, "status": other.status} | {name: getattr(second, name) for name in names}
     return {"moved_start": results, "warnings": () if agrees else (one.sentence(other),)}
 
 
-def _mean(found: Fields) -> Mean:
-    confidence = found["amplitude_mean_confidence"]
-    return Mean(found["status"].value, found["amplitude_mean_dynamic"], math.nan if confidence is None else confidence)
+def _mean(status: Status, found: Mapping[str, Any]) -> Mean:
+    mean, confidence = (found[one.name] for one in (amplitude_mean_dynamic, amplitude_mean_confidence))
+    return Mean(status.value, mean, math.nan if confidence is None else confidence)

@@ -235,7 +235,7 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
     energy = {name: float(value) for name, value in sums["energy"].items()}
     status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
     if run.plane is not None:
-        in_plane = _in_plane(run.plane, slice(first, done))
+        in_plane = in_plane_of(run.plane, slice(first, done))
         status = Status.TILTED if _tilted(in_plane, run.plane.bound) and status in _USABLE else status
         sums |= in_plane
     section, b = records.section[: done + 1], system.bodies
@@ -255,7 +255,7 @@ def closed_status(status: Status, imbalance: float, gain: float, bound: float) -
     return Status.ENERGY if not closed and status in _USABLE else status
 
 
-def _in_plane(plane: Plane, window: slice) -> dict[str, np.ndarray]:
+def in_plane_of(plane: Plane, window: slice) -> dict[str, np.ndarray]:
     """Return what quantities need of planar bodies (b,), over the evaluated periods; nan for sliders."""
     slider = np.where(np.isnan(plane.neglected), np.nan, 1.0)
     return {

@@ -26,11 +26,11 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import at_speed_of, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.scene_record import SceneCheckpoint
-from vanedamp.coupling.response.static_deflection import about_mean, deflects
+from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.simulation import exponent_of, parts_of, simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
 from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble, at_frequency
@@ -44,6 +44,8 @@ from vanedamp.coupling.system.linear_response import (
 )
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS
+from vanedamp.coupling.transients.periods import Periods, spots_of_periods
 from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
 from vanedamp.coupling.transients.ramp_record import CURVES, WORKS, Ramp, RampRun
 from vanedamp.files.store import Variable, frozen
@@ -57,6 +59,8 @@ _UNSEEN = 1e-11
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 #: fraction of the range over which the detuning of a resonance is differentiated
 _STEP = 1e-4
+#: periods whose linear amplitudes are found together
+_TOGETHER = 10_000
 
 
 class _Checkpoint(SceneCheckpoint):
@@ -166,7 +170,7 @@ class _Run:
         p, b = len(course.time), self.system.bodies
         travel = {cavity.name: cavity.gap for cavity in scene.cavity}
         self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
-        self.amplitude, self.dynamic, self.impacts, self.collided = np.zeros((4, p))
+        self.periods, self.linear, self.collided = Periods(scene, NOT_IN_RAMPS), np.full((2, p), np.nan), np.zeros(p)
         ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
         self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
@@ -181,7 +185,9 @@ class _Run:
     def advance(self) -> Iterator[int]:
         """Run all periods, or until one fails (`status`). Yields the number of those done."""
         for k in range(len(self.course.time)):
-            run = self._begin(k)
+            earlier, run = self.run, self._begin(k)
+            if earlier is not None and self.scene.yields and run.advance_to(0) is Status.OK:
+                _carry_impulses(run, earlier)
             self.status = run.advance_to(1)
             if self.status is not Status.OK:
                 return
@@ -206,13 +212,20 @@ class _Run:
         solver: Any = self.scene.solver
         scene, system = self.scene, self.system
         each = 0 if self.stress is None else self.stress.each
-        records = new_records(system, 1, each, self.stress is not None, self.deflected)
+        records = new_records(
+            system, 1, each, self.stress is not None, self.deflected, exponent_of(parts_of(scene)), outputs=True
+        )
         left = solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)
         reuse_subsystems(run, self.run)
         self.run = run
         return run
+
+    def _scene_of(self, k: int) -> Scene:
+        """Return the scene of period k; the one of another frequency will do where nothing reads that."""
+        reads = not self.over_speed and (self.scene.wear is not None or self.system.outputs.size)
+        return scene_at(self.scene, self.table, float(self.course.value[k])) if reads else self.scene
 
     def _record(self, k: int, outcome: Outcome) -> None:
         records, b = outcome.records, self.system.bodies
@@ -227,10 +240,13 @@ class _Run:
         self.ledger[k + 1] = ended
         self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
         self.ledger[k + 1, STORED] -= self.rotation
-        self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
+        self.collided[k] = records.collided[0]
+        self.periods.add(self._scene_of(k), outcome)
+        if self.over_speed and self.scene.excitation.signal is None:
+            at = self.course.frequency[k : k + 1]
+            self.linear[:, k] = [one.amplitude(at)[0] for one in linear_responses(self.scene, self.system)]
         if self.spots is not None and self.stress is not None:
             self.stress.add(self.spots.stress(records.coordinates))
-        self.dynamic[k] = about_mean(records, 0, 1, self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
         self.stuck[k] = slow.all(axis=0) & same & ~named_bodies(outcome.rows, outcome.log, b)
@@ -252,19 +268,35 @@ class _Run:
         works = *change[:STORED], self.rotation, change[STORED] + self.rotation
         return RampRun(
             rate=course.rate, status=status.value, time=course.time[:p], frequency=course.frequency[:p],
-            speed=course.speed[:p], amplitude=frozen(self.amplitude[:p]),
-            amplitude_dynamic=frozen(self.dynamic[:p]), impacts=frozen(self.impacts[:p]),
-            stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
+            speed=course.speed[:p], stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
             velocity=frozen(self.section[: p + 1, 1]),
             energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
-            **self._of_spots(),
+            **self._measured(p),
         )  # fmt: skip
 
-    def _of_spots(self) -> dict[str, Any]:
-        """Return stress and strength of the periods done; the mean stress is that of the speed where it is largest."""
-        if self.spots is None or self.stress is None or not self.done:
-            return {}
-        return {"stress": frozen(self.stress.amplitudes()), "strength": self.stress.strengths([self.spots])}
+    def _measured(self, p: int) -> dict[str, Any]:
+        """Return quantities, stress and strength of the p periods done.
+
+        The mean stress is that of the speed where it is largest.
+        """
+        if not self.over_speed and self.scene.excitation.signal is None:
+            for begin in range(0, p, _TOGETHER):
+                some = slice(begin, min(begin + _TOGETHER, p))
+                self.linear[:, some] = linear_amplitudes(self.scene, self.course.frequency[some])
+        further: dict[str, Any] = dict(zip(("undamped", "fixed"), self.linear[:, :p], strict=True))
+        of_spots: dict[str, Any] = {}
+        if self.spots is not None and self.stress is not None and p:
+            strength = self.stress.strengths([self.spots])
+            of_spots = {"stress": frozen(self.stress.amplitudes()), "strength": strength}
+            further["stress"] = spots_of_periods(self.stress, strength)
+        return {"quantities": self.periods.quantities(further), **of_spots}
+
+
+def _carry_impulses(run: Any, earlier: Any) -> None:
+    """Let compliant contacts that stay closed over the end of a period keep the impulses since they closed."""
+    for name in ("contact_impulse", "pushed"):  # of the engines of sliders, and of planar bodies
+        if hasattr(run.state, name):
+            getattr(run.state, name)[:] = getattr(earlier.state, name)
 
 
 def _square(values: np.ndarray) -> float:

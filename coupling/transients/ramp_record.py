@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.response.records import ENERGIES
+from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
+from vanedamp.coupling.quantities.impacts import impacts_per_period
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
+from vanedamp.coupling.quantities.sums import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, has_meaning
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Own, Record
 from vanedamp.files.store import Variable, frozen
@@ -24,7 +29,11 @@ DIRECTIONS = ("up", "down")
 #: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
 #: series of a run, an entry per period, and their units
-SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "amplitude_dynamic": "m", "impacts": "1"}
+SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s"}
+#: quantities of a period that files have by names of their own
+NAMED = {
+    amplitude_max.name: "amplitude", amplitude_max_dynamic.name: "amplitude_dynamic", impacts_per_period.name: "impacts"
+}  # fmt: skip
 #: states at both ends of every period, and their units
 STATES = {"displacement": "m", "velocity": "m/s"}
 #: curves of the linear structure in steady state, and their units
@@ -32,17 +41,13 @@ CURVES = {"frequency": "Hz", "speed": "rad/s", "undamped": "m", "fixed": "m"}
 
 
 @dataclass(frozen=True, eq=False)
-class RampRun:
+class RampRun(Measured):
     """A run through p excitation periods with b bodies.
 
     rate             change of the ramp's quantity per second, below zero where it falls
     status           "ok", or another response.response.Status that ended the run early or spoils its results
     time             (p,) s, at the start of each period
     frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
-    amplitude        (p,) m, the largest |x| in it
-    amplitude_dynamic  (p,) m, the largest distance in it from the static deflection under the bodies' loads, which
-                     linear amplitudes leave out, too
-    impacts          (p,) in it
     stuck            (p, b) whether a body stays at rest in its cavity over the period
     displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
     energy           J by the names of WORKS, over the run
@@ -50,6 +55,9 @@ class RampRun:
     stress           (p, s, 8) Pa, amplitudes of stress in it at s hot spots, by response.spot_stress.MEASURES; None
                      without any
     strength         utilisation and damage of the run, by hot spot (strength.assessment); those without data left out
+    quantities       (p, ...) of each period, by name, attributes as well (docs/quantities.md), such as `amplitude_rms`
+                     or `wear_volume_rate`; what no period knows is left out
+    amplitude, amplitude_dynamic, impacts  (p,) those of NAMED by their names in files
     """
 
     rate: float
@@ -57,9 +65,6 @@ class RampRun:
     time: np.ndarray
     frequency: np.ndarray
     speed: np.ndarray
-    amplitude: np.ndarray
-    amplitude_dynamic: np.ndarray
-    impacts: np.ndarray
     stuck: np.ndarray
     displacement: np.ndarray
     velocity: np.ndarray
@@ -67,6 +72,43 @@ class RampRun:
     energy_residual: float
     stress: np.ndarray | None = None
     strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    quantities: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a quantity: also by its name in files."""
+        for quantity, named in NAMED.items():
+            if name == named:
+                return self.quantities.get(quantity, np.full(len(self.time), np.nan))
+        return super().__getattr__(name)
+
+    @property
+    def largest(self) -> dict[str, Any]:
+        """Largest value of each quantity in a period of the run, by name; angles of a wave have none."""
+        return {one.name: np.fmax.reduce(self.quantities[one.name]) for one in self._ordered}
+
+    @property
+    def mean(self) -> dict[str, Any]:
+        """Mean of each quantity over the time of the run, by name: of rates, what the run comes to per time."""
+        return {one.name: self._mean(self.quantities[one.name]) for one in self._ordered}
+
+    def _mean(self, values: np.ndarray) -> Any:
+        """Return the mean over the time of the periods that are known; nan without any."""
+        known = np.isfinite(values)
+        spans = known / self.frequency.reshape(-1, *[1] * (values.ndim - 1))
+        total = spans.sum(axis=0)
+        return np.where(known, values, 0.0).T @ (1.0 / self.frequency) / np.where(total > 0.0, total, np.nan).T
+
+    @property
+    def limits(self) -> list[tuple[Quantity, float, float]]:
+        """What is limited, such as wear, with its largest value in a period and its mean; stress is in `strength`."""
+        largest, mean = self.largest, self.mean
+        known = (one for name, one in table().items() if name in largest)
+        return [(one, float(largest[one.name]), float(mean[one.name])) for one in known if one.limited and not one.dims]
+
+    @property
+    def _ordered(self) -> list[Quantity]:
+        """Quantities whose values have an order."""
+        return [one for name in self.quantities if (one := table()[name]).unit != "rad" or one.dims]
 
     @property
     def direction(self) -> str:
@@ -89,8 +131,10 @@ class RampRun:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ramp(Record, Plotted):
+class Ramp(Measured, Record, Plotted):
     """Run-ups and run-downs of a scene with a [ramp] table.
+
+    Quantities of the periods are attributes, all runs one after the other.
 
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
     linear structure in steady state without bodies and with every body fixed in its cavity; tops: the peaks of both
@@ -108,6 +152,16 @@ class Ramp(Record, Plotted):
     tops: Mapping[str, float]
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def quantities(self) -> dict[str, np.ndarray]:  # type: ignore[override]
+        """Quantities of all periods (docs/quantities.md), run by run, nan where a run knows none."""
+        known = {name: run.quantities[name].shape[1:] for run in self.runs for name in run.quantities}
+
+        def of(run: RampRun, name: str) -> np.ndarray:
+            return run.quantities.get(name, np.full((len(run.time), *known[name]), np.nan))
+
+        return {name: frozen(np.concatenate([of(run, name) for run in self.runs])) for name in table() if name in known}
 
     @property
     def table(self) -> Table:
@@ -141,8 +195,10 @@ class Ramp(Record, Plotted):
             } | ({} if run.stress is None else {"stress": self.tops_of_stress(run), "strength": self.strength(run)})
             for run in self.runs
         ]  # fmt: skip
+        measured = [{"largest": _plain(run.largest), "mean": _plain(run.mean)} for run in self.runs]
         return {
             "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
+            "quantities": measured,
         }  # fmt: skip
 
     def tops_of_stress(self, run: RampRun) -> dict[str, dict[str, float]]:
@@ -173,9 +229,14 @@ class Ramp(Record, Plotted):
             return np.concatenate([getattr(run, name) for run in runs])
 
         periods = [len(run.time) for run in runs]
+        measured = {
+            NAMED.get(name, name): Variable(values, ("period", *table()[name].dims), table()[name].unit)
+            for name, values in self.quantities.items()
+        }
         found = {
             "run_of_period": Variable(np.repeat(np.arange(len(runs)), periods), ("period",)),
             **{name: Variable(joined(name), ("period",), units) for name, units in SERIES.items()},
+            **measured,
             "run_of_start": Variable(np.repeat(np.arange(len(runs)), np.add(periods, 1)), ("start",)),
             **{name: Variable(joined(name), ("start",), units) for name, units in STATES.items()},
             "rate": Variable([run.rate for run in runs], ("run",), unit),
@@ -194,6 +255,8 @@ class Ramp(Record, Plotted):
             none = np.zeros((0, len(spots), len(MEASURES)))
             stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
             found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
+        own = {dim for name in self.quantities for dim in table()[name].dims if labels(dim)}
+        found |= {dim: Variable(np.array(labels(dim), object), (dim,)) for dim in own}
         if dampers:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
@@ -219,6 +282,11 @@ class Ramp(Record, Plotted):
                     energy_residual=float(values["energy_residual"][number]),
                     stress=frozen(values["stress"][inside]) if "stress" in values and inside.any() else None,
                     strength=strength.get(str(number), {}),
+                    quantities={
+                        name: frozen(values[NAMED.get(name, name)][inside])
+                        for name, one in table().items()
+                        if inside.any() and NAMED.get(name, name) in values and has_meaning(one, NOT_IN_RAMPS)
+                    },
                     **{name: frozen(values[name][inside]) for name in SERIES},
                     **{name: frozen(values[name][starts]) for name in STATES},
                 )
@@ -231,3 +299,8 @@ class Ramp(Record, Plotted):
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as; with the quantity."""
         return super().to_xarray().assign_attrs(quantity=self.table.quantity)
+
+
+def _plain(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return quantities as plain data."""
+    return {name: np.asarray(value, float).tolist() for name, value in found.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.linalg import eigh
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
+from vanedamp.coupling.quantities.quantity import table as quantities
 from vanedamp.coupling.response.evaluation import Ended, evaluate
 from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
@@ -23,6 +25,7 @@ from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import exponent_of, parts_of
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
 from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble
@@ -31,6 +34,8 @@ from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import Followed, TurningPoint, TurningPoints, without_rebounds
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS, has_meaning
+from vanedamp.coupling.transients.periods import Periods, single_periods, spots_of_periods
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
 from vanedamp.files.store import frozen
@@ -44,6 +49,7 @@ _STILL = 1e-12
 _NO_MOTION: dict[str, Any] = {
     **dict.fromkeys(("time", "displacement", "energy", "structure_energy"), frozen(())), "impacts": frozen((), int),
     "rest_time": None, "energies": {}, "energy_residual": 0.0,
+    "quantities": {}, "course": {}, "warnings": (),
 }  # fmt: skip
 
 
@@ -75,10 +81,11 @@ def ring_down(
         )
         status = ended if status is Status.OK else status
     spots = hot_spots_in_file(free.structure)
+    motion = motion | {"warnings": chosen.warnings + motion["warnings"]}
     return RingDown(
         scene=scene, status=status, linear=_linear(system, mode), duration=periods * system.period, **motion,
         drive=None if drive is None else _of_drive(drive), wall_time_s=time.perf_counter() - began,
-        estimate=chosen.estimate, advice=chosen.advice, warnings=chosen.warnings,
+        estimate=chosen.estimate, advice=chosen.advice,
         provenance=dict(provenance or {}) | ({"hot_spots": spots} if spots else {}),
     )  # fmt: skip
 
@@ -140,10 +147,12 @@ def _free_motion(
     """Return how the free motion from a state ended, and the fields of RingDown that describe it."""
     began, periods = time.perf_counter(), free.time.simulated
     options: Any = free.solver
-    spots = spots_of(free)
+    spots, parts = spots_of(free), parts_of(free)
     own = np.sqrt(system.of_structure.stiffness[mode]) / system.omega
     each = 0 if spots is None else max(samples_of(free, system, spots), OF_HARMONIC * math.ceil(own))
-    records = new_records(system, periods, each, spots is not None, deflects(free, system))
+    records = new_records(
+        system, periods, each, spots is not None, deflects(free, system), exponent_of(parts), outputs=True
+    )
     begun = start_of(free, system, start)
     run = engine_run(system, begun, records, True, options.max_events, options.linearisation)
     walk, turning, done = Walk(run, periods), TurningPoints(), 0
@@ -152,22 +161,35 @@ def _free_motion(
         if segment.period > done:
             report(done := segment.period)
     outcome = run.outcome()
-    response = evaluate(free, outcome, Ended(walk.status, 0), began, [EVENT_LIST])
+    response = evaluate(free, outcome, Ended(walk.status, 0), began, [EVENT_LIST, *parts])
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
     of_spots: dict[str, Any] = {}
+    of_periods: dict[str, Any] = {}
     if spots is not None and outcome.periods:
         series = StressSeries(spots, each)
         for samples in np.split(records.coordinates[: outcome.periods * each], outcome.periods):
             series.add(spots.stress(samples))
         of_spots = {"stress": frozen(series.amplitudes()), "strength": series.strengths()}
+        of_periods["stress"] = spots_of_periods(series, of_spots["strength"])
+        response = replace(response, stress=tuple(spots_of_periods(series, of_spots["strength"], whole=True)))
+    course = Periods(free, NOT_IN_RAMPS | NOT_IN_RING_DOWNS)
+    for one in single_periods(outcome):
+        course.add(free, one)
     ledger = outcome.records.ledger[: outcome.periods + 1]
-    parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
+    energies = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
     return response.status, {
         "time": frozen(moments), "displacement": frozen(system.response[mode] * coordinate), "energy": frozen(energy),
         "structure_energy": frozen(structure), "impacts": frozen(np.diff(np.searchsorted(hit, moments)), int),
-        **of_spots,
-        "rest_time": None if turning.rest is None else turning.rest.time,
-        "energies": dict(zip(PARTS, map(float, parts), strict=True)), "energy_residual": response.energy_residual,
+        **of_spots, "quantities": _measured(response), "course": course.quantities(of_periods),
+        "warnings": response.warnings, "rest_time": None if turning.rest is None else turning.rest.time,
+        "energies": dict(zip(PARTS, map(float, energies), strict=True)), "energy_residual": response.energy_residual,
     }  # fmt: skip
+
+
+def _measured(response: Response) -> dict[str, Any]:
+    """Return the quantities of the whole motion that have a meaning for it, and that are known."""
+    found = {name: getattr(response, name) for name, one in quantities().items() if has_meaning(one, NOT_IN_RING_DOWNS)}
+    known = {name: np.asarray(value, float) for name, value in found.items() if value is not None}
+    return {name: frozen(value)[()] for name, value in known.items() if np.isfinite(value).any()}

@@ -9,13 +9,14 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Record
+from vanedamp.files.record import Array, Columns, Record
 from vanedamp.files.store import Variable
 
 #: energies of a ring-down: at its start, lost, and at its end
@@ -37,8 +38,11 @@ class LinearMode:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingDown(Record, Plotted):
-    """The free motion of one natural mode, by its k turning points; in JSON, names have units."""
+class RingDown(Measured, Record, Plotted):
+    """The free motion of one natural mode, by its k turning points; in JSON, names have units.
+
+    Quantities of the whole motion are attributes (docs/quantities.md).
+    """
 
     KIND: ClassVar[str] = "ring_down"
     IN_JSON = ("status", "energy_residual", "drive", "wall_time_s", "warnings")
@@ -84,6 +88,11 @@ class RingDown(Record, Plotted):
     strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """utilisation and damage of the motion, by hot spot (strength.assessment)"""
 
+    quantities: Annotated[Mapping[str, Any], Columns(table)] = field(default_factory=dict)
+    """of the whole free motion, by name; what is not known, or has no meaning without an excitation, is left out"""
+    course: Annotated[Mapping[str, np.ndarray], Columns(table, ("period",), "period_")] = field(default_factory=dict)
+    """(p, ...) the same of each of the periods of `duration`"""
+
     @property
     def table(self) -> RingDownTable:
         """The scene's [ring_down] table."""
@@ -114,6 +123,27 @@ class RingDown(Record, Plotted):
             "damping_ratio_energy": bins(whole.amplitude, whole.damping_ratio_energy, edges, stride),
         }
 
+    @property
+    def numbers(self) -> list[tuple[Quantity, float]]:
+        """Quantities that are one number, with it."""
+        return [
+            (one, float(self.quantities[name]))
+            for name, one in table().items()
+            if name in self.quantities and not one.dims
+        ]
+
+    def labels(self) -> dict[str, Any]:
+        """Return the names along dimensions that have some."""
+        dims = {dim for name in (*self.quantities, *self.course) for dim in table()[name].dims}
+        return {dim: labels(dim) for dim in dims if labels(dim)}
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> RingDown:
+        """Return the record in the variables and attributes of a file."""
+        given = cls.given(values, attributes, path)
+        given["quantities"] = {name: value[()] for name, value in given["quantities"].items()}
+        return cls(**given)
+
     def derived(self) -> dict[str, Any]:
         """Return turning points, half cycles, cycles and bins, and further numbers by names with units."""
         half, whole = self.half_cycles, self.cycles
@@ -141,6 +171,8 @@ class RingDown(Record, Plotted):
                 spot: {name: self.stress[:, place, MEASURES.index(name)].tolist() for name in SCALARS}
                 for place, spot in enumerate(self.provenance["hot_spots"])
             }
+        if self.quantities:
+            data["quantities"] = {name: np.asarray(value).tolist() for name, value in self.quantities.items()}
         if self.table.bins:
             data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
         if self.strength:
@@ -165,7 +197,9 @@ class RingDown(Record, Plotted):
         }
         if self.stress is not None:
             found |= stress_axes(list(self.provenance["hot_spots"]))
-            found["period_time"] = Variable(np.arange(len(self.stress)) / self.scene.frequency, ("period",), "s")
+        if self.stress is not None or self.course:
+            count = len(next(iter(self.course.values())) if self.stress is None else self.stress)
+            found["period_time"] = Variable(np.arange(count) / self.scene.frequency, ("period",), "s")
         if self.table.bins:
             for name, each in self.bins.items():
                 units = {"low": "m", "high": "m", "number": "1"}

@@ -20,6 +20,9 @@ KINDS = {
     "ensemble": "vanedamp.coupling.ensembles.record:NOT_IN_ENSEMBLES",
     "orbit, branch": "vanedamp.coupling.orbits.orbit_quantities:NOT_IN_ORBITS",
     "border": "vanedamp.coupling.orbits.orbit_quantities:NOT_IN_BORDERS",
+    "ramp": "vanedamp.coupling.transients.no_meaning:NOT_IN_RAMPS",
+    "ring-down": "vanedamp.coupling.transients.no_meaning:NOT_IN_RING_DOWNS",
+    "derivative": "vanedamp.coupling.sensitivity.sensitivity_record:NOT_IN_DERIVATIVES",
 }
 
 

@@ -60,6 +60,8 @@ def _summary(result: RingDown) -> Iterator[str]:
                 f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
                 f"{plus_minus(facts.get('error'))}"
             )
+    for one, value in (each for each in result.numbers if each[0].limited):
+        yield f"{one.name}: {value:.4g} {one.unit} ({one.about})"
     yield from strength_lines(result.strength)
     if result.rest_time is not None:
         place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.studies.facts import Fact, Found
 
@@ -15,9 +17,13 @@ RECORD = "vanedamp.Ramp"
 
 def facts(record: Found) -> Iterator[Fact]:
     """Yield its figures."""
-    found = Ramp.load(record.path).to_json()
+    ramp = Ramp.load(record.path)
+    found = ramp.to_json()
     yield Fact("runs", [
         f"{abs(run['rate']):g} {found['unit']}/s {run['direction']}: {run['status']}, peak {run['peak']:.6g} m at "
         f"{run['peak_frequency']:.6g} Hz, {run['peak_share']:.1%} of the steady peak without bodies"
         for run in found["runs"]
     ])  # fmt: skip
+    known = {one.name: one for run in ramp.runs for one, _, _ in run.limits}
+    for name, one in known.items():
+        yield Fact(name, [float(run.largest.get(name, np.nan)) for run in ramp.runs], one.unit, f"{one.about}; at most")

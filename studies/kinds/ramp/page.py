@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
@@ -50,6 +51,7 @@ def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
         {"name": run_name(ramp, run), "run": run, "share": ramp.share(run), "at": run.at_peak("frequency")}
         for run in ramp.runs
     ]
+    chosen = menu(ramp)
     return {
         "record": ramp,
         "along": along(ramp),
@@ -59,6 +61,8 @@ def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
         "chart": page.chart("ramp", figure(ramp, named), *_ramp_table(ramp), [file, *beside]),
         "peaks": page.chart("peaks", peaks_figure(ramp), *_peaks_table(ramp), [file]),
         "stress": _stress_chart(file, ramp, page),
+        "limits": [(run_name(ramp, run), *limit) for run in ramp.runs for limit in run.limits],
+        "measured": chosen and page.chart("quantities", chosen, *_measured_table(ramp), [file]),
     }
 
 
@@ -115,6 +119,48 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
     figure.update_xaxes(title_text=_TITLES[x], hoverformat=".6g")
     figure.update_yaxes(title_text="amplitude, µm", rangemode="tozero")
     return dressed(figure, height=520)
+
+
+def menu(ramp: Ramp) -> go.Figure | None:
+    """Draw one quantity of the periods at a time, which a menu chooses; None for files of earlier versions."""
+    shown = [one for name in ramp.quantities if not (one := table()[name]).dims]
+    if not shown or not any(len(run.time) for run in ramp.runs):
+        return None
+    figure, x = go.Figure(), along(ramp)
+    for one in shown:
+        for number, run in enumerate(ramp.runs):
+            kept = _thinned(run)
+            values = run.quantities.get(one.name, np.full(len(run.time), np.nan))
+            figure.add_scatter(
+                x=getattr(run, x)[kept], y=values[kept], name=run_name(ramp, run), mode="lines",
+                visible=one is shown[0], line={"color": COLOURS[number % len(COLOURS)], "width": 1.6},
+                hovertemplate="%{x:.6g}: %{y:.5g}",
+            )  # fmt: skip
+    choices = [
+        {
+            "label": one.name, "method": "update",
+            "args": [
+                {"visible": [each is one for each in shown for _ in ramp.runs]},
+                {"yaxis.title.text": f"{one.name}, {one.unit}"},
+            ],
+        }
+        for one in shown
+    ]  # fmt: skip
+    figure.update_layout(updatemenus=[{"buttons": choices, "x": 0.0, "xanchor": "left", "y": 1.2, "yanchor": "top"}])
+    figure.update_xaxes(title_text=_TITLES[x], hoverformat=".6g")
+    figure.update_yaxes(title_text=f"{shown[0].name}, {shown[0].unit}")
+    return dressed(figure, height=460)
+
+
+def _measured_table(ramp: Ramp) -> Table:
+    """Return the quantities of the periods that are drawn."""
+    names = [name for name in ramp.quantities if not table()[name].dims]
+    rows: list[list[float]] = []
+    for run in ramp.runs:
+        nothing, kept = np.full(len(run.time), np.nan), _thinned(run)
+        columns = [run.time, *(run.quantities.get(name, nothing) for name in names)]
+        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+    return ["rate", "time", *names], rows
 
 
 def _thinned(run: RampRun) -> np.ndarray:

@@ -24,3 +24,5 @@ def facts(record: Found) -> Iterator[Fact]:
     yield Fact("amplitude", half.amplitude[[0, -1]].tolist() if len(half.time) else None, "m", "first and last")
     yield Fact("impacts", int(found.impacts.sum()))
     yield Fact("rest_time", found.rest_time, "s")
+    for one, value in found.numbers:
+        yield Fact(one.name, value, one.unit, one.about)

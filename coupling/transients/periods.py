@@ -1,0 +1,169 @@
+"""Quantities of motions that do not repeat: each of their periods is evaluated as a run of its own."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.quantities.quantity import Quantity, evaluated, table
+from vanedamp.coupling.quantities.sums import SUMS, sources_of
+from vanedamp.coupling.response.evaluation import Outcome, in_plane_of
+from vanedamp.coupling.response.figures import Measured, measure, measured_of
+from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT
+from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.simulation import parts_of
+from vanedamp.coupling.strength.contact_strength import CONTACTS
+from vanedamp.coupling.strength.haigh import utilisation, yield_utilisation
+from vanedamp.coupling.strength.stress_series import StressSeries
+from vanedamp.files.store import frozen
+
+
+class Periods:
+    """The periods of a motion, taken one after the other.
+
+    without: what quantities may not need. Sums are evaluated for all periods at once, other parts as they come; where
+    contacts yield, once the next period has told how the impacts end that a period leaves open.
+    """
+
+    def __init__(self, scene: Scene, without: Mapping[str, str]) -> None:
+        self._without, self._late = without, scene.yields
+        self._rows, self._planes = list[np.ndarray](), list[Mapping[str, np.ndarray]]()
+        self._of_parts = dict[Quantity, list[Any]]()
+        self._waiting: tuple[Scene, Outcome] | None = None
+        #: what figures need of the system, as long as it is the same but for the excitation's frequency
+        self._measured: Measured | None = None
+        self._J = np.zeros(0)
+
+    def add(self, scene: Scene, run: Outcome) -> None:
+        """Take a run of one period of a scene."""
+        row, system = np.empty(len(SUMS)), run.system
+        if self._measured is None or system.J is not self._J:
+            self._measured, self._J = measured_of(scene, system), system.J
+        clock = np.array([system.omega, system.period])
+        measured = self._measured._replace(clock=clock, frequency=system.frequency)
+        measure(measured, run.records, 0, 1, np.nan, row)
+        self._rows.append(row)
+        if run.plane is not None:
+            self._planes.append(in_plane_of(run.plane, slice(0, 1)))
+        self._finish(run)
+        self._waiting = scene, run
+        if not self._late:
+            self._finish(None)
+
+    def _finish(self, later: Outcome | None) -> None:
+        """Evaluate the parts of the period that waits."""
+        if self._waiting is None:
+            return
+        (scene, run), self._waiting = self._waiting, None
+        if later is not None:
+            run = replace(run, log=_ended(run, later.log))
+        if parts := _parts(scene, run):
+            if not self._of_parts:
+                self._of_parts = {one: [] for one in table().values() if one.exists(parts)}
+            for one, values in self._of_parts.items():
+                values.append(one.of(parts))
+
+    def quantities(self, further: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Return the quantities (p, ...) of the periods; what no period knows is left out.
+
+        further: what quantities need besides, (p,) each, and `stress` as `spots_of_periods` returns it.
+        """
+        self._finish(None)
+        count, rows = len(self._rows), np.array(self._rows)
+        if not count:
+            return {}
+        # sums are columns, beside which bodies have columns of their own
+        sources = {name: _columns(value) for name, value in (sources_of(rows) | dict(further)).items()}
+        for name in self._planes[0] if self._planes else ():
+            sources[name] = np.array([plane[name] for plane in self._planes])
+        known = {name: value for name, value in sources.items() if name not in self._without}
+        found: dict[str, Any] = {
+            name: np.moveaxis(value, -1, 0) if "stress" in table()[name].needs else value
+            for name, value in evaluated(known).items()
+        } | {one.name: np.array(values, float) for one, values in self._of_parts.items()}
+        return {
+            name: frozen(np.reshape(found[name], (count, *([-1] if one.dims else []))))
+            for name, one in table().items()
+            if name in found and np.isfinite(found[name]).any()
+        }
+
+
+def _columns(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _columns(one) for name, one in value.items()}
+    return value[:, None] if isinstance(value, np.ndarray) else value
+
+
+def _parts(scene: Scene, run: Outcome) -> dict[str, Any]:
+    """Return what quantities need of a run of one period besides its sums."""
+    ledger, found = run.records.ledger, dict[str, Any]()
+    known = {"transient": 0, "energy": {"friction": float(ledger[1, FRICTION] - ledger[0, FRICTION])}}
+    for observer in parts_of(scene):
+        # what is pressed beyond what Hertz' law can tell has no strength
+        found |= {"contacts": None} if observer is CONTACTS else {}
+        found |= observer.fields(scene, run, known)
+    return {name: value for name, value in found.items() if name not in ("warnings", "contact_work")}
+
+
+def _ended(run: Outcome, later: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
+    """Return the log of a period with the ends, in the log of the next one, of impacts that it leaves open."""
+    last = {int(entry[2]): entry[1] for log in run.log for entry in log if entry[1] in (IMPACT, DETACHES)}
+    ends: dict[int, np.ndarray] = {}
+    for entry in itertools.chain(*later):
+        row = int(entry[2])
+        if entry[1] == DETACHES and last.get(row) == IMPACT and np.isfinite(run.rows.spring[row]):
+            ends.setdefault(row, np.r_[entry[0] + run.system.period, entry[1:]])
+    return [*run.log, *([np.array(list(ends.values()))] if ends else [])]
+
+
+def single_periods(run: Outcome) -> Iterator[Outcome]:
+    """Yield the periods of a run as runs of their own."""
+    records, span = run.records, run.system.period
+    log = np.concatenate(run.log) if run.log else np.zeros((0, 1))
+    edges = np.searchsorted(log[:, 0], span * np.arange(run.periods + 1))
+    edges[0], edges[-1] = 0, len(log)
+    for k in range(run.periods):
+        own = log[edges[k] : edges[k + 1]].copy()
+        own[:, 0] -= k * span
+        arrays = (part[k : k + 2] if len(part) == len(records.peak) else part for part in records)
+        plane = run.plane
+        if plane is not None:
+            cut = {name: getattr(plane, name)[k : k + 1] for name in ("tilt", "lifted", "walls")}
+            plane = plane._replace(**cut)
+        yield replace(run, records=type(records)(*arrays), periods=1, log=[own] if len(own) else [], plane=plane)
+
+
+def spots_of_periods(
+    series: StressSeries, strengths: Mapping[str, Mapping[str, Any]], whole: bool = False
+) -> list[Any]:
+    """Return what quantities need of hot spots: of each period, (p,), or of the whole motion as of a run.
+
+    strengths: those of the motion (StressSeries.strengths), whose mean stress counts.
+    """
+    amplitudes, found = series.amplitudes(), list[Any]()
+    for place, (name, material) in enumerate(zip(series.spots.facts, series.spots.materials, strict=True)):
+        own = dict(zip(MEASURES, amplitudes[:, place].T, strict=True))
+        level = {measure: values.mean() if whole else values for measure, values in own.items()}
+        tops = {f"{scalar}_max": own[scalar].max() if whole else np.nan for scalar in SCALARS}
+        strength = dict.fromkeys(("utilisation", "yield_utilisation"), np.nan * level[SCALARS[0]])
+        if material is not None:
+            most, mean = strengths[name], strengths[name]["mean"]
+            strength["utilisation"] = utilisation(level[material.criterion], mean, material)
+            if whole:
+                strength["utilisation_max"] = most["utilisation"]
+            used = yield_utilisation(
+                own[material.criterion].max() if whole else level[material.criterion], mean, material
+            )
+            strength |= {} if used is None else {"yield_utilisation": used}
+        found.append(SimpleNamespace(
+            **{scalar: level[scalar] for scalar in SCALARS}, **tops, strength=strength, mean=[], static=None,
+            amplitude={measure: level[measure] for measure in MEASURES if whole and measure not in SCALARS},
+            undamped=None, fixed=None,
+        ))  # fmt: skip
+    return found
