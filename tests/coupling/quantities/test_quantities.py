@@ -21,6 +21,9 @@ from vanedamp.files.record import Columns, Record, declared
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import kinds
 from vanedamp.studies.cli import main
+from vanedamp.studies.optimisation.measures import Limits, check_measured
+from vanedamp.studies.report.page import write_report
+from vanedamp.studies.report.results import collect
 
 ROOT = Path(__file__).parents[3]
 SCENE = {
@@ -33,6 +36,9 @@ SCENE = {
     "time": {"periods": 60, "transient": 40},
 }
 
+#: a body that friction holds, and a run so short that neighbours stay together
+RESTS = {"damper": [SCENE["damper"][0] | {"friction": 0.2, "normal_load": 500.0}]}
+SHORT = {"periods": 6, "transient": 3}
 LONG = {"periods": 400, "transient": 300, "tolerance": 0.2}
 
 
@@ -88,6 +94,42 @@ def test_a_quantity_of_one_file_is_in_sweeps_and_ensembles(jerk, tmp_path):
     assert found.quantile[jerk].shape == (5, 3) and np.isfinite(found.quantile[f"peak_{jerk}"]).all()
 
 
+def test_a_quantity_of_one_file_is_in_orbits(jerk, tmp_path):
+    found = vd.orbits(scene(orbit={"from": 15.7, "to": 15.8, "max_points": 3, "start": "linear"}, **RESTS))
+    (branch,) = found.branches
+    expected = (2 * np.pi * branch.parameter) ** 3 * branch.amplitude_max
+    assert getattr(branch, jerk) == pytest.approx(expected, rel=1e-9)
+    found.save(tmp_path / "orbits.h5")
+    assert getattr(vd.Branches.load(tmp_path / "orbits.h5"), jerk) == pytest.approx(expected)
+    assert found.to_xarray()[jerk].attrs["units"] == "m/s^3"
+    assert getattr(vd.orbit_at(found), jerk) == pytest.approx(expected[0])
+
+
+def test_a_quantity_of_one_file_is_in_ramps_and_ring_downs(jerk, tmp_path):
+    found = vd.ramp(scene(ramp={"from": 15.0, "to": 15.5, "periods": 5}))
+    (run,) = found.runs
+    assert getattr(run, jerk) == pytest.approx((2 * np.pi * run.frequency) ** 3 * run.amplitude_max)
+    assert run.largest[jerk] == getattr(run, jerk).max() and found.to_xarray()[jerk].attrs["units"] == "m/s^3"
+    rung = vd.ring_down(scene(ring_down={"start": "steady", "periods": 30}))
+    assert rung.quantities[jerk] > 0.0 and rung.to_xarray().attrs.get(jerk, rung.quantities[jerk]) > 0.0
+
+
+def test_a_quantity_of_one_file_has_derivatives(jerk):
+    found = vd.sensitivity(scene(time=SHORT), ["excitation.frequency", "damper.0.mass"])
+    assert found.values[jerk] == pytest.approx((2 * np.pi * 15.9) ** 3 * found.values["amplitude_max"], rel=1e-9)
+    expected = (2 * np.pi * 15.9) ** 3 * found.derivatives["amplitude_max"]
+    expected[0] += 3 * found.values[jerk] / 15.9
+    assert found.derivatives[jerk] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_quantity_of_one_file_may_be_limited_and_is_on_the_page(jerk, tmp_path):
+    check_measured(scene(), jerk, Limits(quantities={jerk: 1e3}))
+    vd.sweep(scene(sweep={"excitation.frequency": [15.7, 15.9]})).save(tmp_path / "sweep.h5")
+    write_report(collect([tmp_path / "sweep.h5"]), tmp_path / "report.html")
+    assert f"{jerk}-0" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(reason(table()[jerk], kind) is None for kind in KINDS)
+
+
 def test_formulas_take_numbers_and_arrays_of_scenes_alike():
     rng = np.random.default_rng(1)
     rows = rng.uniform(0.5, 2.0, (7, len(SUMS)))
@@ -101,16 +143,6 @@ def test_sums_have_a_place_each():
     assert len({*SUMS}) == len(SUMS) and set(COMPLEX + ENERGIES).isdisjoint(
         sources_of(np.zeros(len(SUMS))).keys() - {*COMPLEX}
     )
-
-
-# where they are: what is not there is explained, and what is there is not
-
-
-def results():
-    """A record of each kind, of a scene that has as much as it can, and the quantities that it has."""
-    run = vd.simulate(scene())
-    found = {"run": {name for name in table() if getattr(run, name) is not None}}
-    return found
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -136,7 +168,12 @@ def product():
 
 UNITS = {"m", "1", "rad", "Pa", "N", "m/s", "m/h", "m^3/h", "W", "1/h", "1/s", "Hz", "J"}
 #: units of the keys of other tables: of measured data, and of contacts at one speed
-OTHERS = {"studies/identification/data.py", "coupling/contacts/numbers.py", "files/formats/lab_units.py"}
+OTHERS = {
+    "studies/identification/data.py",
+    "coupling/contacts/numbers.py",
+    "files/formats/lab_units.py",
+    "files/formats/lab_table.py",
+}
 
 
 def test_a_quantity_has_its_unit_in_one_file():
