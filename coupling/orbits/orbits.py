@@ -168,15 +168,14 @@ class _Search:
         if track is not None and self.to is not None:
             corners = itertools.product((self.low, self.to), (self.first_second, track.to))
             ends += [_at(centred(base), {path: one, track.parameter: two}) for one, two in corners]
-        self.warnings = warnings_of(ends[0])
+        self.first, self.warnings, choices = ends[0], warnings_of(ends[0]), None
         if leaves_open(base):
             choices = choices_of(ends, more=True)
-            made = [with_choices(end, choices) for end in ends]
-            ends, self.warnings = [each.scene for each in made], made[0].warnings
-        self.first = ends[0]
+            made = with_choices(ends[0], choices)
+            self.first, self.warnings = made.scene, made.warnings
         second = "" if track is None else track.parameter
         self._periods = 1 if self.table.wave else self.table.periods
-        self.map: PeriodMap = period_map(self.first, path, self._periods or 1, second)
+        self.map: PeriodMap = period_map(ends[0], path, self._periods or 1, second, choices)
 
     def _share(self, second: float) -> float:
         """Return where a value lies in the range of the second number, 0 to 1."""

@@ -6,9 +6,9 @@ The engine's motion is walked segment by segment, and with it the derivative of 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from vanedamp.coupling.derivatives.symmetry import Symmetry
 from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import check_waveform
-from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.model_order.choices import Choices, choices_of, with_choices
 from vanedamp.coupling.orbits.orbit_quantities import exponents_of, quantities_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response, Status
@@ -40,15 +40,16 @@ from vanedamp.files.toml_input import InputError
 class PeriodMap:
     """The period map of a scene, over excitation periods.
 
-    scene: with the map's parameter (a dotted path in it) at its value; scale: (k,) typical sizes of the coordinates,
-    the same along a branch, by which they are divided before they are compared; speed: of rotation whose modes those
-    of states are, rad/s; None: the scene's own; numbers: paths (P,) of the scene by which passages have derivatives;
-    wave: whether a passage ends, with its sectors shifted, after the part of a period in which a travelling wave comes
-    to the next one (derivatives.symmetry.wave_of): travelling waves are fixed points of it; begin: part of a period of
-    the excitation at which passages begin and end.
+    given: scene with the map's parameter (a dotted path in it) at its value, as it is written: one number of a ring
+    may be many of its sectors'; made: returns the scene that runs from it, without open choices; scale: (k,)
+    typical sizes of the coordinates, the same along a branch, by which they are divided before they are compared;
+    speed: of rotation whose modes those of states are, rad/s; None: the scene's own; numbers: paths (P,) of the
+    scene by which passages have derivatives; wave: whether a passage ends, with its sectors shifted, after the part
+    of a period in which a travelling wave comes to the next one (derivatives.symmetry.wave_of): travelling waves
+    are fixed points of it; begin: part of a period of the excitation at which passages begin and end.
     """
 
-    scene: Scene
+    given: Scene
     parameter: str
     periods: int
     scale: np.ndarray
@@ -56,8 +57,14 @@ class PeriodMap:
     numbers: tuple[str, ...] = ()
     wave: bool = False
     begin: float = 0.0
+    made: Callable[[Scene], Scene] = lambda given: given
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
     _earlier: list[EventRun] = field(default_factory=list, repr=False)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene that runs."""
+        return self.made(self.given)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -69,7 +76,9 @@ class PeriodMap:
 
     @cached_property
     def _numbers(self) -> Numbers | None:
-        return numbers_of(self.scene, self.numbers, self._dynamics, self.speed) if self.numbers else None
+        if not self.numbers:
+            return None
+        return numbers_of(self.given, self.numbers, self._dynamics, self.speed, derived=self.made)
 
     @cached_property
     def _event_names(self) -> EventNames:
@@ -115,7 +124,7 @@ class PeriodMap:
 
     def with_numbers(self, values: Mapping[str, float]) -> PeriodMap:
         """Return the map with numbers of its scene, by their paths, at values. Raises InputError as `at`."""
-        return replace(self, scene=self.scene.replace(values))
+        return replace(self, given=self.given.replace(values))
 
     def over(self, periods: int) -> PeriodMap:
         """Return the map of the same scene over another number of periods."""
@@ -217,21 +226,30 @@ class PeriodMap:
         return passage._replace(state=there, derivative=by_state, by_number=by_number)
 
 
-def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "") -> PeriodMap:
+def period_map(
+    scene: Scene, parameter: str = "excitation.frequency", periods: int = 1, second: str = "",
+    choices: Choices | None = None,
+) -> PeriodMap:  # fmt: skip
     """Return the map of a scene over excitation periods, with a number of it as parameter (dotted path).
 
-    second: another number that will change; bodies then begin in the middle of their cavities. Open choices of the
-    scene are made first. Raises InputError for a scene that the exact engine cannot run.
+    second: another number that will change; bodies then begin in the middle of their cavities. choices: of what the
+    scene leaves open; None: those that suit it. Raises InputError for a scene that the exact engine cannot run.
     """
     if scene.solver.method != "exact":
         raise InputError(
             f'solver.method: orbits are those of the exact engine, not of "{scene.solver.method}"; take "exact"'
         )
-    chosen = choose(scene).scene
+    made = partial(_made, choices_of([scene]) if choices is None else choices, bool(second))
+    chosen = made(scene)
     check_waveform(chosen, "exact")
     turns = (parameter in SPEEDS or second in SPEEDS) and isinstance(chosen.structure, Rom)
-    chosen = centred(chosen) if second else chosen
-    return PeriodMap(chosen, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None)
+    return PeriodMap(scene, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None, made=made)
+
+
+def _made(choices: Choices, moves: bool, scene: Scene) -> Scene:
+    """Return the scene that runs; moves: whether gaps may change in which bodies are to begin."""
+    chosen = with_choices(scene, choices).scene
+    return centred(chosen) if moves else chosen
 
 
 def centred(scene: Scene) -> Scene:

@@ -109,7 +109,7 @@ def labels(dim: str) -> tuple[str, ...]:
 
 
 class Measured:
-    """Base of records with `quantities`: an attribute each, and each family as a mapping."""
+    """Base of records with `quantities`: an attribute each, None where there is none; each family as a mapping."""
 
     quantities: Mapping[str, Any]
 
@@ -119,6 +119,8 @@ class Measured:
                 return self.quantities[name]
             if name in FAMILIES.own() or any(one.family == name for one in table().values()):
                 return {one.name: self.quantities[one.name] for one in family(name) if one.name in self.quantities}
+            if name in table():
+                return None
         raise AttributeError(f"{type(self).__name__} has no {name}", name=name, obj=self)
 
     def __dir__(self) -> Iterable[str]:

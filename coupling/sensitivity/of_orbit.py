@@ -110,7 +110,8 @@ def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.nd
 
 def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
     """Return the motion of a period map's scene from its section."""
-    return Motion(period_map.scene, paths, speed=period_map.speed, scale=scale, begin=period_map.begin)
+    moved = period_map.made, None, period_map.speed, scale, period_map.begin
+    return Motion(period_map.given, paths, *moved)
 
 
 def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:

@@ -9,6 +9,7 @@ import pytest
 import vanedamp as vd
 from tests.coupling.orbits.test_scenes import BODY, STOP
 from tests.tools.closed_form_scenes import ball, scene
+from tests.tools.rings import Chain
 from vanedamp.coupling.exponents.lyapunov import lyapunov
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.branch import Branches, stacked, unknown
@@ -189,3 +190,27 @@ def test_quantities_of_an_orbit_that_no_run_stays_on_are_unknown():
     lost = stacked([*(point.quantities for point in branch.points[:-1]), longer])
     assert unknown(branch) == ""
     assert unknown(replace(branch, quantities=lost)) == f"1 of 8 orbits have no quantities: {LEAVES}"
+
+
+def test_one_number_of_a_ring_is_that_of_all_its_sectors(tmp_path):
+    """Along branches and by derivatives, as in scenes that are written with it."""
+    model = Chain(sectors=4, damping_ratio=0.02).saved(tmp_path)
+
+    def ring(mass, **orbit):
+        return vd.Scene.of({
+            "structure": {"model": "ring", "file": str(model)},
+            "excitation": {"frequency": 300.0, "at": "tip", "force": 10.0},
+            "cavity": [{"name": "c", "gap": 1.0, "floor": "tip", "sectors": [0, 1]}],
+            "damper": [{"cavity": "c", "mass": mass, "friction": 1.0, "normal_load": 2.0}],
+            "time": {"periods": 40}, "orbit": {"start": "linear"} | orbit,
+        }, "ring")  # fmt: skip
+
+    below, orbit, above = (find_orbit(ring(mass)) for mass in (0.0499, 0.05, 0.0501))
+    slope = (above.sector_amplitude_mean - below.sector_amplitude_mean) / 2e-4
+    found = vd.sensitivity(orbit, ["damper.0.mass"])
+    turned = [found.derivatives[f"sector_amplitude_mean.{sector}"][0] for sector in range(4)]
+    assert found.status == "ok" and turned == pytest.approx(slope, rel=1e-4)
+    (branch,) = orbits(ring(0.05, **{"parameter": "damper.0.mass", "from": 0.05, "to": 0.06})).branches
+    end = find_orbit(ring(float(branch.parameter[-1])))
+    assert branch.parameter[-1] == 0.06
+    assert branch.sector_amplitude_mean[-1] == pytest.approx(end.sector_amplitude_mean, rel=1e-9)
