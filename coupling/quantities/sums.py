@@ -45,3 +45,5 @@ OF_MOTION = (*sources_of(np.zeros(len(SUMS))), "undamped", "fixed", "overlap")
 #: what bodies in the plane (b,) have: largest tilt, rad, time off the floor, s, impacts on walls, and what a tilt
 #: neglects over the smallest play, per square of it
 OF_PLANE = ("tilt", "lifted", "walls", "neglected")
+#: Poincare sections, as of a Response
+OF_SECTIONS = ("section", "slip", "slip_velocity", "transient")

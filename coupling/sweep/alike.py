@@ -25,10 +25,10 @@ from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Ring, Rom
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.sweep.grid import Points, PointTable
+from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.transient import Transient, most_periods
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
@@ -159,7 +159,7 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
         _LAST.key, _LAST.kind = key, None
         with suppress(InputError, ValueError):  # its own run says what is wrong
             chosen = maker.chosen(point)
-            settled = chosen.start is None and chosen.scene.time.steady is None and chosen.scene.wear is None
+            settled = chosen.start is None and chosen.scene.time.steady is None
             if settled and columned(chosen.scene, paths) == paths:  # other values may be in the way of a column
                 _LAST.kind = Kind(chosen.scene)
     return _LAST.kind
@@ -188,7 +188,7 @@ def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list
     telling = [values for path, values in kept.items() if path not in paths]
     telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
     keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)
-    if not paths or "exponents" in base.kept or isinstance(base.structure, Ring) or hot_spots_in_file(base.structure):
+    if not paths or Row(base).alone:
         yield from (([], [place]) for place in range(len(points)))
     elif linked:
         yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), keys.__getitem__))

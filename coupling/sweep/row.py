@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Quantity, labels, table
-from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE
+from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE, OF_SECTIONS
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.contact_strength import wanted
@@ -38,7 +38,7 @@ class Row:
         }  # fmt: skip
         parts = {
             OF_PLANE: base.planar, ("lyapunov",): "exponents" in base.kept, ("wear",): base.wear is not None,
-            ("section", "slip", "slip_velocity", "transient"): "sections" in base.kept,
+            OF_SECTIONS: "sections" in base.kept,
             ("stress",): bool(self._sizes["hot_spot"]), ("sectors",): ring is not None, ("contacts",): wanted(base),
         }  # fmt: skip
         known = {name for names, there in parts.items() if there for name in names}.union(OF_MOTION)
@@ -57,9 +57,11 @@ class Row:
         """Return the shape of a quantity of a point."""
         return tuple(self._sizes.get(dim) or len(labels(dim)) for dim in one.dims)
 
-    def __contains__(self, sources: Sequence[str]) -> bool:
-        """Whether all quantities that need a motion's sums and parts have what they need among some names."""
-        return all(one.exists(sources) for one in self.quantities.values()) and len(self.texts) == len(TEXTS)
+    @property
+    def alone(self) -> bool:
+        """Whether a run has to be one of its own, because quantities need more than sums and sections."""
+        known = OF_MOTION + OF_SECTIONS
+        return len(self.texts) > len(TEXTS) or not all(one.exists(known) for one in self.quantities.values())
 
     def put(self, row: np.ndarray, response: Response, more: Mapping[str, Any]) -> tuple[str, ...]:
         """Put the quantities of a run into a row (width,); return its texts. more: what runs have no part for."""

@@ -94,6 +94,27 @@ def test_a_quantity_of_one_file_is_in_sweeps_and_ensembles(jerk, tmp_path):
     assert found.quantile[jerk].shape == (5, 3) and np.isfinite(found.quantile[f"peak_{jerk}"]).all()
 
 
+BLOCK = {
+    "damper": [SCENE["damper"][0] | {"shape": "block", "length": 1e-2, "height": 1e-2}],
+    "cavity": [{"name": "c", "gap": 4e-4, "play": 1e-4}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", [{}, {"wear": None}, {"contact": None, "wear": None}, {"contact": None}, BLOCK])
+def test_points_of_sweeps_have_what_runs_have(changes):
+    """Whether they run as one in compiled code, or one by one."""
+    tables = {name: table for name, table in (SCENE | changes).items() if table is not None}
+    given = validate(Scene, tables, "scene")
+    found = vd.sweep(given.replace({"sweep": {"excitation.frequency": [15.7, 15.9, 16.1], "sections": 3}}))
+    for place, frequency in enumerate([15.7, 15.9, 16.1]):
+        run = vd.simulate(given.replace({"excitation.frequency": frequency}))
+        known = {name for name in table() if getattr(run, name) is not None}
+        assert known - {*found.quantities} == set()
+        for name in known - {*found.sections}:
+            np.testing.assert_array_equal(found.quantities[name][place], getattr(run, name), err_msg=name)
+    assert ("contact_force" in found.quantities) == ("contact" in tables)
+
+
 def test_a_quantity_of_one_file_is_in_orbits(jerk, tmp_path):
     found = vd.orbits(scene(orbit={"from": 15.7, "to": 15.8, "max_points": 3, "start": "linear"}, **RESTS))
     (branch,) = found.branches
