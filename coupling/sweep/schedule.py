@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import PointSet
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.worker import (
@@ -63,6 +64,11 @@ def run_tasks(
     finally:
         for future in running:
             future.cancel()
+
+
+def width_of(base: Scene) -> int:
+    """Return the number of columns of a scene's points: something that a worker can do."""
+    return Row(base).width
 
 
 class TaskSize:
@@ -144,7 +150,7 @@ def _one_by_one(grid: PointSet, task: Task, lost: Future[TaskResult], executor: 
         error = future.exception()
         if error is not None:
             _raise_sweep_error(future)
-            if executor is not None and _handed_out(executor, Row, grid.base).exception() is not None:
+            if executor is not None and _handed_out(executor, width_of, grid.base).exception() is not None:
                 raise SweepError(f"the workers end as they begin ({error}); run the same again to go on") from error
         results.append(future.result() if error is None else broken(error, Row(grid.base)))
         state = state if results[-1].final is None else results[-1].final

@@ -135,23 +135,26 @@ class Ramp(Measured, Record, Plotted):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
     Quantities of the periods are attributes, all runs one after the other.
-
-    runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
-    linear structure in steady state without bodies and with every body fixed in its cavity; tops: the peaks of both
-    from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
-    `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
-    which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
-    be read before results are used; provenance: versions and further data of the caller (JSON-able).
     """
 
     KIND: ClassVar[str] = "ramp"
     IN_JSON = ("warnings",)
     scene: SceneField
+    """with its [ramp] table"""
     runs: Annotated[tuple[RampRun, ...], Own()]
+    """one for each rate, then those in the other direction: `run_of_period`, `run_of_start` and series of the periods"""
     curves: Annotated[Mapping[str, np.ndarray], Own()]
+    """by the names of CURVES, (k,) amplitudes of the linear structure in steady state without bodies and with every
+    body fixed in its cavity"""
     tops: Mapping[str, float]
+    """the peaks of both from end to end and where they are, `undamped_peak` and `fixed_peak` (m),
+    `undamped_peak_frequency` and `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width`
+    (Hz), and `detuning_rate`, by which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp
+    does not pass it"""
     warnings: tuple[str, ...] = ()
+    """to be read before results are used"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    """versions and further data of the caller (JSON-able)"""
 
     @cached_property
     def quantities(self) -> dict[str, np.ndarray]:  # type: ignore[override]

@@ -36,7 +36,9 @@ class Result:
     @classmethod
     def of(cls, record: Any, scene: Mapping[str, Any] | None = None) -> Result:
         """Return the result of a record with a provenance, whose scene the page shows by itself."""
-        return cls(record, {key: value for key, value in record.provenance.items() if key != "scene"}, scene)
+        return cls(
+            record, {key: value for key, value in getattr(record, "provenance", {}).items() if key != "scene"}, scene
+        )
 
 
 class Section(Protocol):
