@@ -142,7 +142,8 @@ class Ramp(Measured, Record, Plotted):
     scene: SceneField
     """with its [ramp] table"""
     runs: Annotated[tuple[RampRun, ...], Own()]
-    """one for each rate, then those in the other direction: `run_of_period`, `run_of_start` and series of the periods"""
+    """one for each rate, then those in the other direction; in files `run_of_period`, `run_of_start` and series of the
+    periods"""
     curves: Annotated[Mapping[str, np.ndarray], Own()]
     """by the names of CURVES, (k,) amplitudes of the linear structure in steady state without bodies and with every
     body fixed in its cavity"""

@@ -60,7 +60,7 @@ def section(results, page):
     shown = []
     for file, result in results.items():
         rows = zip(result.record.time.tolist(), result.record.temperature.tolist())
-        shown.append(page.chart(NAME, dressed(figure(result.record)), ("time", "temperature"), rows, [file]))
+        shown.append(page.chart(NAME, dressed(figure(result.record), height=300), ("time", "temperature"), rows, [file]))
     return shown
 
 
