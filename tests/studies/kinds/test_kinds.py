@@ -60,7 +60,8 @@ def section(results, page):
     shown = []
     for file, result in results.items():
         rows = zip(result.record.time.tolist(), result.record.temperature.tolist())
-        shown.append(page.chart(NAME, dressed(figure(result.record), height=300), ("time", "temperature"), rows, [file]))
+        drawn = dressed(figure(result.record), height=300)
+        shown.append(page.chart(NAME, drawn, ("time", "temperature"), rows, [file]))
     return shown
 
 
