@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
+from vanedamp.coupling.quantities.sums import OF_MOTION
 from vanedamp.coupling.response.contact_strength import ContactStrength
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
@@ -327,25 +328,29 @@ class Response(Measured, Record, Plotted):
         """Return the response in a file: all but `final` and `contact_work`."""
         given = cls.given(values, attributes, path)
         scene = given["provenance"].pop("scene", None)
-        kept = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
-        own = {name: attributes[name] for name, one in table().items() if name in attributes}
-        own = {name: value for name, value in own.items() if not table()[name].exists(cls.__dataclass_fields__)}
+        nested = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
+        kept = [name for name, one in table().items() if not one.exists(cls.__dataclass_fields__)]
+        quantities = {name: None for name in kept if table()[name].exists(OF_MOTION)} | {
+            name: float(value) if np.ndim(value := attributes[name]) == 0 else frozen(value)
+            for name in kept
+            if name in attributes
+        }
         of_events = {name.removeprefix("event_"): values[name] for name in values if name.startswith("event_")}
         columns = zip(*(column.tolist() for column in of_events.values()), strict=True)
         unknown: dict[str, Any] = (
             {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}
         )  # of earlier files
         return cls(
-            quantities={name: float(value) if np.ndim(value) == 0 else frozen(value) for name, value in own.items()},
+            quantities=quantities,
             event_list=[Event(**dict(zip(of_events, row, strict=True)), **unknown) for row in columns],
             time=values.get("time", np.zeros(0)), displacement=values.get("displacement", np.zeros(0)),
             body_displacement=values.get("body_displacement", np.zeros((0, 0))), in_plane=PlanarSamples.of(values),
-            wear=tuple(ContactWear(**one) for one in kept["wear"]) if "wear" in kept else None,
-            contacts=tuple(ContactStrength(**one) for one in kept["contact_strength"])
-            if "contact_strength" in kept else None,
-            stress=tuple(SpotStress.of(name, facts, kept.get("strength", {}).get(name, {}))
-                         for name, facts in kept["stress"].items()) if "stress" in kept else None,
-            sectors=SectorResponse.of(values, kept["sectors"]) if "sectors" in kept else None,
+            wear=tuple(ContactWear(**one) for one in nested["wear"]) if "wear" in nested else None,
+            contacts=tuple(ContactStrength(**one) for one in nested["contact_strength"])
+            if "contact_strength" in nested else None,
+            stress=tuple(SpotStress.of(name, facts, nested.get("strength", {}).get(name, {}))
+                         for name, facts in nested["stress"].items()) if "stress" in nested else None,
+            sectors=SectorResponse.of(values, nested["sectors"]) if "sectors" in nested else None,
             scene=None if scene is None else validate(Scene, scene, path), **given,
         )  # fmt: skip
 

@@ -124,7 +124,8 @@ def test_results_are_those_of_a_run(tmp_path):
     text = results("Response of a run")
     listed = re.search(r"response:Response\n(.*?)```", text, re.DOTALL)[1].split()
     in_json = response.to_json() | response.to_xarray().attrs
-    assert in_json.keys() - {"kind", "schema_version", "versions", "provenance"} <= set(listed), in_json.keys()
+    known = {*listed, *quantity.table(), "kind", "schema_version", "versions", "provenance"}
+    assert in_json.keys() <= known, in_json.keys() - known
     assert set(listed) <= set(Response.__dataclass_fields__)
     for name, variable in response.to_xarray().variables.items():
         if not name.startswith("event_"):
@@ -162,9 +163,9 @@ def test_fields_have_the_dimensions_and_units_of_the_file(name):
 
 
 def test_results_of_sweeps_are_listed():
-    text = results("Sweep")
-    for name in quantity.table():
-        assert f"`{name}`" in text, name
+    text = results("Quantities")
+    assert "```{quantities}\n```" in text and "```{quantities-by-kind}\n```" in text
+    assert all(len(one.about) > 10 for one in quantity.table().values())
 
 
 # Python
