@@ -110,8 +110,8 @@ class Optimise(Band):
     """what designs must keep (default: nothing)"""
     measure: str = "amplitude_mean"
     """what counts of a run: "amplitude_mean" or "amplitude_max" of its periods, without static deflection; "stress" at
-    the worst hot spot; "life", its damage, or "wear", the deepest over X, in 10,000 h; or any quantity of a run that
-    limits.quantities names, the largest of bodies, hot spots and sectors over its limit"""
+    the worst hot spot; in 10,000 h "life", its damage, or "wear", the deepest over X; or a quantity over its
+    limits.quantities"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
+from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.terminal import duration
 
@@ -56,7 +56,8 @@ def check_sweep(scene: Scene, workers: int) -> None:
             f"sweep: {points:.3g} points take {duration(seconds)} on {workers} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
-    needed = _SAMPLE * Row(scene).width * points * ("sections" in scene.kept)
+    channels = 2 * (1 + len(unrolled(scene).damper))
+    needed = _SAMPLE * scene.kept.get("sections", 0) * channels * points
     if needed > MOST_BYTES:
         raise InputError(
             f"sweep.sections: those of {points} points need {_amount(needed)}; at most {_amount(MOST_BYTES)}"
