@@ -48,7 +48,7 @@ def test_an_observer_sees_the_run_and_fills_its_fields():
 
     def tell(scene, run, known):
         assert scene is MADE and run.records.samples_per_period == 12 and run.log
-        return {"provenance": {"impacts": known["impacts_per_period"]}, "warnings": ("one",)}
+        return {"provenance": {"impacts": known["quantities"]["impacts_per_period"]}, "warnings": ("one",)}
 
     own = Own(tell, Needs(samples=12, log=True))
     response = respond(MADE, [samples(4), own, Observer(lambda *_: {"warnings": ("two",)})])

@@ -8,7 +8,7 @@ import pytest
 from tests.reference.comparison import follow
 from tests.tools.rings import Chain
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.sector_response import SectorResponse
+from vanedamp.coupling.response.sector_response import BY_SECTOR, SectorResponse
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.record import Sweep
@@ -126,11 +126,12 @@ def test_a_static_pull_moves_no_amplitude_by_sector(file):
 
 
 def test_the_record_tells_the_ring_from_its_arrays():
-    record = SectorResponse(*np.array([[3.0, 1.0], [4.0, 1.0], [2.0, 2.0], [1.0, 1.0], [0.0, 2.0]]), tuned=2.0)
+    rows = np.array([[3.0, 1.0], [4.0, 1.0], [2.0, 2.0], [1.0, 1.0], [0.0, 2.0]])
+    record = SectorResponse(dict(zip(BY_SECTOR, rows, strict=True)), tuned=2.0)
     assert (record.largest, record.amplification) == (0, 1.5)
     assert record.localisation == pytest.approx(3.0 / np.sqrt(5.0))
     assert "impacts per period 0 to 2" in record.sentence
-    still = SectorResponse(*np.zeros((4, 2)), np.full(2, np.nan))
+    still = SectorResponse(dict(zip(BY_SECTOR, [*np.zeros((4, 2)), np.full(2, np.nan)], strict=True)))
     assert still.to_json()["impacts_per_period"] == [None, None]
     assert (still.amplification, still.localisation) == (None, None)
 
