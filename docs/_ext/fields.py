@@ -50,6 +50,10 @@ def fields_table(found: Sequence[Described]) -> nodes.table:
     return table_node(header, rows, widths)
 
 
+#: fields that many records have, where they have no docstring
+_EVERYWHERE = {"provenance": "versions and further data of the caller (JSON-able)"}
+
+
 class Described(NamedTuple):
     """A field of a record; one that is a variable of the file (files.record.Array) by its name and dimensions there."""
 
@@ -64,7 +68,7 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
     texts, found = _texts(record), []
     layouts = declared(record) if issubclass(record, Record) else {}
     for one in names or layouts or texts:
-        layout, text = layouts[one][1] if layouts else None, texts.get(one, "")
+        layout, text = layouts[one][1] if layouts else None, texts.get(one, _EVERYWHERE.get(one, ""))
         if isinstance(layout, Array) and not layout.attribute:
             parts = ("_real", "_imaginary") if layout.dtype is complex else ("",)
             own = ", ".join((layout.name or one) + part for part in parts)
@@ -77,7 +81,7 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
 
 def _texts(record: type) -> dict[str, str]:
     """Return the docstrings after the fields of a class, and of its bases."""
-    found = {"provenance": "versions and further data of the caller (JSON-able)"}
+    found: dict[str, str] = {}
     for base in reversed(record.__mro__[:-1]):
         if base.__module__.startswith("vanedamp"):
             for (owner, field), lines in ModuleAnalyzer.for_module(base.__module__).find_attr_docs().items():
