@@ -18,7 +18,7 @@ pytest.importorskip("sphinx", reason="needs the extra docs")
 pytest.importorskip("myst_parser", reason="needs the extra docs")
 
 from docs._ext import commands, pages, python_api, toml_keys
-from docs._ext.fields import Fields, described
+from docs._ext.fields import _texts, described
 from docs.check_site import faults
 from tests.tools.input_files import SCENE
 from tests.tools.processes import PATIENCE, ROOT, environment
@@ -163,9 +163,7 @@ def test_fields_have_the_dimensions_and_units_of_the_file(name):
 
 
 def test_tables_of_statuses_have_all_of_them():
-    place = f"{Status.__module__}:{Status.__name__}"
-    made = Fields("fields", [place], {}, [], 0, 0, "", None, None).run()
-    assert all(status.value in made[0].astext() for status in Status)
+    assert _texts(Status).keys() == Status.__members__.keys()
 
 
 def test_results_of_sweeps_are_listed():
