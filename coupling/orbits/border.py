@@ -34,7 +34,7 @@ class BorderPoint:
 class Border(Measured):
     """A border of m points, in order, over the branches' number and a second one.
 
-    All quantities of its orbits (docs/quantities.md) are attributes, but for exponents, of which one is zero.
+    All quantities of its orbits (docs/reference/results.md) are attributes, but for exponents, of which one is zero.
     """
 
     kind: str

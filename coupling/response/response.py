@@ -149,7 +149,7 @@ class PlanarSamples(NamedTuple):
 class Response(Measured, Record, Plotted):
     """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods.
 
-    All quantities that it has are attributes of it, too (docs/quantities.md); None: it has none.
+    All quantities that it has are attributes of it, too (docs/reference/results.md); None: it has none.
     """
 
     KIND: ClassVar[str] = "response"

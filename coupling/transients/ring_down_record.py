@@ -41,7 +41,7 @@ class LinearMode:
 class RingDown(Measured, Record, Plotted):
     """The free motion of one natural mode, by its k turning points; in JSON, names have units.
 
-    Quantities of the whole motion are attributes (docs/quantities.md).
+    Quantities of the whole motion are attributes (docs/reference/results.md).
     """
 
     KIND: ClassVar[str] = "ring_down"
