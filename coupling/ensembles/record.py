@@ -79,7 +79,7 @@ class Ensemble(Record, Plotted):
     samples: Annotated[Mapping[str, np.ndarray], Own()]
     """dotted path -> (s,) values of each range"""
     members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
-    """(s, *grid) quantities of all points (docs/reference/results.md), of bodies, hot spots and sectors the largest; nan where
+    """(s, *grid) quantities of all points (results.md), of bodies, hot spots and sectors the largest; nan where
     none is"""
     status: Annotated[np.ndarray, Array(("sample", "grid"), dtype=object)]
     """of every point, as in a Sweep"""

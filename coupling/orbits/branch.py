@@ -63,7 +63,7 @@ class SpecialPoint:
 class Branch(Measured):
     """A branch of m orbits with states of k coordinates, in the order in which it was followed.
 
-    All quantities of its orbits (docs/reference/results.md) are attributes, arrays over the points, and so are their families.
+    All quantities of its orbits (results.md) are attributes, arrays over the points, and so are their families.
     """
 
     periods: int

@@ -72,7 +72,7 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orbit(Measured, Displayed):
-    """A periodic orbit, or the last state of a search for one. All its quantities are attributes (docs/reference/results.md).
+    """A periodic orbit, or the last state of a search for one. All its quantities are attributes (results.md).
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
     excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest fraction of the scale

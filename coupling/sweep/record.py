@@ -41,7 +41,7 @@ _MOST_ROWS = 20
 class Sweep(Measured, Record, Plotted):
     """Responses over the product of the axes.
 
-    All quantities that points have are attributes (docs/reference/results.md), arrays over the grid in the axes' order, with
+    All quantities that points have are attributes (results.md), arrays over the grid in the axes' order, with
     their own dimensions behind it, nan where a point has none; and so are their families, mappings by name, such as
     `stress` or `wear`. A point of the grid is the same whoever ran it, and whenever: no time is taken.
     """

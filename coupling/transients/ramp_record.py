@@ -55,7 +55,7 @@ class RampRun(Measured):
     stress           (p, s, 8) Pa, amplitudes of stress in it at s hot spots, by response.spot_stress.MEASURES; None
                      without any
     strength         utilisation and damage of the run, by hot spot (strength.assessment); those without data left out
-    quantities       (p, ...) of each period, by name, attributes as well (docs/reference/results.md), such as `amplitude_rms`
+    quantities       (p, ...) of each period, by name, attributes as well (results.md), such as `amplitude_rms`
                      or `wear_volume_rate`; what no period knows is left out
     amplitude, amplitude_dynamic, impacts  (p,) those of NAMED by their names in files
     """
@@ -159,7 +159,7 @@ class Ramp(Measured, Record, Plotted):
 
     @cached_property
     def quantities(self) -> dict[str, np.ndarray]:  # type: ignore[override]
-        """Quantities of all periods (docs/reference/results.md), run by run, nan where a run knows none."""
+        """Quantities of all periods (results.md), run by run, nan where a run knows none."""
         known = {name: run.quantities[name].shape[1:] for run in self.runs for name in run.quantities}
 
         def of(run: RampRun, name: str) -> np.ndarray:
