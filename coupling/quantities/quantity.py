@@ -100,7 +100,13 @@ def family(name: str) -> list[Quantity]:
 def evaluated(sources: Mapping[str, Any]) -> dict[str, Any]:
     """Return all quantities that some sources have."""
     with np.errstate(all="ignore"):
-        return {name: one.of(sources) for name, one in table().items() if one.exists(sources)}
+        return {one.name: one.of(sources) for one in possible(frozenset(sources))}
+
+
+@cache
+def possible(sources: frozenset[str]) -> tuple[Quantity, ...]:
+    """Return the quantities that some sources, by name, have."""
+    return tuple(one for one in table().values() if one.exists(sources))
 
 
 def labels(dim: str) -> tuple[str, ...]:

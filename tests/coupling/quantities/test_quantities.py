@@ -14,7 +14,7 @@ import pytest
 import vanedamp as vd
 from docs._ext.quantities import KINDS, lacks, reason
 from vanedamp.coupling.quantities import quantity as quantities
-from vanedamp.coupling.quantities.quantity import FAMILIES, evaluated, quantity, table
+from vanedamp.coupling.quantities.quantity import FAMILIES, evaluated, possible, quantity, table
 from vanedamp.coupling.quantities.sums import COMPLEX, ENERGIES, SUMS, sources_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.record import Columns, Record, declared
@@ -61,10 +61,12 @@ class Jerk:
 def jerk(monkeypatch):
     known = {"jerk": Jerk} | FAMILIES.all()
     monkeypatch.setattr(quantities, "FAMILIES", SimpleNamespace(all=lambda: known, own=lambda: known))
-    table.cache_clear()
+    for kept in (table, possible):
+        kept.cache_clear()
     yield Jerk.largest_jerk.name
     monkeypatch.undo()
-    table.cache_clear()
+    for kept in (table, possible):
+        kept.cache_clear()
 
 
 def test_a_quantity_of_one_file_is_in_runs(jerk, tmp_path, capsys):
