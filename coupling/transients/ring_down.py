@@ -43,6 +43,8 @@ from vanedamp.files.toml_input import InputError
 
 #: fraction of the largest motion of excitation.at by one mode below which it does not show another
 _UNSEEN = 1e-9
+#: difference of frequencies of a pair of modes, relative: of these the one that shows more is followed
+_PAIR = 1e-6
 #: fraction of the largest motion of a mode at the start below which another is at rest, but for round-off
 _STILL = 1e-12
 #: the motion after a steady response that ended early
@@ -118,7 +120,9 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
     if table.mode is not None:
         mode = table.mode
     elif table.start == "steady" and list(scene.excitation.shares) == [1]:
-        mode = int(np.argmin(np.where(moves, np.abs(omega - system.omega), np.inf)))
+        away = np.where(moves, np.abs(omega - system.omega), np.inf)
+        near = np.flatnonzero(away <= away.min() + _PAIR * system.omega)
+        mode = int(near[np.argmax(shown[near])])
     else:
         mode = int(np.argmax(shown * size))
     if shown[mode] <= _UNSEEN * shown.max():
