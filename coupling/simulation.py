@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -76,11 +76,6 @@ def parts_of(scene: Scene) -> list[Observer]:
         *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
         *([CONTACTS] if wanted(scene) else []),
     ]
-
-
-def exponent_of(observers: Sequence[Observer]) -> float | None:
-    """Return the exponent of the energies of impacts that observers need; None: none."""
-    return next((one.needs.exponent for one in observers if one.needs.exponent is not None), None)
 
 
 def _from_moved(

@@ -14,7 +14,7 @@ from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.grid import dimension, dimensions, resonance_axis
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Array, Columns, Own, Record
 from vanedamp.files.store import Variable, frozen
@@ -31,8 +31,6 @@ NOT_IN_ENSEMBLES = {
     "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
     "fixed_top": _PEAK,
 }  # fmt: skip
-#: dimensions over which the largest is kept
-_REDUCED = {"damper", "hot_spot", "sector"}
 PEAK, REDUCTION = "peak_amplitude", "reduction"
 
 
@@ -46,9 +44,8 @@ class Spread(NamedTuple):
 
 def kept() -> dict[str, Spread]:
     """Return what is kept of all samples, by name: of bodies, hot spots and sectors the largest."""
-    return {
-        name: Spread(one.unit) for name, one in table().items() if not one.text and _REDUCED.issuperset(one.dims)
-    }  # fmt: skip
+    found = (one for one in table().values() if not one.text and one.lacking(NOT_IN_ENSEMBLES) is None)
+    return {one.name: Spread(one.unit) for one in found}
 
 
 def spreads() -> dict[str, Spread]:
@@ -168,16 +165,16 @@ class Ensemble(Record, Plotted):
         return {"number": self.numbers, "index": INDICES}
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return the dimensions of the grid, and of its curves: the axes' paths with _ for dots."""
-        return {"grid": tuple(map(_dimension, self.axes)), "curves": tuple(map(_dimension, self.curves))}
+        """Return the dimensions of the grid, and of its curves."""
+        return dimensions(self.scene, self.axes)
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file."""
         found = super().variables() | {"quantile": Variable(np.array(QUANTILES), ("quantile",))}
         for path, values in self.axes.items():
-            found[_dimension(path)] = Variable(values, (_dimension(path),), unit_of(path))
+            found[dimension(path)] = Variable(values, (dimension(path),), unit_of(path))
         for path, values in self.samples.items():
-            found[f"sample_{_dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
+            found[f"sample_{dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
         return found
 
     def attributes(self) -> dict[str, Any]:
@@ -187,16 +184,12 @@ class Ensemble(Record, Plotted):
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
         """Return the record in the variables and attributes of a file."""
-        axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
+        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
         return cls(
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
-            samples={number: frozen(values[f"sample_{_dimension(number)}"]) for number in values["number"]},
+            samples={number: frozen(values[f"sample_{dimension(number)}"]) for number in values["number"]},
             **cls.given(values, attributes, path),
         )
-
-
-def _dimension(path: str) -> str:
-    return path.replace(".", "_")
 
 
 def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:

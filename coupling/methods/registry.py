@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.methods import Method
-from vanedamp.coupling.response.evaluation import Needs, Observer, Run, evaluate, run_scene
+from vanedamp.coupling.response.evaluation import Observer, Run, evaluate, run_scene, together
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
@@ -86,16 +86,15 @@ def run_of(scene: Scene, observers: Sequence[Observer] = (), start: RestartState
         raise InputError(f"wear: {reason}; leave the table out")
     system = assemble(scene)
     _check_bodies(scene, system)
-    needs = [Needs(), *(observer.begin(scene, system) for observer in observers)]
-    samples, logs, outputs, exponents = zip(*needs, strict=True)
-    scene.solver.check_samples(max(samples))
+    needs = together(observer.begin(scene, system) for observer in observers)
+    scene.solver.check_samples(needs.samples)
     records = new_records(
-        system, most_periods(scene), max(samples), isinstance(scene.structure, Rom), deflects(scene, system),
-        next(filter(None, exponents), None), any(outputs),
+        system, most_periods(scene), needs.samples, isinstance(scene.structure, Rom), deflects(scene, system),
+        needs.exponent, needs.outputs,
     )  # fmt: skip
     for observer in observers:
         records = observer.records(records)
-    return method.begin(scene, system, records, any(logs), start_of(scene, system, start))
+    return method.begin(scene, system, records, needs.log, start_of(scene, system, start))
 
 
 def _check_bodies(scene: Scene, system: System) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 
 from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.newton import Orbit
-from vanedamp.coupling.orbits.orbit_quantities import LEAVES, names_along
+from vanedamp.coupling.orbits.orbit_quantities import LEAVES
 from vanedamp.coupling.quantities import stress as of_stress
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, table
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
@@ -208,7 +208,7 @@ class Branches(Measured, Record, Plotted):
 
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
-        return names_along(self.quantities, self.provenance.get("hot_spots", {}))
+        return labels_along(self.quantities, self.provenance.get("hot_spots", {}))
 
     def derived(self) -> dict[str, Any]:
         """Return a summary of branches, special points, borders and quantities."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.orbits.multipliers import decided
-from vanedamp.coupling.quantities.quantity import labels, table
+from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.response import Response
 
 _ONE_FREQUENCY = "an orbit has one frequency"
@@ -36,7 +36,7 @@ def quantities_of(run: Response, missed: float, exponents: Mapping[str, Any] | N
     known: dict[str, Any] = {} if exponents is None else {"lyapunov": exponents}
     found = dict[str, Any]()
     for name, one in table().items():
-        if NOT_IN_ORBITS.keys().isdisjoint(one.needs):
+        if one.lacking(NOT_IN_ORBITS) is None:
             value = one.of(known) if one.exists(known) else getattr(run, name)
             if value is not None or name in run.quantities:
                 unknown = value is None or not (missed < _LEFT or one.text)
@@ -61,10 +61,3 @@ def exponents_of(
         "confidence": 0.0 if len(rates) else np.nan, "exponent_per_period": largest * period,
         "exponents": rates.tolist(),
     }  # fmt: skip
-
-
-def names_along(quantities: Mapping[str, Any], spots: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the names along dimensions of quantities, where there are some; spots: hot spots by name."""
-    dims = dict.fromkeys(dim for name in quantities for dim in table()[name].dims)
-    found: dict[str, Any] = {dim: labels(dim) for dim in dims if labels(dim)}
-    return found | ({"hot_spot": tuple(spots)} if "hot_spot" in dims else {})

@@ -48,6 +48,10 @@ class Quantity(NamedTuple):
         """Whether all that it needs is among some names."""
         return set(self.needs).issubset(sources)
 
+    def lacking(self, reasons: Mapping[str, str]) -> str | None:
+        """Return why a kind of result does not have it; None: it has. reasons: by name, what it needs, or dimension."""
+        return next((reasons[name] for name in (self.name, *self.needs, *self.dims) if name in reasons), None)
+
     def of(self, sources: Mapping[str, Any]) -> Any:
         """Return its value; None where something that it needs is None."""
         given = {name: sources[name] for name in self.needs}
@@ -76,14 +80,14 @@ def table() -> Mapping[str, Quantity]:
     """Return all quantities by name, family by family."""
     found: dict[str, Quantity] = {}
     for name, module in FAMILIES.all().items():
-        for one in _declared(module):
+        for one in declared_in(module):
             if one.name in found:
                 raise ValueError(f"{module.__name__}: there is a quantity {one.name} in {found[one.name].family}")
             found[one.name] = one._replace(family=name)
     return found
 
 
-def _declared(module: Any) -> Iterator[Quantity]:
+def declared_in(module: Any) -> Iterator[Quantity]:
     """Yield the quantities of a module, and those in its lists."""
     for value in vars(module).values():
         if isinstance(value, Quantity):
@@ -109,9 +113,17 @@ def possible(sources: frozenset[str]) -> tuple[Quantity, ...]:
     return tuple(one for one in table().values() if one.exists(sources))
 
 
+@cache
 def labels(dim: str) -> tuple[str, ...]:
     """Return the names along a dimension that are the same for all scenes; empty for other dimensions."""
     return next((module.LABELS[dim] for module in FAMILIES.all().values() if dim in getattr(module, "LABELS", {})), ())
+
+
+def labels_along(names: Iterable[str], hot_spots: Iterable[str] = ()) -> dict[str, tuple[str, ...]]:
+    """Return the names along the dimensions of some quantities, where there are any; hot_spots: their names."""
+    dims = dict.fromkeys(dim for name in names for dim in table()[name].dims)
+    known = {dim: tuple(hot_spots) if dim == "hot_spot" else labels(dim) for dim in dims}
+    return {dim: named for dim, named in known.items() if named}
 
 
 class Measured:
@@ -123,7 +135,7 @@ class Measured:
         if not name.startswith("_") and name != "quantities":
             if name in self.quantities:
                 return self.quantities[name]
-            if name in FAMILIES.own() or any(one.family == name for one in table().values()):
+            if any(one.family == name for one in table().values()):
                 return {one.name: self.quantities[one.name] for one in family(name) if one.name in self.quantities}
             if name in table():
                 return None

@@ -6,7 +6,7 @@ Every method leaves the same records, so that results of different methods have 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -109,6 +109,12 @@ class Needs(NamedTuple):
 
 
 _NOTHING = Needs()
+
+
+def together(needs: Iterable[Needs]) -> Needs:
+    """Return what a run has to record for all of some observers."""
+    samples, logs, outputs, exponents = zip(_NOTHING, *needs, strict=True)
+    return Needs(max(samples), any(logs), any(outputs), next(filter(None, exponents), None))
 
 
 @dataclass

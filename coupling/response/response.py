@@ -250,7 +250,7 @@ class Response(Measured, Record, Plotted):
         known = {
             name: getattr(self, name)
             for name, one in table().items()
-            if one.dims in ((), ("damper",)) or (one.dims and labels(one.dims[0]) and len(one.dims) == 1)
+            if not one.dims or (len(one.dims) == 1 and (one.dims == ("damper",) or labels(one.dims[0])))
         }
         return {name: value for name, value in known.items() if value is not None or name in self.quantities}
 
@@ -317,10 +317,11 @@ class Response(Measured, Record, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        own = {name: value for name, value in self.derived().items() if name not in self._plain}
+        plain = self._plain
+        own = {name: value for name, value in self.derived().items() if name not in plain}
         for name in own.keys() & {"wear", "contact_strength"}:
             own[name] = json.dumps(own[name])
-        own |= {name: value for name, value in self._plain.items() if value is not None}
+        own |= {name: value for name, value in plain.items() if value is not None}
         return super().attributes() | own | {"provenance": self._made(), "warnings": list(self.warnings)}
 
     @classmethod

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.stress import LINEAR, MEASURES, SCALARS
+from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.files.store import Variable
 from vanedamp.rom.recovery import COMPONENTS
-
-__all__ = ["LINEAR", "MEASURES", "SCALARS", "SpotStress", "named", "stress_axes"]
 
 
 @dataclass(frozen=True, eq=False)

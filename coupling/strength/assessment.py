@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import SCALARS, SpotStress
+from vanedamp.coupling.quantities.stress import SCALARS
+from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.strength.counting import Cycles
 from vanedamp.coupling.strength.haigh import equivalent_amplitude, utilisation, yield_utilisation
 from vanedamp.coupling.strength.life import damage, hours, quantiles, starts

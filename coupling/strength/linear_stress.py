@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import LINEAR, MEASURES
+from vanedamp.coupling.quantities.stress import LINEAR, MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.spots import Spots
 from vanedamp.coupling.strength.stress import period_stress

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import SCALARS
+from vanedamp.coupling.quantities.stress import SCALARS
 from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles, turning_points
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.coupling.strength.multiaxial import largest_principal

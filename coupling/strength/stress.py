@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import MEASURES, SpotStress
+from vanedamp.coupling.quantities.stress import MEASURES
+from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.modal.algebra import von_mises
 
 __all__ = ["MEASURES", "PeriodStress", "SpotStress", "period_stress", "scalar_stresses", "signs"]

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine.run import EventDrivenRun
+from vanedamp.coupling.quantities.stress import LINEAR, MEASURES, SCALARS
 from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome, Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.spot_stress import LINEAR, MEASURES, SCALARS, SpotStress, named
+from vanedamp.coupling.response.spot_stress import SpotStress, named
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.strength.assessment import with_strength

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS
+from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.strength.assessment import assessed, mean_stress
 from vanedamp.coupling.strength.spot_history import SpotHistories
 from vanedamp.coupling.strength.spots import Spots

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.response.spot_stress import LINEAR
+from vanedamp.coupling.quantities.stress import LINEAR
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.spectral import (
     Moments,

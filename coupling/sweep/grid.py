@@ -239,6 +239,18 @@ def base_scene(scene: Scene) -> Scene:
     return replace(base, excitation=replace(base.excitation, resonance_near=near))
 
 
+def dimension(path: str) -> str:
+    """Return the dimension of a file that an axis is: its path with _ for dots."""
+    return path.replace(".", "_")
+
+
+def dimensions(scene: Scene, axes: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return the dimensions "grid" of points, and "curves" over all axes but the frequency, or the speed."""
+    paths = list(axes)
+    swept = resonance_axis(scene, paths)[0]
+    return {"grid": tuple(map(dimension, paths)), "curves": tuple(dimension(path) for path in paths if path != swept)}
+
+
 def resonance_axis(scene: Scene, axes: Iterable[str]) -> tuple[str | None, float]:
     """Return the axis along which a sweep meets resonances, and the frequency of a unit of it, Hz.
 

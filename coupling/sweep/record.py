@@ -9,12 +9,14 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from vanedamp.coupling.quantities import linear_peaks
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_mean
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, family, labels, table
+from vanedamp.coupling.quantities.energy import penetration
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, declared_in, labels, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.grid import dimension, dimensions
 from vanedamp.coupling.sweep.row import TEXTS
 from vanedamp.files.display import Plotted, html_table
 from vanedamp.files.record import Array, Columns, Own, Record
@@ -22,7 +24,7 @@ from vanedamp.files.store import Variable, frozen
 
 #: amplitudes that earlier files have of bodies without static loads only, which they are then as well
 _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
-PEAKS = tuple(one.name for one in family("linear_peaks"))
+PEAKS = tuple(one.name for one in declared_in(linear_peaks))
 
 
 def _of_points() -> dict[str, Quantity]:
@@ -113,17 +115,11 @@ class Sweep(Measured, Record, Plotted):
 
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
-        dims = {dim for name in self.quantities for dim in table()[name].dims}
-        found: dict[str, Any] = {dim: labels(dim) for dim in dims if labels(dim)}
-        return found | ({"hot_spot": self.hot_spots} if "hot_spot" in dims else {})
+        return labels_along(self.quantities, self.hot_spots)
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return the dimensions of the grid, and of its curves: the axes' paths with _ for dots."""
-        swept = resonance_axis(self.scene, self.axes)[0]
-        return {
-            "grid": tuple(map(_dimension, self.axes)),
-            "curves": tuple(_dimension(axis) for axis in self.axes if axis != swept),
-        }
+        """Return the dimensions of the grid, and of its curves."""
+        return dimensions(self.scene, self.axes)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, quantities as nested lists (nan where there is none), without sections."""
@@ -141,7 +137,7 @@ class Sweep(Measured, Record, Plotted):
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file."""
         units = self.units()
-        axes = {_dimension(axis): Variable(v, (_dimension(axis),), units[axis]) for axis, v in self.axes.items()}
+        axes = {dimension(axis): Variable(v, (dimension(axis),), units[axis]) for axis, v in self.axes.items()}
         return axes | super().variables()
 
     def attributes(self) -> dict[str, Any]:
@@ -152,14 +148,11 @@ class Sweep(Measured, Record, Plotted):
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Sweep:
         """Return the record in the variables and attributes of a file."""
         earlier = {f"{name}_dynamic": values[name] for name in _ALSO_DYNAMIC}
-        axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
+        earlier[penetration.name] = np.full(np.shape(values["status"]), np.nan)
+        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
         given = cls.given(earlier | dict(values), attributes, path)
         return cls(axes={axis: frozen(array, array.dtype) for axis, array in axes.items()}, **given)
 
 
 def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _dimension(path: str) -> str:
-    return path.replace(".", "_")

@@ -31,7 +31,7 @@ class Row:
     """
 
     def __init__(self, base: Scene) -> None:
-        ring, self._kept = ring_in_file(base.structure), base.kept
+        ring = ring_in_file(base.structure)
         self._sizes = {
             "damper": len(unrolled(base).damper), "hot_spot": len(hot_spots_in_file(base.structure)),
             "sector": 0 if ring is None else ring.sectors, _SECTION: base.kept.get("sections", 0),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from vanedamp.coupling.quantities import stress
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
-from vanedamp.coupling.quantities.quantity import Quantity, family
+from vanedamp.coupling.quantities.quantity import declared_in
 
 _ENDLESS, _FREE = "is of a motion that goes on as it is", "nothing excites the motion"
 _NOT_STEADY = {
@@ -18,8 +19,8 @@ _NOT_STEADY = {
 
 def _of_stress(by_end: Mapping[str, str], damage: str) -> dict[str, str]:
     """Return why quantities of hot spots are not there, by the ends of their names; damage: why no rate of it is."""
-    found = {one.name: why for one in family("stress") for end, why in by_end.items() if one.name.endswith(end)}
-    return found | {one.name: damage for one in family("stress") if one.unit == "1/h"}
+    found = {one.name: why for one in declared_in(stress) for end, why in by_end.items() if one.name.endswith(end)}
+    return found | {one.name: damage for one in declared_in(stress) if one.unit == "1/h"}
 
 
 NOT_IN_RAMPS = _NOT_STEADY | {
@@ -46,8 +47,3 @@ NOT_IN_RING_DOWNS = (
         "the motion happens now and then: `strength` has the damage of one",
     )
 )
-
-
-def has_meaning(one: Quantity, reasons: Mapping[str, str]) -> bool:
-    """Return whether there is no reason why a quantity is not there."""
-    return reasons.keys().isdisjoint((one.name, *one.needs, *one.dims))

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Quantity, evaluated, table
+from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.quantities.sums import SUMS, sources_of
 from vanedamp.coupling.response.evaluation import Outcome, in_plane_of
 from vanedamp.coupling.response.figures import Measured, measure, measured_of
 from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT
-from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.contact_strength import CONTACTS

@@ -18,7 +18,7 @@ import numpy as np
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
-from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual
+from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual, together
 from vanedamp.coupling.response.event_log import named_bodies
 from vanedamp.coupling.response.figures import contact_gain
 from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
@@ -30,7 +30,7 @@ from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.simulation import exponent_of, parts_of, simulate
+from vanedamp.coupling.simulation import parts_of, simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
 from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble, at_frequency
@@ -212,9 +212,8 @@ class _Run:
         solver: Any = self.scene.solver
         scene, system = self.scene, self.system
         each = 0 if self.stress is None else self.stress.each
-        records = new_records(
-            system, 1, each, self.stress is not None, self.deflected, exponent_of(parts_of(scene)), outputs=True
-        )
+        exponent = together(one.needs for one in parts_of(scene)).exponent
+        records = new_records(system, 1, each, self.stress is not None, self.deflected, exponent, outputs=True)
         left = solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)

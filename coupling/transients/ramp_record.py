@@ -12,12 +12,13 @@ import numpy as np
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
 from vanedamp.coupling.quantities.impacts import impacts_per_period
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
+from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.quantities.sums import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneField
-from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
+from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
-from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, has_meaning
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Own, Record
 from vanedamp.files.store import Variable, frozen
@@ -259,8 +260,8 @@ class Ramp(Measured, Record, Plotted):
             none = np.zeros((0, len(spots), len(MEASURES)))
             stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
             found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
-        own = {dim for name in self.quantities for dim in table()[name].dims if labels(dim)}
-        found |= {dim: Variable(np.array(labels(dim), object), (dim,)) for dim in own}
+        own = labels_along(self.quantities).items()
+        found |= {dim: Variable(np.array(names, object), (dim,)) for dim, names in own}
         if dampers:
             found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
         return found
@@ -289,7 +290,7 @@ class Ramp(Measured, Record, Plotted):
                     quantities={
                         name: frozen(values[NAMED.get(name, name)][inside])
                         for name, one in table().items()
-                        if inside.any() and NAMED.get(name, name) in values and has_meaning(one, NOT_IN_RAMPS)
+                        if inside.any() and NAMED.get(name, name) in values and one.lacking(NOT_IN_RAMPS) is None
                     },
                     **{name: frozen(values[name][inside]) for name in SERIES},
                     **{name: frozen(values[name][starts]) for name in STATES},

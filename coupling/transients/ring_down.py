@@ -15,7 +15,7 @@ from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.quantities.quantity import table as quantities
-from vanedamp.coupling.response.evaluation import Ended, evaluate
+from vanedamp.coupling.response.evaluation import Ended, evaluate, together
 from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.records import STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Response, Status
@@ -25,7 +25,7 @@ from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.simulation import exponent_of, parts_of
+from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
 from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble
@@ -34,7 +34,7 @@ from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import Followed, TurningPoint, TurningPoints, without_rebounds
-from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS, has_meaning
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS
 from vanedamp.coupling.transients.periods import Periods, single_periods, spots_of_periods
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
@@ -154,9 +154,8 @@ def _free_motion(
     spots, parts = spots_of(free), parts_of(free)
     own = np.sqrt(system.of_structure.stiffness[mode]) / system.omega
     each = 0 if spots is None else max(samples_of(free, system, spots), OF_HARMONIC * math.ceil(own))
-    records = new_records(
-        system, periods, each, spots is not None, deflects(free, system), exponent_of(parts), outputs=True
-    )
+    exponent = together(one.needs for one in parts).exponent
+    records = new_records(system, periods, each, spots is not None, deflects(free, system), exponent, outputs=True)
     begun = start_of(free, system, start)
     run = engine_run(system, begun, records, True, options.max_events, options.linearisation)
     walk, turning, done = Walk(run, periods), TurningPoints(), 0
@@ -194,6 +193,8 @@ def _free_motion(
 
 def _measured(response: Response) -> dict[str, Any]:
     """Return the quantities of the whole motion that have a meaning for it, and that are known."""
-    found = {name: getattr(response, name) for name, one in quantities().items() if has_meaning(one, NOT_IN_RING_DOWNS)}
+    found = {
+        name: getattr(response, name) for name, one in quantities().items() if one.lacking(NOT_IN_RING_DOWNS) is None
+    }
     known = {name: np.asarray(value, float) for name, value in found.items() if value is not None}
     return {name: frozen(value)[()] for name, value in known.items() if np.isfinite(value).any()}

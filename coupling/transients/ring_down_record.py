@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
+from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
+from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneField
-from vanedamp.coupling.response.spot_stress import MEASURES, SCALARS, stress_axes
+from vanedamp.coupling.response.spot_stress import stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
@@ -134,8 +135,7 @@ class RingDown(Measured, Record, Plotted):
 
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
-        dims = {dim for name in (*self.quantities, *self.course) for dim in table()[name].dims}
-        return {dim: labels(dim) for dim in dims if labels(dim)}
+        return labels_along((*self.quantities, *self.course))
 
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> RingDown:

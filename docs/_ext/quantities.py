@@ -35,8 +35,7 @@ def lacks(kind: str) -> Mapping[str, str]:
 
 def reason(one: Quantity, kind: str) -> str | None:
     """Return why a kind of result does not have a quantity; None: it has."""
-    why = lacks(kind)
-    return next((why[name] for name in (one.name, *one.needs, *one.dims) if name in why), None)
+    return one.lacking(lacks(kind))
 
 
 class Quantities(Directive):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator
 
-from vanedamp.coupling.response.spot_stress import MEASURES
+from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.coupling.transients.ring_down_record import RingDown

@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 
 from tests.coupling.strength.test_stressed_runs import FIRST, MASS, STIFFNESS, STRESS, scene
 from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.response.observers import samples
-from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.counting import Cycles, rainflow_cycles
 from vanedamp.coupling.strength.life import damage

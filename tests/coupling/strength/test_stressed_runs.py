@@ -7,8 +7,8 @@ from scipy.linalg import eigh
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
+from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.response.observers import samples
-from vanedamp.coupling.response.spot_stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of

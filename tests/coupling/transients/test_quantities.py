@@ -11,7 +11,7 @@ from tests.coupling.transients.test_ring_down import blow, oscillator
 from tests.tools.rings import Chain
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE
-from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS, has_meaning
+from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS
 from vanedamp.files.toml_input import validate
 
 WEAR = {"rate": 1e-13, "impact_rate": 1e-9, "area": 1e-4}
@@ -172,7 +172,7 @@ def test_what_a_motion_lacks_is_what_has_no_meaning(tmp_path):
     rung = vd.ring_down(validate(vd.Scene, data | {"ring_down": blow(2.0, 6)}, "x"))
     sources = {*OF_MOTION, *OF_PLANE, "wear", "contacts"}
     for kind, reasons in ((found, NOT_IN_RAMPS), (rung, NOT_IN_RING_DOWNS)):
-        wanted = {name for name, one in table().items() if one.exists(sources) and has_meaning(one, reasons)}
+        wanted = {name for name, one in table().items() if one.exists(sources) and one.lacking(reasons) is None}
         assert set(kind.quantities) == wanted
         known = {name for one in table().values() for name in (one.name, *one.needs, *one.dims)}
         assert reasons.keys() <= known
