@@ -45,12 +45,9 @@ def assessed(
     found: dict[str, Any] = {
         "criterion": fatigue.criterion, "mean_line": fatigue.mean_stress, "amplitude": amplitude, "mean": mean,
         "equivalent_amplitude": float(equivalent_amplitude(amplitude, mean, fatigue)),
-        "utilisation": float(utilisation(amplitude, mean, fatigue)),
-    }  # fmt: skip
+    } | {name: float(value) for name, value in used(amplitude, mean, fatigue).items()}  # fmt: skip
     if (most := amplitudes.get(f"{fatigue.criterion}_max")) is not None:
         found["utilisation_max"] = float(utilisation(most, mean, fatigue))
-    if (used := yield_utilisation(amplitude, mean, fatigue)) is not None:
-        found["yield_utilisation"] = float(used)
     if cycles is not None and fatigue.exponent is not None:
         found["damage"] = total = damage(cycles, fatigue, mean)
         if duration is None:
@@ -59,6 +56,13 @@ def assessed(
             found["damage_per_hour"] = 3600.0 * total / duration
             found["life_hours"] = quantiles(hours(total, duration), fatigue)
     return found
+
+
+def used(amplitude: np.ndarray | float, mean: float, fatigue: Fatigue) -> dict[str, np.ndarray]:
+    """Return the utilisation of stress amplitudes, Pa, and that of the yield strength if there is one."""
+    of_yield = yield_utilisation(amplitude, mean, fatigue)
+    found = {"utilisation": utilisation(amplitude, mean, fatigue)}
+    return found if of_yield is None else found | {"yield_utilisation": of_yield}
 
 
 def with_strength(

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
-from vanedamp.coupling.strength.assessment import assessed, mean_stress
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.assessment import assessed, mean_stress, used
 from vanedamp.coupling.strength.spot_history import SpotHistories
-from vanedamp.coupling.strength.spots import Spots
+from vanedamp.coupling.strength.spots import Spots, known_spots
 from vanedamp.coupling.strength.stress import period_stress
+from vanedamp.rom.recovery import COMPONENTS
 
 
 class StressSeries:
-    """Takes the samples of stress (s, 6, each), Pa, at the hot spots period by period."""
+    """Takes the stress at the hot spots of a scene period by period; each: samples of a period."""
 
     #: periods that are evaluated together
     _TOGETHER = 100
 
     def __init__(self, spots: Spots, each: int) -> None:
-        self.spots, self.each = spots, each
+        self.spots, self.each, self._last = spots, each, spots
         self._waiting, self._amplitudes = list[np.ndarray](), list[np.ndarray]()
         self._histories, self._taken = SpotHistories(spots.materials), 0
 
-    def add(self, stress: np.ndarray) -> None:
-        """Take the next period."""
-        self._waiting.append(stress)
+    def add(self, scene: Scene, coordinates: np.ndarray) -> None:
+        """Take modal coordinates (each, n) of the next period, and the scene then, whose speed may have changed."""
+        if scene.speed != self._last.speed:
+            self._last = known_spots(scene)
+        self._waiting.append(self._last.stress(coordinates))
         if len(self._waiting) > self._TOGETHER:
             self._evaluate()
 
@@ -36,21 +41,41 @@ class StressSeries:
         self._evaluate()
         return np.concatenate(self._amplitudes)
 
-    def strengths(self, at: Sequence[Spots] = ()) -> dict[str, dict[str, Any]]:
-        """Return utilisation by the largest amplitude and damage of the motion, by hot spot (assessment.assessed).
+    @cached_property
+    def strengths(self) -> dict[str, dict[str, Any]]:
+        """Utilisation by the largest amplitude and damage of the motion, by hot spot (assessment.assessed).
 
-        at: the spots at other speeds of the motion; the largest mean stress counts.
+        The mean stress is that of the first or the last speed, where it is larger.
         """
-        largest, found = self.amplitudes().max(axis=0), {}
+        largest, found = self.amplitudes().max(axis=0), dict[str, dict[str, Any]]()
         for place, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
             if material is None:
                 continue
-            known = [spots.static(name) for spots in (self.spots, *at)]
+            known = [spots.static(name) for spots in (self.spots, self._last)]
             rest = self._histories.mean[place] if self._histories.mean.size else np.zeros(6)
             static = max((rest if one is None else rest + one for one in known), key=lambda s: mean_stress(material, s))
             amplitudes = {scalar: float(largest[place, MEASURES.index(scalar)]) for scalar in SCALARS}
             cycles, every = self._histories.cycles(place), all(one is not None for one in known)
             found[name] = {"mean_known": every} | assessed(material, amplitudes, static, cycles)
+        return found
+
+    def of_spots(self, whole: bool = False) -> list[Any]:
+        """Return what quantities need of hot spots: of each period, (p,), or of the whole motion as of a run."""
+        amplitudes, found = self.amplitudes(), list[Any]()
+        for place, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
+            own = dict(zip(MEASURES, amplitudes[:, place].T, strict=True))
+            level = {measure: values.mean() if whole else values for measure, values in own.items()}
+            strength = dict.fromkeys(("utilisation", "yield_utilisation"), np.nan * level[SCALARS[0]])
+            if material is not None:
+                most = self.strengths[name]
+                strength |= used(level[material.criterion], most["mean"], material)
+                if whole:
+                    by_largest = {"utilisation_max": "utilisation", "yield_utilisation": "yield_utilisation"}
+                    strength |= {name: most[of] for name, of in by_largest.items() if of in most}
+            found.append(SimpleNamespace(
+                **level, **{f"{scalar}_max": own[scalar].max() for scalar in SCALARS}, strength=strength, mean=[],
+                static=None, undamped=None, fixed=None, amplitude={name: level[name] for name in COMPONENTS},
+            ))  # fmt: skip
         return found
 
     def _evaluate(self) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Quantity, evaluated, table
-from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.quantities.sums import SUMS, sources_of
 from vanedamp.coupling.response.evaluation import Outcome, in_plane_of
 from vanedamp.coupling.response.figures import Measured, measure, measured_of
@@ -19,7 +17,7 @@ from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.contact_strength import CONTACTS
-from vanedamp.coupling.strength.haigh import utilisation, yield_utilisation
+from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.files.store import frozen
 
@@ -27,12 +25,15 @@ from vanedamp.files.store import frozen
 class Periods:
     """The periods of a motion, taken one after the other.
 
-    without: what quantities may not need. Sums are evaluated for all periods at once, other parts as they come; where
-    contacts yield, once the next period has told how the impacts end that a period leaves open.
+    without: what quantities may not need; each: samples of a period, of a scene with hot spots. Sums are evaluated for
+    all periods at once, other parts as they come; where contacts yield, once the next period has told how the impacts
+    end that a period leaves open.
     """
 
-    def __init__(self, scene: Scene, without: Mapping[str, str]) -> None:
+    def __init__(self, scene: Scene, without: Mapping[str, str], each: int = 0) -> None:
         self._without, self._late = without, scene.yields
+        spots = spots_of(scene)
+        self._stress = None if spots is None else StressSeries(spots, each)
         self._rows, self._planes = list[np.ndarray](), list[Mapping[str, np.ndarray]]()
         self._of_parts = dict[Quantity, list[Any]]()
         self._waiting: tuple[Scene, Outcome] | None = None
@@ -51,6 +52,8 @@ class Periods:
         self._rows.append(row)
         if run.plane is not None:
             self._planes.append(in_plane_of(run.plane, slice(0, 1)))
+        if self._stress is not None:
+            self._stress.add(scene, run.records.coordinates)
         self._finish(run)
         self._waiting = scene, run
         if not self._late:
@@ -69,29 +72,37 @@ class Periods:
             for one, values in self._of_parts.items():
                 values.append(one.of(parts))
 
-    def quantities(self, further: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the quantities (p, ...) of the periods; what no period knows is left out.
+    def stress_of_all(self) -> list[Any] | None:
+        """Return what quantities need of hot spots over all periods, as of a run; None without any."""
+        return self._stress.of_spots(whole=True) if self._stress is not None and self._rows else None
 
-        further: what quantities need besides, (p,) each, and `stress` as `spots_of_periods` returns it.
+    def results(self, further: Mapping[str, Any]) -> dict[str, Any]:
+        """Return `quantities` (p, ...) of the periods, `stress` and `strength`; what no period knows is left out.
+
+        further: what quantities need besides, (p,) each.
         """
         self._finish(None)
-        count, rows = len(self._rows), np.array(self._rows)
+        count, rows, of_spots = len(self._rows), np.array(self._rows), dict[str, Any]()
         if not count:
-            return {}
+            return {"quantities": {}}
         # sums are columns, beside which bodies have columns of their own
         sources = {name: _columns(value) for name, value in (sources_of(rows) | dict(further)).items()}
         for name in self._planes[0] if self._planes else ():
             sources[name] = np.array([plane[name] for plane in self._planes])
-        known = {name: value for name, value in sources.items() if name not in self._without}
+        if self._stress is not None:
+            of_spots = {"stress": frozen(self._stress.amplitudes()), "strength": self._stress.strengths}
+            sources["stress"] = self._stress.of_spots()
         found: dict[str, Any] = {
             name: np.moveaxis(value, -1, 0) if "stress" in table()[name].needs else value
-            for name, value in evaluated(known).items()
+            for name, value in evaluated(sources).items()
         } | {one.name: np.array(values, float) for one, values in self._of_parts.items()}
-        return {
+        known = {name: one for name, one in table().items() if name in found and one.lacking(self._without) is None}
+        quantities = {
             name: frozen(np.reshape(found[name], (count, *([-1] if one.dims else []))))
-            for name, one in table().items()
-            if name in found and np.isfinite(found[name]).any()
+            for name, one in known.items()
+            if np.isfinite(found[name]).any()
         }
+        return {"quantities": quantities, **of_spots}
 
 
 def _columns(value: Any) -> Any:
@@ -124,7 +135,7 @@ def _ended(run: Outcome, later: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
 
 def single_periods(run: Outcome) -> Iterator[Outcome]:
     """Yield the periods of a run as runs of their own."""
-    records, span = run.records, run.system.period
+    records, span, each = run.records, run.system.period, run.records.samples_per_period
     log = np.concatenate(run.log) if run.log else np.zeros((0, 1))
     edges = np.searchsorted(log[:, 0], span * np.arange(run.periods + 1))
     edges[0], edges[-1] = 0, len(log)
@@ -132,38 +143,9 @@ def single_periods(run: Outcome) -> Iterator[Outcome]:
         own = log[edges[k] : edges[k + 1]].copy()
         own[:, 0] -= k * span
         arrays = (part[k : k + 2] if len(part) == len(records.peak) else part for part in records)
+        own_records = type(records)(*arrays)._replace(coordinates=records.coordinates[k * each : (k + 1) * each])
         plane = run.plane
         if plane is not None:
             cut = {name: getattr(plane, name)[k : k + 1] for name in ("tilt", "lifted", "walls")}
             plane = plane._replace(**cut)
-        yield replace(run, records=type(records)(*arrays), periods=1, log=[own] if len(own) else [], plane=plane)
-
-
-def spots_of_periods(
-    series: StressSeries, strengths: Mapping[str, Mapping[str, Any]], whole: bool = False
-) -> list[Any]:
-    """Return what quantities need of hot spots: of each period, (p,), or of the whole motion as of a run.
-
-    strengths: those of the motion (StressSeries.strengths), whose mean stress counts.
-    """
-    amplitudes, found = series.amplitudes(), list[Any]()
-    for place, (name, material) in enumerate(zip(series.spots.facts, series.spots.materials, strict=True)):
-        own = dict(zip(MEASURES, amplitudes[:, place].T, strict=True))
-        level = {measure: values.mean() if whole else values for measure, values in own.items()}
-        tops = {f"{scalar}_max": own[scalar].max() if whole else np.nan for scalar in SCALARS}
-        strength = dict.fromkeys(("utilisation", "yield_utilisation"), np.nan * level[SCALARS[0]])
-        if material is not None:
-            most, mean = strengths[name], strengths[name]["mean"]
-            strength["utilisation"] = utilisation(level[material.criterion], mean, material)
-            if whole:
-                strength["utilisation_max"] = most["utilisation"]
-            used = yield_utilisation(
-                own[material.criterion].max() if whole else level[material.criterion], mean, material
-            )
-            strength |= {} if used is None else {"yield_utilisation": used}
-        found.append(SimpleNamespace(
-            **{scalar: level[scalar] for scalar in SCALARS}, **tops, strength=strength, mean=[], static=None,
-            amplitude={measure: level[measure] for measure in MEASURES if whole and measure not in SCALARS},
-            undamped=None, fixed=None,
-        ))  # fmt: skip
-    return found
+        yield replace(run, records=own_records, periods=1, log=[own] if len(own) else [], plane=plane)

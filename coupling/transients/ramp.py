@@ -18,6 +18,7 @@ import numpy as np
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
+from vanedamp.coupling.quantities.stress import LINEAR
 from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual, together
 from vanedamp.coupling.response.event_log import named_bodies
 from vanedamp.coupling.response.figures import contact_gain
@@ -32,7 +33,6 @@ from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of, simulate
 from vanedamp.coupling.strength.spots import samples_of, spots_of
-from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble, at_frequency
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (
@@ -45,7 +45,7 @@ from vanedamp.coupling.system.linear_response import (
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS
-from vanedamp.coupling.transients.periods import Periods, spots_of_periods
+from vanedamp.coupling.transients.periods import Periods
 from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
 from vanedamp.coupling.transients.ramp_record import CURVES, WORKS, Ramp, RampRun
 from vanedamp.files.store import Variable, frozen
@@ -170,14 +170,14 @@ class _Run:
         p, b = len(course.time), self.system.bodies
         travel = {cavity.name: cavity.gap for cavity in scene.cavity}
         self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
-        self.periods, self.linear, self.collided = Periods(scene, NOT_IN_RAMPS), np.full((2, p), np.nan), np.zeros(p)
+        self.linear, self.collided = np.full((2, p), np.nan), np.zeros(p)
         ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
         self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
-        self.spots, self.stress = spots_of(scene), None
-        if self.spots is not None:
-            each = max(samples_of(end, assemble(end), self.spots) for end in ends)
-            self.stress = StressSeries(self.spots, each)
+        spots = spots_of(scene)
+        #: samples of a period, for stress
+        self.each = 0 if spots is None else max(samples_of(end, assemble(end), spots) for end in ends)
+        self.periods = Periods(scene, NOT_IN_RAMPS, self.each)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
         # the energies without the work of the rotation, which is counted apart
         self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
@@ -202,7 +202,6 @@ class _Run:
         if self.over_speed:
             self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
             self.system = seen_only(assemble(self.scene))
-            self.spots = self.spots and spots_of(self.scene)
             if self.state is not None:
                 state = at_speed_of(self.scene, self.state)
                 # fewer modes than the model has may not hold the motion: their loss is no work of the rotation
@@ -211,9 +210,8 @@ class _Run:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
         solver: Any = self.scene.solver
         scene, system = self.scene, self.system
-        each = 0 if self.stress is None else self.stress.each
         exponent = together(one.needs for one in parts_of(scene)).exponent
-        records = new_records(system, 1, each, self.stress is not None, self.deflected, exponent, outputs=True)
+        records = new_records(system, 1, self.each, bool(self.each), self.deflected, exponent, outputs=True)
         left = solver.max_events - self.events
         start = start_of(scene, system, state)
         run = engine_run(system, start, records, True, left, solver.linearisation)
@@ -244,8 +242,6 @@ class _Run:
         if self.over_speed and self.scene.excitation.signal is None:
             at = self.course.frequency[k : k + 1]
             self.linear[:, k] = [one.amplitude(at)[0] for one in linear_responses(self.scene, self.system)]
-        if self.spots is not None and self.stress is not None:
-            self.stress.add(self.spots.stress(records.coordinates))
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
         self.stuck[k] = slow.all(axis=0) & same & ~named_bodies(outcome.rows, outcome.log, b)
@@ -274,21 +270,12 @@ class _Run:
         )  # fmt: skip
 
     def _measured(self, p: int) -> dict[str, Any]:
-        """Return quantities, stress and strength of the p periods done.
-
-        The mean stress is that of the speed where it is largest.
-        """
+        """Return quantities, stress and strength of the p periods done."""
         if not self.over_speed and self.scene.excitation.signal is None:
             for begin in range(0, p, _TOGETHER):
                 some = slice(begin, min(begin + _TOGETHER, p))
                 self.linear[:, some] = linear_amplitudes(self.scene, self.course.frequency[some])
-        further: dict[str, Any] = dict(zip(("undamped", "fixed"), self.linear[:, :p], strict=True))
-        of_spots: dict[str, Any] = {}
-        if self.spots is not None and self.stress is not None and p:
-            strength = self.stress.strengths([self.spots])
-            of_spots = {"stress": frozen(self.stress.amplitudes()), "strength": strength}
-            further["stress"] = spots_of_periods(self.stress, strength)
-        return {"quantities": self.periods.quantities(further), **of_spots}
+        return self.periods.results(dict(zip(LINEAR, self.linear[:, :p], strict=True)))
 
 
 def _carry_impulses(run: Any, earlier: Any) -> None:
@@ -322,7 +309,7 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
     speed = value * unit if table.path in SPEEDS else np.full(len(value), scene.speed)
     width, leaving = _crossing(scene, table, top, low, high)
     tops = {"half_power_width": width, "detuning_rate": leaving}
-    for name, peak in zip(("undamped", "fixed"), peaks, strict=True):
+    for name, peak in zip(LINEAR, peaks, strict=True):
         tops |= {f"{name}_peak": peak.amplitude, f"{name}_peak_frequency": peak.frequency}
     curves = {"frequency": frequency, "speed": speed, "undamped": undamped, "fixed": fixed}
     return {name: frozen(values) for name, values in curves.items()}, tops

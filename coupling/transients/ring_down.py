@@ -27,7 +27,6 @@ from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
-from vanedamp.coupling.strength.stress_series import StressSeries
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
@@ -35,7 +34,7 @@ from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import Followed, TurningPoint, TurningPoints, without_rebounds
 from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS, NOT_IN_RING_DOWNS
-from vanedamp.coupling.transients.periods import Periods, single_periods, spots_of_periods
+from vanedamp.coupling.transients.periods import Periods, single_periods
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
 from vanedamp.files.store import frozen
@@ -168,24 +167,18 @@ def _free_motion(
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
-    of_spots: dict[str, Any] = {}
-    of_periods: dict[str, Any] = {}
-    if spots is not None and outcome.periods:
-        series = StressSeries(spots, each)
-        for samples in np.split(records.coordinates[: outcome.periods * each], outcome.periods):
-            series.add(spots.stress(samples))
-        of_spots = {"stress": frozen(series.amplitudes()), "strength": series.strengths()}
-        of_periods["stress"] = spots_of_periods(series, of_spots["strength"])
-        response = replace(response, stress=tuple(spots_of_periods(series, of_spots["strength"], whole=True)))
-    course = Periods(free, NOT_IN_RAMPS | NOT_IN_RING_DOWNS)
+    course = Periods(free, NOT_IN_RAMPS | NOT_IN_RING_DOWNS, each)
     for one in single_periods(outcome):
         course.add(free, one)
+    if (stress := course.stress_of_all()) is not None:
+        response = replace(response, stress=tuple(stress))
+    of_periods = course.results({})
     ledger = outcome.records.ledger[: outcome.periods + 1]
     energies = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
     return response.status, {
         "time": frozen(moments), "displacement": frozen(system.response[mode] * coordinate), "energy": frozen(energy),
         "structure_energy": frozen(structure), "impacts": frozen(np.diff(np.searchsorted(hit, moments)), int),
-        **of_spots, "quantities": _measured(response), "course": course.quantities(of_periods),
+        "course": of_periods.pop("quantities"), **of_periods, "quantities": _measured(response),
         "warnings": response.warnings, "rest_time": None if turning.rest is None else turning.rest.time,
         "energies": dict(zip(PARTS, map(float, energies), strict=True)), "energy_residual": response.energy_residual,
     }  # fmt: skip
