@@ -113,7 +113,7 @@ def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[
     root, y = one + share * (other - one), near.y + share * (far.y - near.y)
     if (passage := problem.passage(y)) is None:
         return None
-    state, parameter = y[:-1] * problem.weight, problem.parameter(y)
+    state, parameter = problem.state(y), problem.parameter(y)
     orbit = replace(near.orbit, state=state, parameter=parameter, passage=passage, map=problem.at(parameter))
     points[root] = near._replace(y=y, orbit=orbit)
     return root

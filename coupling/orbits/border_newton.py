@@ -49,7 +49,7 @@ def place_of(
     """Return a point of a border that continues in the direction of `row` (k + 2,); None where it has no
     derivative."""
     condition = condition.renewed(y, passage)
-    columns = surface.columns(y)
+    columns = surface.columns(y, 2)
     if columns is None:
         return None
     plane = svd(np.hstack([surface.deflated(passage), columns]))[2][-2:].T

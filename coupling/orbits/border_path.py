@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage, change
 from vanedamp.coupling.orbits.border_newton import Place, place_of, solved
+from vanedamp.coupling.orbits.newton import passes
 from vanedamp.coupling.orbits.surface import Surface
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
@@ -115,7 +116,7 @@ class BorderPath:
             self.end = why
         elif not inside:
             self.end = "the end of a number's range"
-        elif len(self.places) > 4 and self._returned(before, place):
+        elif len(self.places) > 4 and passes(before.y, place.y, self.places[0].y):
             self.end = "closed: back at its first point"
 
     def _steep(self, place: Place) -> str | None:
@@ -125,13 +126,6 @@ class BorderPath:
         if parts < _STEEP or slowest is None:
             return None
         return f"{slowest.name} nearly grazes: motions part by {parts:.0e} per passage"
-
-    def _returned(self, before: Place, place: Place) -> bool:
-        """Say whether the path passes its first place between two."""
-        piece, first = place.y - before.y, self.places[0].y
-        share = (first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
-        away = np.linalg.norm(first - before.y - share * piece)
-        return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
 
     # -- points of codimension two
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border, BorderPoint
+from vanedamp.coupling.orbits.border import Border, BorderPoint, SpecialPoint
 from vanedamp.coupling.orbits.border_newton import Place, place_of, solved
 from vanedamp.coupling.orbits.border_path import BorderPath, Named
-from vanedamp.coupling.orbits.branch import Branch, SpecialPoint, stacked
+from vanedamp.coupling.orbits.branch import Branch, stacked
 from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
@@ -202,7 +202,7 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
         kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
         state=frozen([surface.state(place.border) for place in places]),
         multipliers=frozen([values**2 if surface.mirrored else values for values in found], complex),
-        quantities=stacked([surface.at(place.y).quantities(surface.state(place.y)) for place in places]),
+        quantities=stacked([_quantities(surface, place.y) for place in places]),
         orbits=frozen([each.orbits for each in counts], int),
         stable_orbits=frozen([each.stable for each in counts], int),
         special=tuple(_point(surface, index, named) for index, named in sorted(special, key=lambda entry: entry[0])),
@@ -210,9 +210,13 @@ def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, 
     )  # fmt: skip
 
 
+def _quantities(surface: Surface, y: np.ndarray) -> dict[str, Any]:
+    return surface.at(*surface.numbers(y).tolist()).quantities(surface.state(y))
+
+
 def _point(surface: Surface, index: int, named: Named) -> BorderPoint:
     parameter, second = surface.numbers(named.y).tolist()
-    return BorderPoint(index, parameter, second, named.kind, named.note, frozen(surface.state(named.y)))
+    return BorderPoint(index, parameter, named.kind, named.note, frozen(surface.state(named.y)), second)
 
 
 def _counts(place: Place) -> Counts:

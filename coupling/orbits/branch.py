@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border
+from vanedamp.coupling.orbits.border import Border, Points, SpecialPoint
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES
 from vanedamp.coupling.quantities import stress as of_stress
@@ -17,7 +17,7 @@ from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_alo
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Columns, Ragged, Record, Rows, Unit, declared, joined
+from vanedamp.files.record import Array, Ragged, Record, Rows, declared, joined
 from vanedamp.files.store import frozen
 
 
@@ -44,38 +44,12 @@ class BranchPoint(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialPoint:
-    """A bifurcation, a change of the event sequence or the end of a branch."""
-
-    index: int
-    """of the branch's point before it"""
-    parameter: Annotated[float, Unit("parameter")]
-    """there"""
-    kind: str
-    """what it is: "fold", "period doubling", "neimark-sacker", "pitchfork", "grazing", "sequence" or "end" (docs)"""
-    note: str
-    """what happens there"""
-    state: Annotated[np.ndarray, Array(("coordinate",))]
-    """(k,) at the start of the period"""
-
-
-@dataclass(frozen=True, eq=False)
-class Branch(Measured):
-    """A branch of m orbits with states of k coordinates, in the order in which it was followed.
+class Branch(Points):
+    """A branch of m orbits.
 
     All quantities of its orbits (results.md) are attributes, arrays over the points, and so are their families.
     """
 
-    periods: int
-    """of the excitation that its orbits take"""
-    parameter: Annotated[np.ndarray, Array(("point",), "parameter")]
-    """(m,)"""
-    state: Annotated[np.ndarray, Array(("point", "coordinate"))]
-    """(m, k) at the start of a period, in the units of Branches.names"""
-    multipliers: Annotated[
-        np.ndarray, Array(("point", "multiplier"), dtype=complex, name="multiplier", imaginary="_imag")
-    ]
-    """(m, k) complex, the largest first"""
     neutral: Annotated[np.ndarray, Array(("point",), dtype=int)]
     """(m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight"""
     stable: Annotated[np.ndarray, Array(("point",), dtype=bool)]
@@ -86,8 +60,6 @@ class Branch(Measured):
     """(m,) whether an orbit is its own mirror image half a period later"""
     undetermined: Annotated[np.ndarray, Array(("point",), dtype=bool)]
     """(m,) whether stability is open: events meet or graze, and multipliers hold on one side only"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
-    """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
     special: Annotated[tuple[SpecialPoint, ...], Rows("special")]
     """bifurcations, changes of the sequence, and the end"""
     end: str

@@ -13,13 +13,15 @@ import numpy as np
 
 from vanedamp.coupling.derivatives.passage import change, forecast
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
-from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
+from vanedamp.coupling.orbits.border import SpecialPoint
+from vanedamp.coupling.orbits.branch import Branch, BranchPoint
 from vanedamp.coupling.orbits.newton import (
     Orbit,
     OrbitStatus,
     Point,
     Problem,
     corrected,
+    passes,
     point_of,
     reached,
     with_symmetry,
@@ -114,10 +116,10 @@ class Continuation:
         """Add a point, and the end if it is one."""
         self.points.append(BranchPoint.of(with_symmetry(self.problem, point.orbit)))
         self.head = point
-        share = point.y[-1]
+        share, first = point.y[-1], self.problem.pack(self.points[0].state, self.points[0].parameter)
         if share >= 1.0 or share <= 0.0:
             self._end("the end of the parameter's range", point.orbit)
-        elif len(self.points) > 3 and self._returned(before, point):
+        elif len(self.points) > 3 and passes(before.y, point.y, first):
             self._end("closed: back at its first orbit", point.orbit)
 
     def _search(self, located: Iterable[Located]) -> bool:
@@ -148,14 +150,6 @@ class Continuation:
 
     def _note(self, orbit: Orbit, kind: str, note: str) -> None:
         self.special.append(SpecialPoint(len(self.points) - 1, orbit.parameter, kind, note, orbit.state))
-
-    def _returned(self, before: Point, point: Point) -> bool:
-        """Say whether the branch passes its first orbit between two points."""
-        piece = point.y - before.y
-        first = self.problem.pack(self.points[0].state, self.points[0].parameter)
-        share = (first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
-        away = np.linalg.norm(first - before.y - share * piece)
-        return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
 
     def _end(self, why: str, orbit: Orbit) -> None:
         self._note(orbit, "end", why)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
-from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
+from vanedamp.coupling.orbits.border import SpecialPoint
+from vanedamp.coupling.orbits.branch import Branch
 from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space

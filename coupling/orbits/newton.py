@@ -43,8 +43,8 @@ _SYMMETRIC = 1e-6
 _ITERATIONS, _HALVINGS = 8, 3
 #: moments of an orbit at which a derivative on all sides is sought
 _SECTIONS = 4
-#: scenes and passages that are kept for the next step, which often wants them again; more would fill the memory
-_MAPS, _PASSAGES = 3, 16
+#: scenes that are kept for the next step
+_MAPS = 3
 
 
 class OrbitStatus(StrEnum):
@@ -195,11 +195,20 @@ class Point(NamedTuple):
     tangent: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
 class Scaled:
-    """Orbits of a period map in scaled coordinates."""
+    """Orbits of a period map over numbers of its scene, in scaled coordinates y = (state, numbers).
+
+    map: with any values of the numbers; paths: of these; origin, span: values at which the scaled ones are 0, and their
+    ranges; mirrored: whether orbits are symmetric, and the map takes half a period (PeriodMap.half).
+    """
 
     map: PeriodMap
+    paths: tuple[str, ...]
+    origin: Any
+    span: Any
+    mirrored = False
+    #: passages that are kept for the next step, which often wants them again; more would fill the memory
+    _MOST = 16
 
     @property
     def size(self) -> int:
@@ -211,81 +220,101 @@ class Scaled:
         """Sizes (k,) by which states are divided: the mean square of a scaled state counts."""
         return np.asarray(self.map.scale * math.sqrt(self.size))
 
+    def pack(self, state: np.ndarray, numbers: Any) -> np.ndarray:
+        """Return y of a state (k,) and the numbers."""
+        return np.append(state / self.weight, np.where(np.isnan(self.origin), 0.0, (numbers - self.origin) / self.span))
+
+    def state(self, y: np.ndarray) -> np.ndarray:
+        """Return the state (k,)."""
+        return np.asarray(y[: self.size] * self.weight)
+
+    def numbers(self, y: np.ndarray) -> np.ndarray:
+        """Return the numbers; nan for a map without."""
+        return np.asarray(self.origin + self.span * y[self.size :])
+
+    @cached_property
+    def _maps(self) -> dict[tuple[float, ...], PeriodMap]:
+        return {}
+
+    @cached_property
+    def _passages(self) -> dict[bytes, Passage | None]:
+        return {}
+
+    def at(self, *numbers: float) -> PeriodMap:
+        """Return the map at values of the numbers. Raises InputError for values that make no scene."""
+        if any(map(math.isnan, numbers)):
+            return self.map
+        if numbers not in self._maps:
+            _keep(self._maps, numbers, self.map.with_numbers(dict(zip(self.paths, numbers, strict=True))), _MAPS)
+        return self._maps[numbers]
+
+    def passage(self, y: np.ndarray, derivative: bool = True) -> Passage | None:
+        """Return the passage of y; None if its numbers make no scene, or it has no end, or no derivative if wanted."""
+        key = np.append(y, derivative).tobytes()
+        if key not in self._passages:
+            _keep(self._passages, key, self._walked(y, derivative), self._MOST)
+        return self._passages[key]
+
+    def _walked(self, y: np.ndarray, derivative: bool = True, paths: tuple[str, ...] = ()) -> Passage | None:
+        """Return a passage, with derivatives by some of the numbers."""
+        try:
+            along = self.at(*self.numbers(y).tolist())
+        except InputError:
+            return None
+        along = replace(along, numbers=paths) if paths else along
+        passage = (along.half if self.mirrored else along)(self.state(y), derivative)
+        return passage if passage.serves(derivative) or paths else None
+
+    def columns(self, y: np.ndarray, numbers: int) -> np.ndarray | None:
+        """Return the derivative (k, n) of the residual by the first n scaled numbers; None where it is unknown."""
+        try:
+            passage = self._walked(y, True, self.paths[:numbers])
+        except NotSmooth:
+            return None
+        if passage is None:
+            return None
+        found = passage.by_number / self.weight[:, None] * np.atleast_1d(self.span)[:numbers]
+        return found if np.isfinite(found).all() else None
+
+    def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return by how much an orbit misses itself, scaled (k,)."""
+        return np.asarray(passage.state / self.weight - y[: self.size])
+
+    def derivative(self, passage: Passage) -> np.ndarray:
+        """Return the derivative (k, k) of the map in scaled coordinates."""
+        return passage.scaled(self.map.scale)
+
 
 @dataclass(frozen=True, eq=False)
 class Problem(Scaled):
-    """Orbits of a period map over a range of its parameter, scaled.
+    """Orbits of a period map over a range of its parameter. origin: nan for a map without; count: of iterations."""
 
-    origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
-    passages so far.
-    """
-
+    map: PeriodMap
     origin: float = math.nan
     span: float = 1.0
     count: Counter[str] = field(default_factory=Counter)
-    _maps: dict[float, PeriodMap] = field(default_factory=dict)
-    _passages: dict[bytes, Passage | None] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Path of the parameter."""
+        return (self.map.parameter,)
 
     @cached_property
     def along_parameter(self) -> np.ndarray:
         """The unit row (k + 1,) of the parameter: orbits in a plane normal to it have one value of that."""
         return np.append(np.zeros(self.size), 1.0)
 
-    def at(self, parameter: float) -> PeriodMap:
-        """Return the map at a value of the parameter. Raises InputError for one that is no scene."""
-        if math.isnan(parameter):
-            return self.map
-        if parameter not in self._maps:
-            keep(self._maps, parameter, self.map.at(parameter), _MAPS)
-        return self._maps[parameter]
-
     def parameter(self, y: np.ndarray) -> float:
         """Return the parameter, nan for a map without."""
-        return self.origin + self.span * float(y[-1])
-
-    def pack(self, state: np.ndarray, parameter: float) -> np.ndarray:
-        """Return y (k + 1,)."""
-        share = 0.0 if math.isnan(self.origin) else (parameter - self.origin) / self.span
-        return np.append(state / self.weight, share)
-
-    def passage(self, y: np.ndarray) -> Passage | None:
-        """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
-        return self._passage(y[:-1] * self.weight, self.parameter(y))
-
-    def motion(self, y: np.ndarray) -> Passage | None:
-        """Return the passage of y without its derivative; None if its parameter makes no scene, or it has no end."""
-        return self._passage(y[:-1] * self.weight, self.parameter(y), False)
-
-    def _passage(self, state: np.ndarray, parameter: float, derivative: bool = True) -> Passage | None:
-        key = np.append(state, (parameter, derivative)).tobytes()
-        if key not in self._passages:
-            keep(self._passages, key, self._walked(state, parameter, derivative), _PASSAGES)
-        return self._passages[key]
-
-    def _walked(self, state: np.ndarray, parameter: float, derivative: bool) -> Passage | None:
-        self.count["passages"] += 1
-        try:
-            passage = self.at(parameter)(state, derivative)
-        except InputError:
-            return None
-        return passage if passage.serves(derivative) else None
-
-    def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
-        """Return by how much an orbit misses itself, scaled (k,)."""
-        return np.asarray(passage.state / self.weight - y[:-1])
+        return float(self.numbers(y)[0])
 
     def slope(self, y: np.ndarray) -> np.ndarray:
         """Return the derivative of the residual by the scaled parameter (k,); 0 where there is none."""
-        try:
-            along = replace(self.at(self.parameter(y)), numbers=(self.map.parameter,))
-            found = along(y[:-1] * self.weight).by_number[:, 0]
-        except (InputError, NotSmooth):
-            return np.zeros(self.size)
-        known = np.asarray(found / self.weight * self.span)
-        return known if np.isfinite(known).all() else np.zeros(self.size)
+        columns = self.columns(y, 1)
+        return np.zeros(self.size) if columns is None else columns[:, 0]
 
 
-def keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
     """Keep a value in place of the oldest of many."""
     kept[key] = value
     if len(kept) > most:
@@ -311,9 +340,9 @@ def solve(
     """
     y, passage = start, problem.passage(start)
     if passage is None:
-        state, periods = start[:-1] * problem.weight, problem.map.periods
+        state, periods = problem.state(start), problem.map.periods
         parameter, nothing = problem.parameter(start), Passage.stopped(np.full(problem.size, np.nan), periods)
-        status, motion = OrbitStatus.STOPPED, problem.motion(start)
+        status, motion = OrbitStatus.STOPPED, problem.passage(start, False)
         if motion is not None:
             status = OrbitStatus.UNDETERMINED
         known = None if motion is None else problem.at(parameter)
@@ -344,7 +373,7 @@ def solve(
             break
     missed = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size)
     return Orbit(
-        status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count,
+        status, problem.parameter(y), problem.state(y), problem.map.periods, scale, passage, missed, count,
         map=problem.at(problem.parameter(y)),
     )  # fmt: skip
 
@@ -418,7 +447,7 @@ def _taken(
 def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Return the derivative of the residual by y, and a row below it (k + 1, k + 1)."""
     matrix = np.empty((problem.size + 1, problem.size + 1))
-    matrix[:-1, :-1] = passage.scaled(problem.map.scale) - np.eye(problem.size)
+    matrix[:-1, :-1] = problem.derivative(passage) - np.eye(problem.size)
     matrix[:-1, -1], matrix[-1] = slope, row
     return matrix
 
@@ -435,6 +464,14 @@ def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
     y = problem.pack(orbit.state, orbit.parameter)
     slope = problem.slope(y)
     return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))
+
+
+def passes(before: np.ndarray, after: np.ndarray, place: np.ndarray) -> bool:
+    """Say whether the way from one y to the next leads past another."""
+    piece = after - before
+    share = (place - before) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
+    away = np.linalg.norm(place - before - share * piece)
+    return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
 
 
 def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

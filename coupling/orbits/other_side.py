@@ -78,9 +78,7 @@ class OtherSide:
             return None
         apart = np.diff([*times, times[0] + periods])
         later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % periods
-        there = replace(
-            self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]), _maps={}, _passages={}
-        )
+        there = replace(self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]))
         head = self._moved(self.problem, last, there, later)
         if head is None:
             return None
@@ -111,7 +109,7 @@ class OtherSide:
         parameter = point.orbit.parameter
         behind = point.y - _BEHIND * point.tangent
         states = [
-            self._state(problem, y[:-1] * problem.weight, problem.parameter(y), later) for y in (point.y, behind)
+            self._state(problem, problem.state(y), problem.parameter(y), later) for y in (point.y, behind)
         ]  # fmt: skip
         if states[0] is None or states[1] is None:
             return None
@@ -213,7 +211,7 @@ class OtherSide:
 
         def part(at: float) -> float:
             y = base + at * last.tangent
-            passage = self.problem.motion(y)
+            passage = self.problem.passage(y, False)
             return np.nan if passage is None else float(residual @ self.problem.residual(y, passage))
 
         for _ in range(_WIDENINGS):

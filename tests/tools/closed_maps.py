@@ -69,8 +69,9 @@ class ClosedMap:
         return replace(self, value=value)
 
     def with_numbers(self, values: dict[str, float]) -> ClosedMap:
-        """Return the map at two values, a tuple of them."""
-        return replace(self, value=tuple(values.values()))
+        """Return the map at a value, or at two values, a tuple of them."""
+        first, *others = values.values()
+        return replace(self, value=(first, *others)) if others else self.at(first)
 
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
@@ -161,6 +162,9 @@ class ImpactOscillator:
 
     def at(self, value: float) -> ImpactOscillator:
         return replace(self, value=value)
+
+    def with_numbers(self, values: dict[str, float]) -> ImpactOscillator:
+        return self.at(*values.values())
 
     def over(self, periods: int) -> ImpactOscillator:
         return replace(self, periods=periods)
