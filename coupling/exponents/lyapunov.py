@@ -21,6 +21,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
+from vanedamp.coupling.quantities.exponents import told
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import LEAST_EXPONENTS, Scene, loaded
@@ -40,11 +41,8 @@ _ZERO = 0.02
 _NEUTRAL = 1e-9
 
 
-#: plain data of a motion that has no exponent, because its run ended early
-NO_EXPONENT: dict[str, Any] = {
-    "status": PassageStatus.STOPPED.value, "motion": "undecided", "exponent": math.nan, "confidence": math.nan,
-    "exponent_per_period": math.nan, "exponents": [],
-}  # fmt: skip
+#: of a motion that has no exponent, because its run ended early
+NO_EXPONENT = told(PassageStatus.STOPPED.value, "undecided", ())
 
 
 class Motion(StrEnum):
@@ -105,11 +103,8 @@ class Exponents(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return {
-            "status": self.status.value, "motion": self.motion.value, "exponent": self.largest,
-            "confidence": self.error, "exponent_per_period": self.per_period, "exponents": self.exponents.tolist(),
-            "repeats": self.repeats, "neutral": self.neutral, "periods": self.periods,
-        }  # fmt: skip
+        own = told(self.status.value, self.motion.value, self.exponents.tolist(), self.error, self.period)
+        return own | {"repeats": self.repeats, "neutral": self.neutral, "periods": self.periods}
 
 
 def lyapunov(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.orbits.multipliers import decided
+from vanedamp.coupling.quantities.exponents import told
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.response import Response
 
@@ -55,9 +56,5 @@ def exponents_of(
     sizes = np.abs(decided(multipliers, neutral)) if known else np.zeros(0)
     with np.errstate(divide="ignore"):
         rates = np.sort(np.log(sizes))[::-1] / (periods * period)
-    largest = float(rates[0]) if len(rates) else np.nan
-    return {
-        "status": status, "motion": "periodic" if known else "undecided", "exponent": largest,
-        "confidence": 0.0 if len(rates) else np.nan, "exponent_per_period": largest * period,
-        "exponents": rates.tolist(),
-    }  # fmt: skip
+    confidence = 0.0 if len(rates) else np.nan
+    return told(status, "periodic" if known else "undecided", rates.tolist(), confidence, period)

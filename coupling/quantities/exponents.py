@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vanedamp.coupling.quantities.quantity import quantity
 
 ORDER = 50
+
+
+def told(
+    status: str, kind: str, exponents: Sequence[float], confidence: float = math.nan, period: float = math.nan
+) -> dict[str, Any]:
+    """Return what quantities need of exponents, 1/s, the largest first, with its confidence; period: s."""
+    largest = exponents[0] if len(exponents) else math.nan
+    return {
+        "status": status, "motion": kind, "exponent": largest, "confidence": confidence,
+        "exponent_per_period": largest * period, "exponents": list(exponents),
+    }  # fmt: skip
 
 
 @quantity("1/s")
