@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from vanedamp.coupling.methods.registry import WALLS, respond
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, amplitude_mean_dynamic
-from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.response.by_sector import sectors
 from vanedamp.coupling.response.evaluation import Fields, Observer, Outcome
-from vanedamp.coupling.response.moved_start import Mean, moved
+from vanedamp.coupling.response.moved_start import KEPT, Mean, moved
 from vanedamp.coupling.response.observers import EVENT_LIST, TOGETHER, samples, wear
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -86,10 +82,9 @@ def _from_moved(
     None where no body hits anything, for a run that is not ok, and where the bodies cannot begin elsewhere.
     """
     # those of the transient choose a state as well
-    hit = known["quantities"][impacts_per_period.name] or run.counters.get("impacts")
+    hit = run.records.impacts[known["transient"] : run.periods].any() or run.counters.get("impacts")
     if known["status"] is not Status.OK or not hit or not scene.damper:
         return {}
-    tolerance = 2 * scene.time.tolerance
     places = moved(scene, scene.positions if start is None else start.slip.tolist())
     if start is None:
         bodies = tuple(replace(body, position=place) for body, place in zip(scene.damper, places, strict=True))
@@ -100,13 +95,8 @@ def _from_moved(
         second = respond(scene, start=start, progress=progress)
     except InputError:  # a tilted body at a wall
         return {}
-    one, other = _mean(known["status"], known["quantities"]), _mean(second.status, second.quantities)
-    agrees = one.agrees(other, tolerance)
-    names = (amplitude_mean_dynamic.name, amplitude_mean_confidence.name, impacts_per_period.name, "classification")
-    results = {"agrees": agrees, "status": other.status} | {name: getattr(second, name) for name in names}
-    return {"moved_start": results, "warnings": () if agrees else (one.sentence(other),)}
-
-
-def _mean(status: Status, found: Mapping[str, Any]) -> Mean:
-    mean, confidence = (found[one.name] for one in (amplitude_mean_dynamic, amplitude_mean_confidence))
-    return Mean(status.value, mean, math.nan if confidence is None else confidence)
+    one = Mean.of(known["status"].value, known["quantities"])
+    other = Mean.of(second.status.value, second.quantities)
+    results, warnings = one.compared(other, scene.time.tolerance)
+    results |= {name: getattr(second, name) for name in (*KEPT, "classification")}
+    return {"moved_start": results, "warnings": warnings}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, amplitude_mean_dynamic
+from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.scene.scene import Scene
 
 #: part of the way to other places by which a second run begins elsewhere: of the order of 1e-9 of the free travel
@@ -16,6 +18,8 @@ _MOVED = 4e-9
 _ASIDE = 0.618
 #: distances of neighbours over their free travel that count as contact: at time zero, and in sections
 _TOUCHING, _TOGETHER = 1e-12, 1e-9
+#: quantities of a second run that are kept: those of its Mean first
+KEPT = tuple(one.name for one in (amplitude_mean_dynamic, amplitude_mean_confidence, impacts_per_period))
 #: what has to be equal of neighbours that touch without speed
 _RATES = ("velocity", "tilt", "tilt_rate")
 
@@ -26,6 +30,16 @@ class Mean(NamedTuple):
     status: str
     amplitude: float
     confidence: float
+
+    @classmethod
+    def of(cls, status: str, quantities: Mapping[str, Any]) -> Mean:
+        """Return that of a run with some quantities."""
+        return cls(status, *(np.nan if quantities[name] is None else quantities[name] for name in KEPT[:2]))
+
+    def compared(self, second: Mean, tolerance: float) -> tuple[dict[str, Any], tuple[str, ...]]:
+        """Return how a run from a moved start compares, and a warning if they differ; tolerance: of a steady mean."""
+        agrees = self.agrees(second, 2 * tolerance)
+        return {"agrees": agrees, "status": second.status}, () if agrees else (self.sentence(second),)
 
     def agrees(self, other: Mean, tolerance: float) -> bool:
         """Return whether another run has the same mean within both intervals, and a tolerance relative to it."""

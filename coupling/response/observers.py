@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome
 from vanedamp.coupling.response.event_log import events_of, impact_energies
@@ -53,9 +52,10 @@ def _worn(scene: Scene, run: Outcome, known: Fields) -> Fields:
 
 
 def _together(scene: Scene, run: Outcome, known: Fields) -> Fields:
-    if not known["quantities"][impacts_per_period.name]:
+    first = known["transient"]
+    if not run.records.impacts[first : run.periods].any():
         return {}
-    return {"warnings": as_one(scene, *(known[name][known["transient"] :] for name in ("slip", "slip_velocity")))}
+    return {"warnings": as_one(scene, *(known[name][first:] for name in ("slip", "slip_velocity")))}
 
 
 #: keeps the list of events

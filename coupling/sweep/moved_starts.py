@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, amplitude_mean_dynamic
-from vanedamp.coupling.quantities.impacts import impacts_per_period
-from vanedamp.coupling.response.moved_start import Mean, as_one, moved, neighbours
+from vanedamp.coupling.response.moved_start import KEPT, Mean, as_one, moved, neighbours
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.row import Row
@@ -19,8 +17,6 @@ from vanedamp.coupling.sweep.schedule import run_tasks
 from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.coupling.system.sectors import unrolled
 
-#: measures of a second run that are kept
-_KEPT = tuple(one.name for one in (amplitude_mean_dynamic, amplitude_mean_confidence, impacts_per_period))
 #: sections at which neighbours that never part are looked for
 _SECTIONS = 33
 
@@ -83,12 +79,11 @@ def _compared(
     """Return the results of the second runs, and warnings of those that do not agree with the first."""
     found, notes, status = [], [], table.text("status")
     for number, (peak, point) in enumerate(zip(peaks, points, strict=True)):
-        kept = {name: float(table.row.value(table.values[number], name)) for name in _KEPT}
-        one = Mean("ok", *(float(getattr(sweep, name).flat[peak]) for name in _KEPT[:2]))
-        other = Mean(str(status[number]), *(kept[name] for name in _KEPT[:2]))
-        agrees = one.agrees(other, 2 * sweep.scene.time.tolerance)
-        found.append({"at": dict(point), "agrees": agrees, "status": other.status} | kept)
-        notes += [] if agrees else [f"at {_named(point)}: {one.sentence(other)}"]
+        kept = {name: float(table.row.value(table.values[number], name)) for name in KEPT}
+        one = Mean.of("ok", {name: float(getattr(sweep, name).flat[peak]) for name in KEPT})
+        results, warnings = one.compared(Mean.of(str(status[number]), kept), sweep.scene.time.tolerance)
+        found.append({"at": dict(point)} | results | kept)
+        notes += [f"at {_named(point)}: {warning}" for warning in warnings]
     return found, notes
 
 
