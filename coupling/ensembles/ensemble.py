@@ -13,12 +13,12 @@ from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
 from vanedamp.coupling.ensembles.record import PEAK, REDUCTION, Ensemble, complete, kept
 from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic, amplitude_undamped
-from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.linear_peaks import undamped_peak
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sweep.grid import resonance_axis
-from vanedamp.coupling.sweep.sweep import run_all, warnings_in
+from vanedamp.coupling.sweep.over_axes import of_axes
+from vanedamp.coupling.sweep.sweep import notes_on, run_all
 from vanedamp.coupling.sweep.worker import SweepTable
 from vanedamp.files.store import frozen
 
@@ -54,16 +54,13 @@ def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -
     count, seed = len(points.samples), points.scene.sampled.seed
     return Ensemble(
         scene=points.scene,
-        axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
+        axes=of_axes(grid.axes),
         samples=points.samples,
         members=found,
         status=frozen(status, object),
         quantile={name: frozen(quantiles(values, count)) for name, values in (results | of_curves).items()},
         indices={name: frozen(indices(values, count, seed)) for name, values in (told | of_curves).items()},
-        provenance=provenance
-        | warnings_in(grid, found[penetration.name])
-        | ({} if grid.estimate is None else {"estimate": grid.estimate})
-        | ({} if grid.advice is None else {"advice": grid.advice}),
+        provenance=provenance | notes_on(grid, found),
     )
 
 

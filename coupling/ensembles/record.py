@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
 from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic
-from vanedamp.coupling.quantities.quantity import table
+from vanedamp.coupling.quantities.quantity import Quantity, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.grid import dimension, dimensions, resonance_axis
-from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Columns, Own, Record
+from vanedamp.coupling.sweep.grid import dimension, resonance_axis
+from vanedamp.coupling.sweep.over_axes import OverAxes
+from vanedamp.files.record import Array, Columns, Own
 from vanedamp.files.store import Variable, frozen
 
 #: numbers that a sentence names, of the spread's
@@ -34,37 +34,31 @@ NOT_IN_ENSEMBLES = {
 PEAK, REDUCTION = "peak_amplitude", "reduction"
 
 
-class Spread(NamedTuple):
-    """A result of all samples: its unit, and whether points have it ("grid") or curves ("curves")."""
-
-    unit: str
-    dims: tuple[str, ...] = ()
-    dtype: type = float
-
-
-def kept() -> dict[str, Spread]:
+def kept() -> dict[str, Quantity]:
     """Return what is kept of all samples, by name: of bodies, hot spots and sectors the largest."""
     found = (one for one in table().values() if not one.text and one.lacking(NOT_IN_ENSEMBLES) is None)
-    return {one.name: Spread(one.unit) for one in found}
+    return {one.name: one._replace(dims=()) for one in found}
 
 
-def spreads() -> dict[str, Spread]:
+def spreads() -> dict[str, Quantity]:
     """Return the results whose spread is told: at every point of the grid, and of the whole curve along its frequency.
 
     Of a curve: the highest mean, m, as amplitude_mean_dynamic; what the bodies take of the maximum without bodies; and
     the highest stress, wear and so on.
     """
-    at_points = {name: Spread(one.unit, ("grid",)) for name, one in table().items() if one.spread}
-    limited = {f"peak_{name}": Spread(one.unit, ("curves",)) for name, one in table().items() if one.limited}
-    return at_points | {PEAK: Spread("m", ("curves",)), REDUCTION: Spread("1", ("curves",))} | limited
+    at_points = {name: one._replace(dims=("grid",)) for name, one in table().items() if one.spread}
+    of_curves = {name: one._replace(dims=("curves",)) for name, one in table().items()}
+    peak = of_curves[amplitude_mean_dynamic.name]
+    limited = {f"peak_{name}": one for name, one in of_curves.items() if one.limited}
+    return at_points | {PEAK: peak, REDUCTION: peak._replace(unit="1")} | limited
 
 
-def _fractions() -> dict[str, Spread]:
+def _fractions() -> dict[str, Quantity]:
     return {name: one._replace(unit="1") for name, one in spreads().items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(Record, Plotted):
+class Ensemble(OverAxes):
     """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers."""
 
     KIND: ClassVar[str] = "ensemble"
@@ -108,8 +102,7 @@ class Ensemble(Record, Plotted):
     @property
     def curves(self) -> tuple[str, ...]:
         """The axes over which there is a curve each: all but the frequency, or the speed along an engine order."""
-        swept = resonance_axis(self.scene, self.axes)[0]
-        return tuple(path for path in self.axes if path != swept)
+        return tuple(path for path in self.axes if path != self.swept)
 
     def sentences(self) -> Iterator[str]:
         """Yield for every curve its reduction with what its spread is due to."""
@@ -134,7 +127,7 @@ class Ensemble(Record, Plotted):
 
     def _remark(self, place: tuple[Any, ...]) -> str:
         """Return how many samples of a curve have no peak within its range, in words; nothing for none."""
-        swept = resonance_axis(self.scene, self.axes)[0]
+        swept = self.swept
         if swept is None or len(self.axes[swept]) < 2:
             return ""
         mean = np.where(self.status == "ok", self.members[amplitude_mean_dynamic.name], -np.inf)
@@ -146,7 +139,7 @@ class Ensemble(Record, Plotted):
     def derived(self) -> dict[str, Any]:
         """Return axes, ranges, quantiles and indices; the file has all members."""
         own = {path: values.tolist() for path, values in self.axes.items()}
-        units = {path: unit_of(path) for path in (*self.axes, *self.samples)}
+        units = self.units() | {path: unit_of(path) for path in self.samples}
         units |= {name: one.unit for name, one in spreads().items()}
         return {
             "axes": own, "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
@@ -156,7 +149,7 @@ class Ensemble(Record, Plotted):
                 name: dict(zip(INDICES, (part.tolist() for part in values), strict=True))
                 for name, values in self.indices.items()
             },
-            "numbers": list(self.numbers), "warnings": list(self.provenance.get("warnings", ())),
+            "numbers": list(self.numbers), "warnings": list(self.warnings),
             "sentences": list(self.sentences()),
         }  # fmt: skip
 
@@ -164,32 +157,18 @@ class Ensemble(Record, Plotted):
         """Return the names along dimensions that have some."""
         return {"number": self.numbers, "index": INDICES}
 
-    def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return the dimensions of the grid, and of its curves."""
-        return dimensions(self.scene, self.axes)
-
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file."""
         found = super().variables() | {"quantile": Variable(np.array(QUANTILES), ("quantile",))}
-        for path, values in self.axes.items():
-            found[dimension(path)] = Variable(values, (dimension(path),), unit_of(path))
         for path, values in self.samples.items():
             found[f"sample_{dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
         return found
 
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        return super().attributes() | {"axes": list(self.axes)}
-
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
         """Return the record in the variables and attributes of a file."""
-        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
-        return cls(
-            axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
-            samples={number: frozen(values[f"sample_{dimension(number)}"]) for number in values["number"]},
-            **cls.given(values, attributes, path),
-        )
+        samples = {number: frozen(values[f"sample_{dimension(number)}"]) for number in values["number"]}
+        return cls(samples=samples, **cls.given(values, attributes, path))
 
 
 def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:

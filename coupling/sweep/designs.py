@@ -8,7 +8,6 @@ import numpy as np
 
 from vanedamp.coupling.quantities.linear_peaks import undamped_peak
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 
@@ -39,13 +38,12 @@ def is_choice(path: str) -> bool:
 
 def of_design(sweep: Sweep) -> list[str]:
     """Return the axes of a sweep over designs; the others have the frequencies, the starts and the like of each."""
-    swept = resonance_axis(sweep.scene, sweep.axes)[0]
-    return [path for path in sweep.axes if is_choice(path) and path != swept]
+    return [path for path in sweep.axes if is_choice(path) and path != sweep.swept]
 
 
 def relative_amplitudes(sweep: Sweep, heights: np.ndarray) -> np.ndarray:
     """Return heights of points, m, over the maximum without bodies of their curves; nan where that is none."""
-    swept, top = resonance_axis(sweep.scene, sweep.axes)[0], sweep.amplitude_undamped
+    swept, top = sweep.swept, sweep.amplitude_undamped
     if swept is not None:
         at = list(sweep.axes).index(swept)
         known = sweep.peaks.get(undamped_peak.name)

@@ -15,12 +15,10 @@ from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, declared_in, labels, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
-from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.grid import dimension, dimensions
+from vanedamp.coupling.sweep.over_axes import OverAxes
 from vanedamp.coupling.sweep.row import TEXTS
-from vanedamp.files.display import Plotted, html_table
-from vanedamp.files.record import Array, Columns, Own, Record
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.display import html_table
+from vanedamp.files.record import Array, Columns, Own
 
 #: amplitudes that earlier files have of bodies without static loads only, which they are then as well
 _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
@@ -40,7 +38,7 @@ _MOST_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(Measured, Record, Plotted):
+class Sweep(Measured, OverAxes):
     """Responses over the product of the axes.
 
     All quantities that points have are attributes (results.md), arrays over the grid in the axes' order, with
@@ -79,11 +77,6 @@ class Sweep(Measured, Record, Plotted):
         return usual[0] if usual else max(lengths, key=lengths.__getitem__)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """To be read before results are used."""
-        return tuple(self.provenance.get("warnings", ()))
-
-    @property
     def moved_starts(self) -> list[dict[str, Any]]:
         """Of the peak of each curve that has impacts: where it is, what a run from bodies about 1e-9 of their gap aside
         comes to, and whether it `agrees` (response.moved_start); empty if not asked for, and for linked runs."""
@@ -109,17 +102,9 @@ class Sweep(Measured, Record, Plotted):
             f"and {rest} further points" if rest > 0 else "",
         )
 
-    def units(self) -> dict[str, str]:
-        """Return the unit of every axis by its path."""
-        return {path: unit_of(path) for path in self.axes}
-
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
         return labels_along(self.quantities, self.hot_spots)
-
-    def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return the dimensions of the grid, and of its curves."""
-        return dimensions(self.scene, self.axes)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, quantities as nested lists (nan where there is none), without sections."""
@@ -134,24 +119,12 @@ class Sweep(Measured, Record, Plotted):
         units = {name: table()[name].unit for name in (*self.quantities, *self.peaks)}
         return {"axes": axes, "units": self.units() | units, "loss": list(labels("loss"))} | notes
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        units = self.units()
-        axes = {dimension(axis): Variable(v, (dimension(axis),), units[axis]) for axis, v in self.axes.items()}
-        return axes | super().variables()
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        return super().attributes() | {"axes": list(self.axes)}
-
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Sweep:
         """Return the record in the variables and attributes of a file."""
         earlier = {f"{name}_dynamic": values[name] for name in _ALSO_DYNAMIC}
         earlier[penetration.name] = np.full(np.shape(values["status"]), np.nan)
-        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
-        given = cls.given(earlier | dict(values), attributes, path)
-        return cls(axes={axis: frozen(array, array.dtype) for axis, array in axes.items()}, **given)
+        return cls(**cls.given(earlier | dict(values), attributes, path))
 
 
 def _text(value: Any) -> str:

@@ -24,6 +24,7 @@ from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.moved_starts import with_moved_starts
+from vanedamp.coupling.sweep.over_axes import of_axes
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.row import TEXTS, Row
 from vanedamp.coupling.sweep.schedule import run_tasks
@@ -107,22 +108,21 @@ def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> S
     found = finished.arrays(grid.shape)
     return Sweep(
         scene=grid.scene,
-        axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
+        axes=of_axes(grid.axes),
         quantities=found,
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
-        | warnings_in(grid, found[penetration.name])
-        | ({} if grid.estimate is None else {"estimate": grid.estimate})
-        | ({} if grid.advice is None else {"advice": grid.advice}),
+        | notes_on(grid, found),
     )
 
 
-def warnings_in(grid: Grid, penetration: np.ndarray) -> dict[str, list[str]]:
-    """Return the warnings of a grid and of its results for the provenance. penetration: (..., *grid) of all points."""
-    found = (*grid.warnings, *wall_warnings(grid.base, grid.axes, penetration))
-    return {"warnings": list(found)} if found else {}
+def notes_on(grid: Grid, quantities: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return what a record's provenance says of a grid: warnings, estimate and advice. quantities: of all points."""
+    warnings = [*grid.warnings, *wall_warnings(grid.base, grid.axes, quantities[penetration.name])]
+    notes = {"warnings": warnings, "estimate": grid.estimate, "advice": grid.advice}
+    return {name: note for name, note in notes.items() if note}
 
 
 #: keys that linear curves do not depend on
