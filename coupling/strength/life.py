@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import ndtri
@@ -19,23 +18,22 @@ PROBABILITIES = (0.1, 0.5, 0.9)
 _BETWEEN = ndtri(0.9) - ndtri(0.1)
 
 
+def curve_of(fatigue: Fatigue) -> tuple[float, float, float, float]:
+    """Return strength, Pa, knee, and exponents above and below it. Raises InputError without a curve."""
+    if fatigue.exponent is None or fatigue.knee is None or fatigue.strength is None:
+        raise InputError("fatigue.exponent: missing; a life needs exponent and knee of a curve of stress and life")
+    return fatigue.strength, fatigue.knee, *fatigue.exponents
+
+
 def damage_per_cycle(amplitude: np.ndarray | float, fatigue: Fatigue) -> np.ndarray:
     """Return 1 / N of fully reversed amplitudes, Pa: (amplitude / strength)^k / knee, k by the side of the knee.
 
     Source: Basquin (1910); below the knee Haibach (1970): 2 k - 1. Raises InputError without a curve.
     """
-    if fatigue.exponent is None or fatigue.knee is None or fatigue.strength is None:
-        raise InputError("fatigue.exponent: missing; a life needs exponent and knee of a curve of stress and life")
-    above, below = fatigue.exponents
-    used = np.asarray(amplitude, dtype=float) / fatigue.strength
+    strength, knee, above, below = curve_of(fatigue)
+    used = np.asarray(amplitude, dtype=float) / strength
     under = np.zeros_like(used) if math.isinf(below) else np.minimum(used, 1.0) ** below
-    return np.where(used >= 1.0, used**above, under) / fatigue.knee
-
-
-def cycles_to_failure(amplitude: np.ndarray | float, fatigue: Fatigue, mean: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the cycles to failure (50 % probability) of amplitudes at mean stresses, Pa; inf without damage."""
-    damage = damage_per_cycle(equivalent_amplitude(amplitude, mean, fatigue), fatigue)
-    return np.divide(1.0, damage, out=np.full(damage.shape, np.inf), where=damage > 0.0)
+    return np.where(used >= 1.0, used**above, under) / knee
 
 
 def damage(cycles: Cycles, fatigue: Fatigue, static: float = 0.0) -> float:
@@ -45,13 +43,6 @@ def damage(cycles: Cycles, fatigue: Fatigue, static: float = 0.0) -> float:
     """
     equivalent = equivalent_amplitude(0.5 * cycles.ranges, cycles.means + static, fatigue)
     return float(np.sum(cycles.counts * damage_per_cycle(equivalent, fatigue)))
-
-
-def damage_rate(
-    amplitude: np.ndarray | float, frequency: float, fatigue: Fatigue, mean: np.ndarray | float = 0.0
-) -> np.ndarray:
-    """Return Miner's sum per second of a motion with one cycle of an amplitude, Pa, per period; frequency: Hz."""
-    return frequency * damage_per_cycle(equivalent_amplitude(amplitude, mean, fatigue), fatigue)
 
 
 def life_at(median: float, fatigue: Fatigue, probability: float) -> float:
@@ -65,9 +56,9 @@ def life_at(median: float, fatigue: Fatigue, probability: float) -> float:
     return float(median * fatigue.scatter ** (ndtri(probability) / _BETWEEN))
 
 
-def quantiles(median: float, fatigue: Fatigue, probabilities: Sequence[float] = PROBABILITIES) -> dict[str, float]:
+def quantiles(median: float, fatigue: Fatigue) -> dict[str, float]:
     """Return the lives by which fractions of parts have failed, {"10%": ...}, in the unit of the median life."""
-    return {f"{100 * chance:g}%": life_at(median, fatigue, chance) for chance in probabilities}
+    return {f"{100 * chance:g}%": life_at(median, fatigue, chance) for chance in PROBABILITIES}
 
 
 def hours(damage: float, duration: float) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import gamma, gammainc, gammaincc
 
 from vanedamp.coupling.strength.haigh import mean_factor
+from vanedamp.coupling.strength.life import curve_of
 from vanedamp.coupling.strength.material import Fatigue
 from vanedamp.files.toml_input import InputError
 
@@ -127,33 +128,23 @@ def dirlik_damage(found: Moments, duration: float, fatigue: Fatigue, mean: float
     third = 1.0 - first - second
     scale = 1.25 * (irregularity - third - second * width) / first
     return found.peaks * duration * (
-        first * _exponential_damage(scale * deviation, fatigue, mean)
+        first * _mean_damage(scale * deviation, 1.0, fatigue, mean)
         + second * _rayleigh_damage(abs(width) * deviation, fatigue, mean)
         + third * _rayleigh_damage(deviation, fatigue, mean)
     )  # fmt: skip
 
 
-def _sides(fatigue: Fatigue, mean: float) -> tuple[float, float, float, float]:
-    """Return the strength at a mean stress, 1 / knee, and both exponents. Raises InputError without a curve."""
-    if fatigue.strength is None or fatigue.exponent is None or fatigue.knee is None:
-        raise InputError("fatigue.exponent: missing; a life needs exponent and knee of a curve of stress and life")
-    return fatigue.strength * float(mean_factor(mean, fatigue)), 1.0 / fatigue.knee, *fatigue.exponents
-
-
 def _rayleigh_damage(deviation: float, fatigue: Fatigue, mean: float) -> float:
-    """Return the mean damage of a cycle whose amplitude has Rayleigh's density S / d^2 exp(-S^2 / (2 d^2)), d in Pa."""
-    strength, rate, above, below = _sides(fatigue, mean)
-    return _two_sides(strength, rate, above, below, math.sqrt(2.0) * deviation, 2.0)
+    return _mean_damage(math.sqrt(2.0) * deviation, 2.0, fatigue, mean)
 
 
-def _exponential_damage(scale: float, fatigue: Fatigue, mean: float) -> float:
-    """Return the mean damage of a cycle whose amplitude has the density exp(-S / q) / q, q in Pa."""
-    strength, rate, above, below = _sides(fatigue, mean)
-    return _two_sides(strength, rate, above, below, scale, 1.0)
+def _mean_damage(scale: float, power: float, fatigue: Fatigue, mean: float) -> float:
+    """Return the mean damage of a cycle if (amplitude / scale)^power has the density exp(-x); scale: Pa.
 
-
-def _two_sides(strength: float, rate: float, above: float, below: float, scale: float, power: float) -> float:
-    """Return the mean of the damage per cycle if (S / scale)^power has the density exp(-x)."""
+    With the power 1 the amplitude's density is exponential, with 2 Rayleigh's, of the deviation scale / sqrt(2).
+    """
+    strength, knee_cycles, above, below = curve_of(fatigue)
+    strength *= float(mean_factor(mean, fatigue))
     if not strength > 0.0:
         return math.inf
     if not scale > 0.0:
@@ -163,4 +154,4 @@ def _two_sides(strength: float, rate: float, above: float, below: float, scale: 
     total = relative**above * gamma(1.0 + above / power) * gammaincc(1.0 + above / power, knee)
     if not math.isinf(below):
         total += relative**below * gamma(1.0 + below / power) * gammainc(1.0 + below / power, knee)
-    return float(rate * total)
+    return float(1.0 / knee_cycles * total)

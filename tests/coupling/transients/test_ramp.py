@@ -12,12 +12,13 @@ from scipy.integrate import solve_ivp
 import vanedamp as vd
 from tests.coupling.sweep.test_continuation import BISTABLE, DAMPING, EPS, RATIOS, one_to_one
 from tests.coupling.system.test_loads import ring, travelling
+from tests.tools.chirp import chirp_response
 from tests.tools.processes import ROOT
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes
-from vanedamp.coupling.transients.lewis import chirp_response, peak_ratio
+from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp import at_frequency, ramp
 from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp

@@ -8,9 +8,9 @@ from scipy import signal
 
 from tests.studies.identification.oscillator import MASS, OMEGA, RATIO, SCENE, STIFFNESS, scene
 from tests.studies.identification.test_study import write
+from tests.tools.chirp import chirp_response
 from vanedamp.coupling.scene.scene import Time
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.transients.lewis import chirp_response
 from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.files.toml_input import InputError
