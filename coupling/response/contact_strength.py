@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from vanedamp.coupling.response.contact_work import contact_name
+from vanedamp.coupling.response.contact_work import OfContact
 
 
 @dataclass(frozen=True)
-class ContactStrength:
-    """Impacts of one contact over the evaluated periods; damper, side, corner as of an Event."""
+class ContactStrength(OfContact):
+    """Impacts of one contact over the evaluated periods."""
 
-    damper: int
-    """number of the body, or of a stop its own"""
-    side: str
-    """what it meets"""
-    corner: int
-    """corner of a body; -1: none"""
     impacts: int
     """number of impacts"""
     fastest: float
@@ -34,11 +27,6 @@ class ContactStrength:
     """fraction of the impacts whose pressure is beyond first yield [-]"""
 
     @property
-    def name(self) -> str:
-        """Name for people."""
-        return contact_name(self.damper, self.side, self.corner)
-
-    @property
     def sentence(self) -> str:
         """What the record says, in a line."""
         used = "" if self.utilisation is None else f", {self.utilisation:.3g} of first yield"
@@ -46,7 +34,3 @@ class ContactStrength:
             f"{self.name}: up to {self.fastest:.3g} m/s, {self.peak_force:.4g} N for {1e6 * self.duration:.3g} us, "
             f"{self.pressure / 1e6:.4g} MPa{used}"
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self)

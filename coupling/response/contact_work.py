@@ -42,19 +42,37 @@ def contact_name(damper: int, side: str, corner: int = -1) -> str:
 
 
 @dataclass(frozen=True)
-class ContactWear:
+class OfContact:
+    """A result of one contact; damper, side, corner as of an Event."""
+
+    damper: int
+    """number of the body, or of a stop its own"""
+    side: str
+    """what it meets"""
+    corner: int
+    """corner of a body; -1: none"""
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return contact_name(self.damper, self.side, self.corner)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class ContactWear(OfContact):
     """Wear of one contact, at the mean rates of the evaluated periods.
 
-    damper, side, corner: as of an Event. sliding: integral of normal force times slip speed, N m; friction: its
+    sliding: integral of normal force times slip speed, N m; friction: its
     coefficient times that, J; impacts: sum of their energies to the power n, J^n; hits: their number. work_rate:
     sliding per time, W. volume_rate: m^3/h of both partners, of which the cavity (of neighbours the right body) loses
     `share`; depth_rate: m/h, None where the patch is not known. *_confidence: half widths of 95 % confidence intervals,
     None where there are too few periods.
     """
 
-    damper: int
-    side: str
-    corner: int
     sliding: float
     friction: float
     impacts: float
@@ -66,15 +84,6 @@ class ContactWear:
     share: float
     area: float | None
 
-    @property
-    def name(self) -> str:
-        """Name for people."""
-        return contact_name(self.damper, self.side, self.corner)
-
     def hours_to(self, depth: float) -> float | None:
         """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
         return depth / self.depth_rate if self.depth_rate else None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self)

@@ -167,15 +167,11 @@ def run_scene(
     while True:
         counted[0] = dropped
         while done < periods:
-            for observer in observers:
-                observer.look(run, dropped)
             # compiled functions hear of no interrupt before they return
             done = min(done + _CHUNK, dropped if done < dropped else periods)
-            ended = run.advance_to(done)
+            ended = _advanced(run, done, periods, progress, observers, dropped)
             if ended is not Status.OK:
                 return Ended(ended, dropped)
-            if progress is not None:
-                progress(done, periods)
         found = judge(transient, run.outcome().records, dropped, periods)
         code = run_ends(found.steady, found.rate, dropped, periods, most)
         if code != codes.LONGER:
@@ -193,13 +189,9 @@ def _run_until_known(
     """Run until the mean amplitude is known well enough, at most some periods."""
     tolerance, ended = transient.scene.time.tolerance, Ended(Status.NOT_STEADY, transient.scene.time.dropped)
     for done in [*range(_CHUNK, periods, _CHUNK), periods]:
-        for observer in observers:
-            observer.look(run, None)
-        status = run.advance_to(done)
+        status = _advanced(run, done, periods, progress, observers, None)
         if status is not Status.OK:
             return Ended(status, ended.transient)
-        if progress is not None:
-            progress(done, periods)
         outcome = run.outcome()
         records, (_, peaks) = outcome.records, about_mean(outcome.records, 0, done, outcome.system.period)
         dropped = transient_length(peaks)
@@ -214,6 +206,19 @@ def _run_until_known(
         else:
             ended = Ended(Status.UNCERTAIN, dropped, found.confidence)
     return ended
+
+
+def _advanced(
+    run: Run, done: int, periods: int, progress: Callable[[int, int], None] | None, observers: Sequence[Observer],
+    dropped: int | None,
+) -> Status:  # fmt: skip
+    """Return how a run came to the end of some periods."""
+    for observer in observers:
+        observer.look(run, dropped)
+    status = run.advance_to(done)
+    if status is Status.OK and progress is not None:
+        progress(done, periods)
+    return status
 
 
 def evaluate(

@@ -20,7 +20,7 @@ from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Own, Record
+from vanedamp.files.record import Array, Own, Record, Unit, row_variables
 from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.recovery import COMPONENTS
@@ -69,7 +69,7 @@ class Status(StrEnum):
 class Event:
     """One event. Speeds are relative to the wall or body met; of planar bodies and at stops, of the gap."""
 
-    time: float
+    time: Annotated[float, Unit("s")]
     """time [s]"""
     kind: str
     """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
@@ -79,17 +79,17 @@ class Event:
     side: str
     """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
     "stop" for a stop; of other elements the name of their table"""
-    relative_velocity_before: float
+    relative_velocity_before: Annotated[float, Unit("m/s")]
     """relative speed before [m/s]"""
-    relative_velocity_after: float
+    relative_velocity_after: Annotated[float, Unit("m/s")]
     """relative speed after [m/s]"""
-    impulse: float
+    impulse: Annotated[float, Unit("N s")]
     """impulse along the normal [N s]"""
     corner: int = -1
     """corner of a body, from 0 (of a block 0 to 3) against the clock from the lower left one; -1: none"""
-    tangential_impulse: float = 0.0
+    tangential_impulse: Annotated[float, Unit("N s")] = 0.0
     """impulse of friction [N s]"""
-    loss: float = 0.0
+    loss: Annotated[float, Unit("J")] = 0.0
     """energy that the impulses of an impact take, without what completes a chatter [J]"""
 
 
@@ -313,7 +313,8 @@ class Response(Measured, Record, Plotted):
         if self.stress:
             found["hot_spot"] = Variable(np.array([spot.name for spot in self.stress], object), ("hot_spot",))
             found["stress_component"] = Variable(np.array(COMPONENTS, object), ("stress_component",))
-        return found | (self._event_variables() if self.event_list else {})
+        events = row_variables(self.event_list, Event, "event") if self.event_list else {}
+        return found | {name: events[name] for name in map("event_{}".format, self._event_fields()) if name in events}
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
@@ -354,18 +355,6 @@ class Response(Measured, Record, Plotted):
             sectors=SectorResponse.of(values, nested["sectors"]) if "sectors" in nested else None,
             scene=None if scene is None else validate(Scene, scene, path), **given,
         )  # fmt: skip
-
-    def _event_variables(self) -> dict[str, Variable]:
-        units = {
-            "time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s",
-            "tangential_impulse": "N s", "loss": "J",
-        }  # fmt: skip
-        return {
-            f"event_{name}": Variable(
-                [getattr(event, name) for event in self.event_list], ("event",), units.get(name, "1")
-            )
-            for name in self._event_fields()
-        }
 
     def _event_fields(self) -> list[str]:
         """Return the names of the fields of events; some apply to planar bodies only."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -93,17 +93,11 @@ class SpotStress:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain data, components by name."""
-        data: dict[str, Any] = {
-            "coordinates": None if self.coordinates is None else list(self.coordinates), "group": self.group,
-            "amplitude": dict(self.amplitude), "von_mises": self.von_mises, "principal": self.principal,
-            "amplitude_max": dict(self.amplitude_max), "von_mises_max": self.von_mises_max,
-            "principal_max": self.principal_max, "mean": named(self.mean),
-            "static": None if self.static is None else named(self.static), "undamped": self.undamped,
-            "fixed": self.fixed, "strength_fraction": self.strength_fraction, "fatigue": dict(self.fatigue),
-            "samples_per_period": self.samples_per_period, "sampling_error": self.sampling_error,
-            "mesh_error": self.mesh_error,
-        }  # fmt: skip
-        return data
+        data = {name: value for name, value in asdict(self).items() if name not in ("name", "strength")}
+        for name in ("mean", "static"):
+            data[name] = None if data[name] is None else named(data[name])
+        coordinates = None if self.coordinates is None else list(self.coordinates)
+        return data | {"coordinates": coordinates, "strength_fraction": self.strength_fraction}
 
 
 def named(components: np.ndarray) -> dict[str, float]:

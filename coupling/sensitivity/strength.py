@@ -15,7 +15,7 @@ from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.dual import Dual
 from vanedamp.coupling.sensitivity.peaks import Found, largest
-from vanedamp.coupling.strength.contact_strength import wanted
+from vanedamp.coupling.strength.contact_strength import loaded, wanted
 
 
 class Worst(NamedTuple):
@@ -66,9 +66,6 @@ class Struck:
 
 
 def _strength(scene: Scene, energy: float) -> np.ndarray:
-    """Return force, N, pressure, Pa, and its utilisation, if it is known, of an impact with an energy, J."""
     pair = scene.contact.pair
     assert pair is not None and pair.contact is not None
-    force = pair.contact.force_of_energy(energy)
-    pressure = pair.contact.pressure(force)
-    return np.array([force, pressure] + ([] if pair.first_yield is None else [pressure / pair.first_yield]))
+    return np.array(loaded(pair.contact, pair.first_yield, energy))

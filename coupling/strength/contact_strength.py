@@ -111,17 +111,23 @@ def _strength(
     pulses = zip(*(column[one].tolist() for column in (after / speed, impulse, durations)), strict=True)
     energy[one] = [contact.energy(peak_over_mean(left) * passed / lasts) for left, passed, lasts in pulses]
     worst = int(np.argmax(energy))
-    force, duration = contact.force_of_energy(float(energy[worst])), float(durations[worst])
+    duration, utilisation, yielding = float(durations[worst]), None, None
+    force, pressure, *used = loaded(contact, first_yield, float(energy[worst]))
     if np.isnan(duration):
         duration = collision(contact, float(mass[worst]), float(speed[worst])).duration
-    pressure = contact.pressure(force)
-    utilisation = yielding = None
     if first_yield is not None:
         limit = contact.energy(contact.force_of_pressure(first_yield))
-        utilisation, yielding = pressure / first_yield, int(np.sum(energy > limit)) / len(energy)
+        utilisation, yielding = used[0], int(np.sum(energy > limit)) / len(energy)
     return ContactStrength(
         *place, len(energy), float(speed.max()), force, duration, pressure, utilisation, yielding
     )  # fmt: skip
+
+
+def loaded(contact: Contact, first_yield: float | None, energy: float) -> list[float]:
+    """Return force, N, and pressure, Pa, of Hertz's contact with an energy, J, and its utilisation, if it is known."""
+    force = contact.force_of_energy(energy)
+    pressure = contact.pressure(force)
+    return [force, pressure, *([] if first_yield is None else [pressure / first_yield])]
 
 
 def _warnings(strengths: Sequence[ContactStrength], speeds: tuple[float, float] | None) -> Iterator[str]:
