@@ -69,14 +69,10 @@ class Parts(NamedTuple):
     @classmethod
     def of(cls, dynamics: Dynamics, start: np.ndarray) -> Parts:
         """Return the parts of a scene's dynamics."""
-        s = dynamics.system
-        return cls(
-            dynamics.root, dynamics.rows, dynamics.gap, dynamics.speed, dynamics.load, dynamics.turn,
-            dynamics.to_state, dynamics.from_state, dynamics.follows, dynamics.bound, dynamics.pulled,
-            dynamics.response, dynamics.outputs, dynamics.tilts, s.mass, s.J, s.friction, s.limit, s.restitution,
-            np.where(np.isfinite(s.spring), s.spring, 0.0), s.dashpot, s.tangential, s.frequency,
-            np.array(s.period), start,
-        )  # fmt: skip
+        system = dynamics.system
+        own = {"spring": np.where(np.isfinite(system.spring), system.spring, 0.0), "period": np.array(system.period)}
+        known = system._asdict() | vars(dynamics) | own | {"start": start}
+        return cls(*(known[name] for name in cls._fields))
 
     def flat(self) -> np.ndarray:
         """Return all in one array."""

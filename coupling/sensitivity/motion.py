@@ -19,7 +19,7 @@ from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.figures import Figures
 from vanedamp.coupling.sensitivity.measures import Measures
-from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
 
 Paths = tuple[str | MatrixDirection, ...]
@@ -148,12 +148,11 @@ def _series(measures: Measures, rows: Callable[..., np.ndarray]) -> dict[str, An
 
 def nothing(paths: Sequence[str | MatrixDirection], status: SensitivityStatus, note: str) -> Sensitivity:
     """Return the record of a motion without derivatives."""
-    none, rows, n = frozen(()), frozen(np.zeros((0, len(paths)))), len(paths)
+    series = dict.fromkeys((*SERIES, "time"), np.zeros(0)) | {"motion": np.zeros((0, 3))}
+    turned = {f"{name}_derivative": np.zeros((*series[name].shape, len(paths))) for name in SERIES}
     return Sensitivity(
         paths=tuple(path if isinstance(path, str) else path.name for path in paths), status=status, note=note,
-        values={}, derivatives={}, names=(), state=none, state_derivative=rows, peak=none, peak_derivative=rows,
-        impact_time=none, impact_speed=none, impact_time_derivative=rows, impact_speed_derivative=rows, time=none,
-        motion=frozen(np.zeros((0, 3))), motion_derivative=frozen(np.zeros((0, 3, n))),
+        values={}, derivatives={}, names=(), **{name: frozen(array) for name, array in (series | turned).items()},
     )  # fmt: skip
 
 
@@ -167,10 +166,7 @@ def together(alone: Sequence[Sensitivity]) -> Sensitivity:
         return frozen(np.concatenate(rows, axis=-1))
 
     without = [f"{each.paths[0]}: no derivative, {each.note}" for each in alone if each.status != SensitivityStatus.OK]
-    turned: dict[str, Any] = {
-        f"{name}_derivative": joined(attrgetter(f"{name}_derivative"))
-        for name in ("state", "peak", "impact_time", "impact_speed", "motion")
-    }
+    turned: dict[str, Any] = {f"{name}_derivative": joined(attrgetter(f"{name}_derivative")) for name in SERIES}
 
     def of(name: str) -> Callable[[Sensitivity], np.ndarray]:
         return lambda each: each.derivatives[name]

@@ -17,7 +17,7 @@ from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
-from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
 
 #: round-off of a period map, relative, and error of an orbit's derivatives, relative, beyond which it is at a fold
@@ -95,7 +95,7 @@ def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.nd
                    energy if name.startswith("energy.") else largest[name]).any()
     ]  # fmt: skip
     series = dict[str, Any]()
-    for name in ("peak", "impact_time", "impact_speed", "motion"):
+    for name in SERIES[1:]:
         key, most = f"{name}_derivative", float(np.abs(getattr(found, name)).max(initial=0.0))
         turns = getattr(found, key)
         off = is_open(turns, (getattr(each, key) for each in others), most)

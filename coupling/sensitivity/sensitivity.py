@@ -56,21 +56,14 @@ def _tried(
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives, or the record of why there are none."""
     try:
-        return _found(motion, paths, orders, times, start)
+        if isinstance(motion, Orbit):
+            return of_orbit(motion, paths, orders=orders, times=times)
+        if isinstance(motion, RingDown):
+            return of_ring_down(motion, paths, orders, times)
+        if isinstance(motion, Ramp):
+            return of_ramp(motion, paths)
+        return of_run(loaded(motion), paths, start, orders=orders, times=times)
     except NoDerivative as error:
         return nothing(paths, error.status, error.note)
     except NotSmooth as error:
         return nothing(paths, SensitivityStatus.UNDETERMINED, str(error))
-
-
-def _found(
-    motion: Orbit | RingDown | Ramp | Scene | str | Path, paths: Paths, orders: Sequence[int], times: list[float],
-    start: RestartState | None,
-) -> Sensitivity:  # fmt: skip
-    if isinstance(motion, Orbit):
-        return of_orbit(motion, paths, orders=orders, times=times)
-    if isinstance(motion, RingDown):
-        return of_ring_down(motion, paths, orders, times)
-    if isinstance(motion, Ramp):
-        return of_ramp(motion, paths)
-    return of_run(loaded(motion), paths, start, orders=orders, times=times)

@@ -24,6 +24,10 @@ NOT_IN_DERIVATIVES: dict[str, str] = {
 }
 
 
+#: what a motion has that is not a figure, with derivatives "<name>_derivative"; all but the first one are series
+SERIES = ("state", "peak", "impact_time", "impact_speed", "motion")
+
+
 class SensitivityStatus(StrEnum):
     """Whether derivatives exist and mean something. Unless `ok`, there are none, nor figures."""
 

@@ -31,6 +31,9 @@ DIRECTIONS = ("up", "down")
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
 #: series of a run, an entry per period, and their units
 SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s"}
+#: numbers of a run, and their units ("rate": of the ramp's quantity per second), and texts
+NUMBERS = {"rate": "1", "peak": "m", "peak_frequency": "Hz", "peak_speed": "rad/s", "energy_residual": "1"}
+TEXTS = ("direction", "status")
 #: quantities of a period that files have by names of their own
 NAMED = {
     amplitude_max.name: "amplitude", amplitude_max_dynamic.name: "amplitude_dynamic", impacts_per_period.name: "impacts"
@@ -126,6 +129,16 @@ class RampRun(Measured):
         """Largest amplitude, m; nan for a run that ended in its first period."""
         return float(self.amplitude[self.top]) if len(self.amplitude) else np.nan
 
+    @property
+    def peak_frequency(self) -> float:
+        """Frequency there, Hz."""
+        return self.at_peak("frequency")
+
+    @property
+    def peak_speed(self) -> float:
+        """Speed there, rad/s."""
+        return self.at_peak("speed")
+
     def at_peak(self, name: str) -> float:
         """Return the value of a series in the period with the largest amplitude."""
         return float(getattr(self, name)[self.top]) if len(self.amplitude) else np.nan
@@ -191,12 +204,10 @@ class Ramp(Measured, Record, Plotted):
         """Return peaks, energies and status of each run as plain data (nan where there is none)."""
         runs = [
             {
-                "rate": run.rate, "direction": run.direction, "status": run.status, "periods": len(run.time),
-                "peak": run.peak, "peak_frequency": run.at_peak("frequency"), "peak_speed": run.at_peak("speed"),
+                **{name: getattr(run, name) for name in (*TEXTS, *NUMBERS)}, "periods": len(run.time),
                 "peak_time": run.at_peak("time"), "peak_share": self.share(run),
                 "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
-                "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
-                "energy": dict(run.energy), "energy_residual": run.energy_residual,
+                "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [], "energy": dict(run.energy),
             } | ({} if run.stress is None else {"stress": self.tops_of_stress(run), "strength": self.strength(run)})
             for run in self.runs
         ]  # fmt: skip
@@ -227,13 +238,13 @@ class Ramp(Measured, Record, Plotted):
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
-        runs, unit = self.runs, f"{self.table.unit}/s"
-        dampers = len(self.scene.damper)
+        runs, dampers = self.runs, len(self.scene.damper)
 
         def joined(name: str) -> np.ndarray:
             return np.concatenate([getattr(run, name) for run in runs])
 
         periods = [len(run.time) for run in runs]
+        numbers = NUMBERS | {"rate": f"{self.table.unit}/s"}
         measured = {
             NAMED.get(name, name): Variable(values, ("period", *table()[name].dims), table()[name].unit)
             for name, values in self.quantities.items()
@@ -244,13 +255,8 @@ class Ramp(Measured, Record, Plotted):
             **measured,
             "run_of_start": Variable(np.repeat(np.arange(len(runs)), np.add(periods, 1)), ("start",)),
             **{name: Variable(joined(name), ("start",), units) for name, units in STATES.items()},
-            "rate": Variable([run.rate for run in runs], ("run",), unit),
-            "direction": Variable(np.array([run.direction for run in runs], object), ("run",)),
-            "status": Variable(np.array([run.status for run in runs], object), ("run",)),
-            "peak": Variable([run.peak for run in runs], ("run",), "m"),
-            "peak_frequency": Variable([run.at_peak("frequency") for run in runs], ("run",), "Hz"),
-            "peak_speed": Variable([run.at_peak("speed") for run in runs], ("run",), "rad/s"),
-            "energy_residual": Variable([run.energy_residual for run in runs], ("run",)),
+            **{name: Variable([getattr(run, name) for run in runs], ("run",), one) for name, one in numbers.items()},
+            **{name: Variable(np.array([getattr(run, name) for run in runs], object), ("run",)) for name in TEXTS},
             "work": Variable(np.array(WORKS, object), ("work",)),
             "energy": Variable([[run.energy[name] for name in WORKS] for run in runs], ("run", "work"), "J"),
             **{f"linear_{name}": Variable(self.curves[name], ("linear",), units) for name, units in CURVES.items()},

@@ -23,6 +23,12 @@ from vanedamp.files.store import Variable
 #: energies of a ring-down: at its start, lost, and at its end
 PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 
+#: units of the results of turning points, cycles and modes that have one
+UNITS = {
+    "time": "s", "displacement": "m", "energy": "J", "amplitude": "m", "frequency": "Hz", "fixed_frequency": "Hz",
+    "energy_loss": "J",
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
 class LinearMode:
@@ -146,25 +152,13 @@ class RingDown(Measured, Record, Plotted):
 
     def derived(self) -> dict[str, Any]:
         """Return turning points, half cycles, cycles and bins, and further numbers by names with units."""
-        half, whole = self.half_cycles, self.cycles
-        hertz = {"frequency": "frequency_hz", "fixed_frequency": "fixed_frequency_hz"}
-        linear = {hertz.get(name, name): value for name, value in asdict(self.linear).items()}
+        turning = {name: getattr(self, name) for name in ("time", "displacement", "energy")}
         data: dict[str, Any] = {
-            "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time,
+            "linear": _with_units(asdict(self.linear)), "duration_s": self.duration, "rest_time_s": self.rest_time,
             "energies_j": {name: self.energies[name] for name in PARTS if name in self.energies},
-            "turning_points": {
-                "time_s": self.time.tolist(), "displacement_m": self.displacement.tolist(),
-                "energy_j": self.energy.tolist(),
-            },
-            "half_cycles": {
-                "time_s": half.time.tolist(), "amplitude_m": half.amplitude.tolist(),
-                "frequency_hz": half.frequency.tolist(), "impacts": self.impacts.tolist(),
-            },
-            "cycles": {
-                "time_s": whole.time.tolist(), "amplitude_m": whole.amplitude.tolist(),
-                "damping_ratio": whole.damping_ratio.tolist(),
-                "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_j": whole.loss.tolist(),
-            },
+            "turning_points": _with_units(turning),
+            "half_cycles": _with_units(_named(self.half_cycles)) | {"impacts": self.impacts.tolist()},
+            "cycles": _with_units(_named(self.cycles)),
         }  # fmt: skip
         if self.stress is not None:
             data["stress_pa"] = {
@@ -174,7 +168,7 @@ class RingDown(Measured, Record, Plotted):
         if self.quantities:
             data["quantities"] = {name: np.asarray(value).tolist() for name, value in self.quantities.items()}
         if self.table.bins:
-            data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
+            data["bins"] = _with_units({name: _of_bins(found) for name, found in self.bins.items()})
         if self.strength:
             data["strength"] = {spot: dict(values) for spot, values in self.strength.items()}
         for name in ("estimate", "advice"):
@@ -184,17 +178,11 @@ class RingDown(Measured, Record, Plotted):
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: turning points, half cycles, windows of cycles, and bins if there are any."""
-        half, whole = self.half_cycles, self.cycles
-        found = super().variables() | {
-            "half_cycle_time": Variable(half.time, ("half_cycle",), "s"),
-            "half_cycle_amplitude": Variable(half.amplitude, ("half_cycle",), "m"),
-            "frequency": Variable(half.frequency, ("half_cycle",), "Hz"),
-            "cycle_time": Variable(whole.time, ("cycle",), "s"),
-            "cycle_amplitude": Variable(whole.amplitude, ("cycle",), "m"),
-            "damping_ratio": Variable(whole.damping_ratio, ("cycle",)),
-            "damping_ratio_energy": Variable(whole.damping_ratio_energy, ("cycle",)),
-            "energy_loss": Variable(whole.loss, ("cycle",), "J"),
-        }
+        found = super().variables()
+        for dim, swings in (("half_cycle", self.half_cycles), ("cycle", self.cycles)):
+            for name, values in _named(swings).items():
+                named = f"{dim}_{name}" if name in ("time", "amplitude") else name
+                found[named] = Variable(values, (dim,), UNITS.get(name, "1"))
         if self.stress is not None:
             found |= stress_axes(list(self.provenance["hot_spots"]))
         if self.stress is not None or self.course:
@@ -203,12 +191,22 @@ class RingDown(Measured, Record, Plotted):
         if self.table.bins:
             for name, each in self.bins.items():
                 units = {"low": "m", "high": "m", "number": "1"}
-                for part, values in zip(each._fields, each, strict=True):
-                    unit = units.get(part, "Hz" if name == "frequency" else "1")
+                for part, values in each._asdict().items():
+                    unit = units.get(part, UNITS.get(name, "1"))
                     found[f"{name}_{part}"] = Variable(values, ("bin",), unit)
         return found
 
 
 def _of_bins(found: Bins) -> dict[str, list[float]]:
     names = {"low": "amplitude_low_m", "high": "amplitude_high_m"}
-    return {names.get(part, part): values.tolist() for part, values in zip(found._fields, found, strict=True)}
+    return {names.get(part, part): values.tolist() for part, values in found._asdict().items()}
+
+
+def _named(part: HalfCycles | Cycles) -> dict[str, Any]:
+    return {"energy_loss" if name == "loss" else name: values for name, values in part._asdict().items()}
+
+
+def _with_units(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return results as plain data by names with their units."""
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+    return {f"{name}_{UNITS[name].lower()}" if name in UNITS else name: value for name, value in plain.items()}
