@@ -101,10 +101,35 @@ def family(name: str) -> list[Quantity]:
     return [one for one in table().values() if one.family == name]
 
 
-def evaluated(sources: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all quantities that some sources have."""
-    with np.errstate(all="ignore"):
-        return {one.name: one.of(sources) for one in possible(frozenset(sources))}
+class Later(Mapping[str, Any]):
+    """Values by name, each made when it is first read; known: those that need not be made."""
+
+    def __init__(self, names: Iterable[str], make: Callable[[str], Any], known: Mapping[str, Any] = {}) -> None:
+        self._names, self._make, self._made = dict.fromkeys((*known, *names)), make, dict(known)
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._made and name in self._names:
+            self._made[name] = self._make(name)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return dict, (dict(self),)
+
+
+def evaluated(sources: Mapping[str, Any], told: Callable[[Any], Any] = lambda value: value) -> Mapping[str, Any]:
+    """Return all quantities that some sources have, as `told` of them."""
+
+    def value(name: str) -> Any:
+        with np.errstate(all="ignore"):
+            return told(table()[name].of(sources))
+
+    return Later((one.name for one in possible(frozenset(sources))), value)
 
 
 @cache

@@ -8,12 +8,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.quantities.quantity import evaluated
+from vanedamp.coupling.quantities.quantity import Later, evaluated
+from vanedamp.coupling.quantities.stress import LINEAR
 from vanedamp.coupling.quantities.sums import SUMS, nothing_known, sources_of
 from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.figures import (
@@ -253,7 +255,9 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
     return {
         "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
         "energy": energy, "periods": done, "transient": first, "counters": run.counters,
-        "quantities": _known(evaluated(sums | {"overlap": run.penetration} | linear_parts(scene, system)), status),
+        "quantities": evaluated(
+            linear_parts(scene, system, sums | {"overlap": run.penetration}), partial(_known, status)
+        ),
         "peak": records.peak[:done].copy(), "section": section[:, :2].copy(),
         "slip": section[:, 3 : 3 + b].copy(), "slip_velocity": section[:, 3 + b :].copy(), "warnings": (),
         "event_list": [], "time": np.zeros(0), "displacement": np.zeros(0), "body_displacement": np.zeros((0, b)),
@@ -282,23 +286,26 @@ def _tilted(in_plane: Mapping[str, np.ndarray], bound: float) -> bool:
     return bool(np.any(in_plane["neglected"] * in_plane["tilt"] ** 2 > bound))
 
 
-def linear_parts(scene: Scene, system: System | None = None) -> dict[str, float]:
-    """Return the amplitudes without bodies, and with every body fixed in its cavity, m; nan under noise."""
-    known = scene.excitation.signal is None
-    at = np.array([scene.frequency])
-    both = [float(one.amplitude(at)[0]) for one in linear_responses(scene, system)] if known else [np.nan, np.nan]
-    return dict(zip(("undamped", "fixed"), both, strict=True))
+def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str, Any] = {}) -> Mapping[str, Any]:
+    """Return the amplitudes without bodies, and with every body fixed in its cavity, m; nan under noise.
+
+    They take a part of the time of a short run: found when they are wanted. known: what else quantities need.
+    """
+
+    def amplitude(name: str) -> float:
+        if scene.excitation.signal is not None:
+            return np.nan
+        curve = linear_responses(scene, system)[LINEAR.index(name)]
+        return float(curve.amplitude(np.array([scene.frequency]))[0])
+
+    return Later(LINEAR, amplitude, known)
 
 
-def _known(found: Mapping[str, Any], status: Status) -> dict[str, Any]:
-    """Return quantities as plain data, None for what is not known of a motion; of one that has diverged, nan."""
-
-    def plain(value: Any) -> Any:
-        if np.ndim(value):
-            return frozen(value)
-        return None if np.isnan(value) and status is not Status.DIVERGED else float(value)
-
-    return {name: plain(value) for name, value in found.items()}
+def _known(status: Status, value: Any) -> Any:
+    """Return a quantity as plain data, None for what is not known of a motion; of one that has diverged, nan."""
+    if np.ndim(value):
+        return frozen(value)
+    return None if np.isnan(value) and status is not Status.DIVERGED else float(value)
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.stress import MEASURES
+from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.files.store import Variable
 from vanedamp.rom.recovery import COMPONENTS
 
@@ -103,6 +103,11 @@ class SpotStress:
 def named(components: np.ndarray) -> dict[str, float]:
     """Return the six components of a stress, the first of some values, by name."""
     return dict(zip(COMPONENTS, map(float, components), strict=False))
+
+
+def scalars(values: np.ndarray) -> dict[str, Any]:
+    """Return von Mises and principal stress of values (..., 8) of MEASURES by name, as plain data."""
+    return {name: values[..., MEASURES.index(name)].tolist() for name in SCALARS}
 
 
 def stress_axes(names: Sequence[str]) -> dict[str, Variable]:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine.run import EventDrivenRun
-from vanedamp.coupling.quantities.stress import LINEAR, MEASURES, SCALARS
+from vanedamp.coupling.quantities.stress import LINEAR, MEASURES
 from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome, Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.spot_stress import SpotStress, named
+from vanedamp.coupling.response.spot_stress import SpotStress, named, scalars
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.strength.assessment import with_strength
@@ -132,7 +132,7 @@ def _spot_stresses(
 
     linear: amplitudes (s, 8) by the names of LINEAR.
     """
-    at, made = {name: MEASURES.index(name) for name in SCALARS}, []
+    made = []
     for place, (name, facts) in enumerate(spots.facts.items()):
         mean, static, coordinates = found.mean[:, place].mean(axis=0), spots.static(name), facts.get("coordinates")
         of: dict[str, Any] = {}
@@ -140,12 +140,9 @@ def _spot_stresses(
             ("", found.amplitude[:, place].mean(axis=0)),
             ("_max", found.amplitude[:, place].max(axis=0)),
         ):
-            of |= {f"amplitude{suffix}": named(values)} | {
-                f"{name}{suffix}": float(values[at[name]]) for name in SCALARS
-            }
-        for curve in LINEAR:
-            values = np.empty(0) if linear is None else linear[curve][place]
-            of[curve] = None if linear is None else {name: float(values[at[name]]) for name in SCALARS}
+            of |= {f"amplitude{suffix}": named(values)}
+            of |= {f"{name}{suffix}": value for name, value in scalars(values).items()}
+        of |= {curve: None if linear is None else scalars(linear[curve][place]) for curve in LINEAR}
         made.append(
             SpotStress(
                 name=name, coordinates=None if coordinates is None else tuple(coordinates),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
+from vanedamp.coupling.response.spot_stress import scalars
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.assessment import assessed, mean_stress, used
 from vanedamp.coupling.strength.spot_history import SpotHistories
@@ -54,9 +55,8 @@ class StressSeries:
             known = [spots.static(name) for spots in (self.spots, self._last)]
             rest = self._histories.mean[place] if self._histories.mean.size else np.zeros(6)
             static = max((rest if one is None else rest + one for one in known), key=lambda s: mean_stress(material, s))
-            amplitudes = {scalar: float(largest[place, MEASURES.index(scalar)]) for scalar in SCALARS}
             cycles, every = self._histories.cycles(place), all(one is not None for one in known)
-            found[name] = {"mean_known": every} | assessed(material, amplitudes, static, cycles)
+            found[name] = {"mean_known": every} | assessed(material, scalars(largest[place]), static, cycles)
         return found
 
     def of_spots(self, whole: bool = False) -> list[Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.methods.registry import wall_warnings
 from vanedamp.coupling.quantities.energy import penetration
-from vanedamp.coupling.quantities.quantity import table
+from vanedamp.coupling.quantities.quantity import evaluated
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
@@ -159,7 +159,7 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
 
 def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
     """Return the peaks of both linear curves by the names of PEAKS."""
-    return {name: table()[name].of({"undamped_top": undamped, "fixed_top": fixed}) for name in PEAKS}
+    return dict(evaluated({"undamped_top": undamped, "fixed_top": fixed}))
 
 
 def warm_up(scene: Scene | None = None) -> None:

@@ -18,6 +18,8 @@ import numpy as np
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
 from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
+from vanedamp.coupling.quantities.linear_peaks import half_power_width
+from vanedamp.coupling.quantities.quantity import evaluated
 from vanedamp.coupling.quantities.stress import LINEAR
 from vanedamp.coupling.response.evaluation import Outcome, Run, closed_status, exchanged_energy, residual, together
 from vanedamp.coupling.response.event_log import named_bodies
@@ -308,9 +310,8 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
         frequency, top = np.full(len(value), scene.frequency), float(value[np.argmax(undamped)])
     speed = value * unit if table.path in SPEEDS else np.full(len(value), scene.speed)
     width, leaving = _crossing(scene, table, top, low, high)
-    tops = {"half_power_width": width, "detuning_rate": leaving}
-    for name, peak in zip(LINEAR, peaks, strict=True):
-        tops |= {f"{name}_peak": peak.amplitude, f"{name}_peak_frequency": peak.frequency}
+    tops = dict(evaluated(dict(zip(("undamped_top", "fixed_top"), peaks, strict=True))))
+    tops |= {half_power_width.name: width, "detuning_rate": leaving}
     curves = {"frequency": frequency, "speed": speed, "undamped": undamped, "fixed": fixed}
     return {name: frozen(values) for name, values in curves.items()}, tops
 

@@ -13,14 +13,14 @@ import numpy as np
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
 from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
-from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
+from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.quantities.sums import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneField
-from vanedamp.coupling.response.spot_stress import stress_axes
+from vanedamp.coupling.response.spot_stress import scalars, stress_axes
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.transients.no_meaning import NOT_IN_RAMPS
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Own, Record
+from vanedamp.files.record import Own, Record, joined
 from vanedamp.files.store import Variable, frozen
 
 if TYPE_CHECKING:
@@ -174,12 +174,8 @@ class Ramp(Measured, Record, Plotted):
     @cached_property
     def quantities(self) -> dict[str, np.ndarray]:  # type: ignore[override]
         """Quantities of all periods (results.md), run by run, nan where a run knows none."""
-        known = {name: run.quantities[name].shape[1:] for run in self.runs for name in run.quantities}
-
-        def of(run: RampRun, name: str) -> np.ndarray:
-            return run.quantities.get(name, np.full((len(run.time), *known[name]), np.nan))
-
-        return {name: frozen(np.concatenate([of(run, name) for run in self.runs])) for name in table() if name in known}
+        found = joined([run.quantities for run in self.runs], [len(run.time) for run in self.runs])
+        return {name: frozen(values) for name, values in found.items()}
 
     @property
     def table(self) -> Table:
@@ -222,10 +218,7 @@ class Ramp(Measured, Record, Plotted):
         if run.stress is None:
             return {}
         tops = run.stress.max(axis=0)
-        return {
-            spot: {name: float(tops[place, MEASURES.index(name)]) for name in SCALARS}
-            for place, spot in enumerate(self.provenance["hot_spots"])
-        }
+        return {spot: scalars(top) for spot, top in zip(self.provenance["hot_spots"], tops, strict=True)}
 
     def strength(self, run: RampRun) -> dict[str, dict[str, Any]]:
         """Return the strength of a run by hot spot, with the life in starts that pass the ramp `table.passes` times."""
@@ -240,7 +233,7 @@ class Ramp(Measured, Record, Plotted):
         """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
         runs, dampers = self.runs, len(self.scene.damper)
 
-        def joined(name: str) -> np.ndarray:
+        def series(name: str) -> np.ndarray:
             return np.concatenate([getattr(run, name) for run in runs])
 
         periods = [len(run.time) for run in runs]
@@ -251,10 +244,10 @@ class Ramp(Measured, Record, Plotted):
         }
         found = {
             "run_of_period": Variable(np.repeat(np.arange(len(runs)), periods), ("period",)),
-            **{name: Variable(joined(name), ("period",), units) for name, units in SERIES.items()},
+            **{name: Variable(series(name), ("period",), units) for name, units in SERIES.items()},
             **measured,
             "run_of_start": Variable(np.repeat(np.arange(len(runs)), np.add(periods, 1)), ("start",)),
-            **{name: Variable(joined(name), ("start",), units) for name, units in STATES.items()},
+            **{name: Variable(series(name), ("start",), units) for name, units in STATES.items()},
             **{name: Variable([getattr(run, name) for run in runs], ("run",), one) for name, one in numbers.items()},
             **{name: Variable(np.array([getattr(run, name) for run in runs], object), ("run",)) for name in TEXTS},
             "work": Variable(np.array(WORKS, object), ("work",)),
@@ -269,7 +262,7 @@ class Ramp(Measured, Record, Plotted):
         own = labels_along(self.quantities).items()
         found |= {dim: Variable(np.array(names, object), (dim,)) for dim, names in own}
         if dampers:
-            found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
+            found["stuck"] = Variable(series("stuck").astype(np.int8), ("period", "damper"))
         return found
 
     def attributes(self) -> dict[str, Any]:

@@ -10,10 +10,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
-from vanedamp.coupling.quantities.stress import MEASURES, SCALARS
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneField
-from vanedamp.coupling.response.spot_stress import stress_axes
+from vanedamp.coupling.response.spot_stress import scalars, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
@@ -161,10 +160,8 @@ class RingDown(Measured, Record, Plotted):
             "cycles": _with_units(_named(self.cycles)),
         }  # fmt: skip
         if self.stress is not None:
-            data["stress_pa"] = {
-                spot: {name: self.stress[:, place, MEASURES.index(name)].tolist() for name in SCALARS}
-                for place, spot in enumerate(self.provenance["hot_spots"])
-            }
+            spots = self.provenance["hot_spots"]
+            data["stress_pa"] = {spot: scalars(self.stress[:, place]) for place, spot in enumerate(spots)}
         if self.quantities:
             data["quantities"] = {name: np.asarray(value).tolist() for name, value in self.quantities.items()}
         if self.table.bins:

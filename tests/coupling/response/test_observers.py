@@ -1,9 +1,12 @@
 """What a run keeps beside its sums is asked for before it, and its response is made once."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 from vanedamp.coupling.methods.registry import respond, run_of
+from vanedamp.coupling.response import evaluation
 from vanedamp.coupling.response.evaluation import Needs, Observer
 from vanedamp.coupling.response.event_log import WIDTH, entries_of, rows_of_units
 from vanedamp.coupling.response.observers import EVENT_LIST, samples
@@ -36,6 +39,26 @@ def test_a_response_is_made_once(options, runs, monkeypatch):
     monkeypatch.setattr(Response, "__init__", counted)
     response = simulate(MADE, **options)
     assert len(made) == runs and response.contacts and response.wear and response.scene is MADE
+
+
+def test_linear_amplitudes_are_found_when_they_are_read(monkeypatch):
+    """F/|k - m w^2 + i c w|, the body's mass added to m; the damping is the structure's."""
+    asked, found = [], evaluation.linear_responses
+
+    def counted(*given):
+        asked.append(given)
+        return found(*given)
+
+    monkeypatch.setattr(evaluation, "linear_responses", counted)
+    response = simulate(MADE)
+    assert response.amplitude_mean > 0.0 and not asked
+    omega, (mass, stiffness, ratio) = 2 * np.pi * 2414.0, (0.148, 3.4e7, 0.05)
+    damping = 2j * ratio * np.sqrt(mass * stiffness) * omega
+    expected = [400.0 / abs(stiffness - m * omega**2 + damping) for m in (mass, mass + 0.003)]
+    assert [response.amplitude_undamped, response.amplitude_fixed] == pytest.approx(expected, rel=1e-12)
+    count = len(asked)
+    assert count and pickle.loads(pickle.dumps(response)).amplitude_fixed == response.amplitude_fixed
+    assert len(asked) == count
 
 
 def test_an_observer_sees_the_run_and_fills_its_fields():
