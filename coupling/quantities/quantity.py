@@ -110,6 +110,8 @@ class Later(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made and name in self._names:
             self._made[name] = self._make(name)
+            if len(self._made) == len(self._names):
+                del self._make  # and what it holds
         return self._made[name]
 
     def __iter__(self) -> Iterator[str]:

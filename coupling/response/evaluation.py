@@ -44,6 +44,8 @@ from vanedamp.files.store import frozen
 _CHUNK = 100
 #: energy that impacts or contacts may have made by round-off, relative to the energy that flowed (figures.contact_gain)
 _MADE = 1e-9
+#: coordinates of a system that is small
+_LARGE = 50
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -298,7 +300,9 @@ def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str,
         curve = linear_responses(scene, system)[LINEAR.index(name)]
         return float(curve.amplitude(np.array([scene.frequency]))[0])
 
-    return Later(LINEAR, amplitude, known)
+    found = Later(LINEAR, amplitude, known)
+    # responses in a list are not to hold large matrices, beside which a run takes long
+    return found if system is None or len(system.mass) <= _LARGE else dict(found)
 
 
 def _known(status: Status, value: Any) -> Any:
