@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
+from vanedamp.coupling.quantities.energy import energy_residual
 from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
 from vanedamp.coupling.quantities.stress import MEASURES
@@ -32,7 +33,9 @@ WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
 #: series of a run, an entry per period, and their units
 SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s"}
 #: numbers of a run, and their units ("rate": of the ramp's quantity per second), and texts
-NUMBERS = {"rate": "1", "peak": "m", "peak_frequency": "Hz", "peak_speed": "rad/s", "energy_residual": "1"}
+NUMBERS = {
+    "rate": "1", "peak": "m", "peak_frequency": "Hz", "peak_speed": "rad/s", energy_residual.name: energy_residual.unit
+}  # fmt: skip
 TEXTS = ("direction", "status")
 #: quantities of a period that files have by names of their own
 NAMED = {
