@@ -21,6 +21,10 @@ from vanedamp.files.record import Columns, Record, declared
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import kinds
 from vanedamp.studies.cli import main
+from vanedamp.studies.identification.data import forced
+from vanedamp.studies.identification.fit import Fit
+from vanedamp.studies.identification.study import IdentificationStudy
+from vanedamp.studies.identification.tables import ForcedTable, Number
 from vanedamp.studies.optimisation.measures import Limits, check_measured
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
@@ -151,6 +155,18 @@ def test_a_quantity_of_one_file_may_be_limited_and_is_on_the_page(jerk, tmp_path
     write_report(collect([tmp_path / "sweep.h5"]), tmp_path / "report.html")
     assert f"{jerk}-0" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert all(reason(table()[jerk], kind) is None for kind in KINDS)
+
+
+def test_a_quantity_of_one_file_may_be_measured_and_count_for_a_life(jerk):
+    places, numbers = [15.7, 15.9], {"excitation.resonance_amplitude": Number(5e-4, 2e-3)}
+    given = scene(time=LONG, **RESTS)
+    values = [getattr(vd.simulate(given.replace({"excitation.frequency": at})), jerk) for at in places]
+    measured = forced("jerk", places, values, {}, ForcedTable("", noise=0.01, measure=jerk))
+    study = IdentificationStudy(given, numbers, [measured])
+    fit, z = Fit(study), study.coordinates([1e-3])
+    assert np.abs(fit.residual(z)).max() < 1e-6
+    assert fit.jacobian(z)[:, 0] == pytest.approx(1.5e-3 / 1e-3 / 0.01, rel=1e-4)
+    assert measured.channels[0].unit == "m/s^3"
 
 
 def test_formulas_take_numbers_and_arrays_of_scenes_alike():
