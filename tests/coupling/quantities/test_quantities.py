@@ -21,10 +21,12 @@ from vanedamp.files.record import Columns, Record, declared
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import kinds
 from vanedamp.studies.cli import main
+from vanedamp.studies.explore.point_view import point_view
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.fit import Fit
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.tables import ForcedTable, Number
+from vanedamp.studies.life.study import LifeStudy
 from vanedamp.studies.optimisation.measures import Limits, check_measured
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
@@ -167,6 +169,13 @@ def test_a_quantity_of_one_file_may_be_measured_and_count_for_a_life(jerk):
     assert np.abs(fit.residual(z)).max() < 1e-6
     assert fit.jacobian(z)[:, 0] == pytest.approx(1.5e-3 / 1e-3 / 0.01, rel=1e-4)
     assert measured.channels[0].unit == "m/s^3"
+    table = {"band": [15.7, 15.9], "hours": 10.0, "measure": jerk, "limit": 1e3}
+    assert LifeStudy.of(SCENE | {"life": table}).measure.value(vd.simulate(given)) == getattr(vd.simulate(given), jerk)
+
+
+def test_a_quantity_of_one_file_is_in_the_explorer(jerk):
+    tables = {name: table for name, table in SCENE.items() if name != "wear"}
+    assert point_view(tables, 15.9).quantities[jerk].endswith(" m/s^3")
 
 
 def test_formulas_take_numbers_and_arrays_of_scenes_alike():
