@@ -1,7 +1,8 @@
 """The energy balance of a segment, its harmonics, peak and tilts, and the motion within it.
 
-All is in closed form, but for extremes of tilts, which are sought as peaks are (engine.peaks). Forms of the amplitudes have what the modes contribute (energy_forms); bodies also have
-a linear speed, speed + drift t, whose products with modes are integrated here.
+All is in closed form, but for extremes of tilts, which are sought as peaks are (engine.peaks). Forms of the amplitudes
+have what the modes contribute (energy_forms); bodies also have a linear speed, speed + drift t, whose products with
+modes are integrated here.
 """
 
 from __future__ import annotations
