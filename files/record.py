@@ -168,6 +168,12 @@ class Unit(NamedTuple):
     unit: str
 
 
+class Named(NamedTuple):
+    """Plain data whose attribute and key have another name than the field."""
+
+    name: str
+
+
 class Coded(NamedTuple):
     """Plain data of a class that is no plain data: to it, and from it with the path of the file."""
 
@@ -175,7 +181,7 @@ class Coded(NamedTuple):
     decode: Callable[[Any, str], Any]
 
 
-Layout = Array | Columns | Rows | Ragged | Paths | Sparse | Within | Own | Coded | Unit | None
+Layout = Array | Columns | Rows | Ragged | Paths | Sparse | Within | Own | Named | Coded | Unit | None
 #: layouts of what is no attribute
 _VARIABLES = (Columns, Rows, Ragged, Paths, Sparse, Within, Own)
 
@@ -195,7 +201,7 @@ class Record(Displayed):
     def __post_init__(self) -> None:
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
-            if isinstance(layout, Array) and layout.dims and value is not None and not _is_tuple(kind):
+            if isinstance(layout, Array) and value is not None and not _is_tuple(kind):
                 if not _is_frozen(value, layout.dtype):
                     object.__setattr__(self, name, store.frozen(value, layout.dtype))
             elif isinstance(value, np.generic):
@@ -288,7 +294,7 @@ class Record(Displayed):
     def plain(self, names: Container[str] | None = None) -> dict[str, Any]:
         """Return the fields that are neither arrays nor rows, as plain data. names: of those wanted; None: all."""
         return {
-            name: layout.encode(getattr(self, name))
+            _name(name, layout): layout.encode(getattr(self, name))
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
@@ -399,8 +405,8 @@ class Record(Displayed):
                 given[field] = layout.read(field, values, attributes)
             elif isinstance(layout, Own):
                 given |= {field: layout.found(values)} if layout.found else {}
-            elif field in attributes or field not in optional:
-                value = attributes.get(field) if type(None) in get_args(kind) else attributes[field]
+            elif (name := _name(field, layout)) in attributes or field not in optional:
+                value = attributes.get(name) if type(None) in get_args(kind) else attributes[name]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
                 coded = layout if isinstance(layout, Coded) else None
                 given[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
@@ -418,7 +424,7 @@ def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, (Array, *_VARIABLES, Coded, Unit))), None)
+        layout = next((note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, Unit))), None)
         found[item.name] = (kind, layout)
     return found
 
@@ -491,7 +497,7 @@ def _part(
 
 
 def _name(field: str, layout: Layout) -> str:
-    return (layout.name if isinstance(layout, Array) else "") or field
+    return (layout.name if isinstance(layout, Array | Named) else "") or field
 
 
 def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
@@ -567,7 +573,8 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 def _is_tuple(kind: Any) -> bool:
     """Whether a type is that of a tuple, or of None else."""
-    return tuple in map(get_origin, get_args(kind) if type(None) in get_args(kind) else (kind,))
+    kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
+    return any(get_origin(one) is tuple for one in kinds)
 
 
 def _is_text(kind: Any) -> bool:

@@ -94,15 +94,15 @@ class SystemMatrices(Record):
 
     KIND: ClassVar[str] = "system-matrices"
     stiffness: Annotated[sparse.csr_array, Sparse("N/m")]
-    """(N, N) symmetric CSR [N/m]"""
+    """(N, N), symmetric"""
     mass: Annotated[sparse.csr_array, Sparse("kg")]
-    """(N, N) symmetric CSR [kg]"""
+    """(N, N), symmetric"""
     coordinates: Annotated[np.ndarray, Array(("node", "axis"), "m")]
     """of the nodes"""
     fixed: Annotated[np.ndarray, Array(("fixed_dof",), dtype=np.int64)]
     """sorted indices of the DOFs that the supports hold at zero"""
     patches: Annotated[Mapping[str, Patch], Own(_patch_variables, _patches_of)]
-    """label -> Patch"""
+    """by label: in files `patch`, whose `patch_nodes` and `patch_weights` begin at its `patch_offset`"""
     damping_ratio: float
     """modal damping ratio of every mode"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Record, Rows, Within, empty
+from vanedamp.files.record import Array, Named, Record, Rows, Within, empty
 from vanedamp.modal.cyclic import aliased
 from vanedamp.modal.records.campbell import RPM, Crossing
 from vanedamp.modal.records.ring_modes import RingModes
@@ -31,10 +31,10 @@ class Interference(Record, Plotted):
     """of the ring, at `speed`"""
     orders: Annotated[tuple[int, ...], Array(("engine_order",), dtype=np.int64, name="engine_order")] = ()
     """engine orders that are considered, whole numbers from 1; without any 1 to N"""
-    speed: Annotated[float | None, Array((), "rad/s", name="at_speed", attribute=True)] = None
+    speed: Annotated[float | None, Named("at_speed")] = None
     """of rotation; None: the ring does not turn [rad/s]"""
     operating: Annotated[tuple[float, float] | None, Array(("edge",), "rad/s", attribute=True)] = None
-    """lowest and highest speed of operation; None: not known [rad/s]"""
+    """lowest and highest speed of operation; None: not known"""
     speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")] = field(default_factory=empty)
     """ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds"""
     over_speed_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency_over_speed")] = field(

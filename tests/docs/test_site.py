@@ -150,7 +150,9 @@ def test_fields_of_results_are_described():
         assert all(isinstance(after, ast.Expr) for _, after in fields), record
 
 
-@pytest.mark.parametrize("name", ["modes", "life", "calibration", "optimisation", "mistuning"])
+@pytest.mark.parametrize(
+    "name", ["modes", "life", "calibration", "optimisation", "mistuning", "campbell", "ring-modes", "system-matrices"]
+)
 def test_fields_have_the_dimensions_and_units_of_the_file(name):
     kind, variables, _ = load_any(ROOT / "tests" / "files" / "written" / f"{name}.h5")
     found = [one for one in described(pkgutil.resolve_name(kinds.kind(kind).RECORD)) if one.dims]
