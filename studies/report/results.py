@@ -1,10 +1,12 @@
-"""Results in files, the parts of a report. Each kind is read by its section (studies.kinds)."""
+"""Results in files, the parts of a report. Each kind is read by its section, or its record (studies.kinds)."""
 
 from __future__ import annotations
 
 import contextlib
+import pkgutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -46,9 +48,10 @@ class Section(Protocol):
 
     KIND: str
     __file__: str
+    __package__: str
 
     def load(self, path: Path) -> Result:
-        """Read a file of the kind. Raises StoreError or InputError."""
+        """Read a file of the kind; ours may leave it to their record. Raises StoreError or InputError."""
 
     def section(self, results: Mapping[str, Result], page: Any) -> Any:
         """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
@@ -124,12 +127,20 @@ def collect(paths: Sequence[str | Path]) -> Results:
             kind = _kind(file, known)
             if kind in known:
                 with contextlib.nullcontext() if kind in _endings(known) else decoding(file):
-                    results.kinds[kind][str(file)] = known[kind].load(file)
+                    results.kinds[kind][str(file)] = _loaded(known[kind], file)
             elif not path.is_dir():
                 raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
     if not results.files:
         raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(known)})")
     return results
+
+
+def _loaded(section: Section, path: Path) -> Result:
+    if hasattr(section, "load"):
+        return section.load(path)
+    record = pkgutil.resolve_name(import_module(section.__package__).RECORD).load(path)
+    scene = getattr(record, "scene", None)
+    return Result.of(record, None if scene is None else scene.to_dict())
 
 
 def _endings(kinds: Iterable[str]) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,6 @@ KIND = NAME
 _ORDER, _MARK = "#64748b", "#111827"
 #: of modes beyond the colours
 _DASHES = ("solid", "dot", "dashdot")
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp campbell` wrote."""
-    diagram = Campbell.load(path)
-    return Result(diagram, diagram.provenance)
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import plotly.graph_objects as go
@@ -16,11 +15,6 @@ from vanedamp.studies.report.results import Result
 
 ORDER = 58
 KIND = NAME
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp identify` wrote of a ring."""
-    return Result.of(Identified.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

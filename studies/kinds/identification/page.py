@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,12 +35,6 @@ _PROFILES = (
 )
 _CORRELATIONS = "Correlations of the numbers."
 _NEXT = "The next measurement: what each would leave of the largest uncertainty."
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp identify` wrote."""
-    record = Identification.load(path)
-    return Result(record, dict(record.provenance), record.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

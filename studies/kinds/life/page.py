@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,6 @@ from vanedamp.studies.report.strength_charts import wear_figure
 ORDER = 57
 KIND = NAME
 figure = life_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp life` wrote."""
-    return Result.of(LifeRecord.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

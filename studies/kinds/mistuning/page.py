@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,12 +21,6 @@ from vanedamp.studies.report.results import Result
 ORDER = 16
 KIND = NAME
 figure = amplification_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ring --mistuning` wrote."""
-    study = MistuningStudy.load(path)
-    return Result(study, study.provenance)
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from vanedamp.studies.kinds.optimisation import NAME
@@ -16,11 +15,6 @@ from vanedamp.studies.report.results import Result
 ORDER = 55
 KIND = NAME
 figure = optimisation_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp optimise` wrote."""
-    return Result.of(Optimisation.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

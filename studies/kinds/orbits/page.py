@@ -6,7 +6,6 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -46,12 +45,6 @@ _SYMBOLS = {
 _POINT = "#9ca3af"  # of a sweep
 #: modulus as which smaller ones are drawn
 _SMALLEST = 1e-3
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp orbits` wrote."""
-    branches = Branches.load(path)
-    return Result.of(branches, branches.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -30,12 +29,6 @@ _MOST_POINTS = 2000
 #: rates of Lewis' curve, and how far it extends beyond the runs'
 _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ramp` wrote."""
-    ramp = Ramp.load(path)
-    return Result.of(ramp, ramp.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

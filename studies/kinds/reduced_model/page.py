@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,11 +20,6 @@ from vanedamp.studies.report.results import Result
 
 ORDER = 30
 KIND = NAME
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp reduce` or `vanedamp import` wrote."""
-    return Result.of(ReducedModel.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

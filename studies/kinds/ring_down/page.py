@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import zip_longest
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,12 +35,6 @@ HEADER = [
     "time_s", "amplitude_m", "frequency_hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
     "damping_ratio_energy", "energy_loss_j",
 ]  # fmt: skip
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ringdown` wrote."""
-    record = RingDown.load(path)
-    return Result(record, dict(record.provenance), record.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,6 @@ ORDER = 12
 KIND = NAME
 #: nodes that are drawn, evenly chosen of more
 _MOST = 20_000
-
-
-def load(path: Path) -> Result:
-    """Read what SystemMatrices.save wrote."""
-    return Result.of(SystemMatrices.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
