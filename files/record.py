@@ -157,9 +157,9 @@ class Own(NamedTuple):
 
 
 class Within(NamedTuple):
-    """A record in the same file; JSON has some of its fields."""
+    """A record in the same file, or None where that lacks its first field; JSON has some of its fields."""
 
-    json: tuple[str, ...]
+    json: tuple[str, ...] = ()
 
 
 class Unit(NamedTuple):
@@ -248,7 +248,7 @@ class Record(Displayed):
             elif isinstance(layout, Ragged) and (value or name not in optional):
                 found |= self._ragged_variables(value, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
-                found |= value.variables()
+                found |= value.variables() if value is not None else {}
             elif isinstance(layout, Paths | Sparse):
                 found |= layout.written(name, value)
             elif isinstance(layout, Own) and layout.variables and value is not None:
@@ -318,7 +318,7 @@ class Record(Displayed):
                 found[layout.name or name] = list(value) if _is_tuple(kind) else value
             elif isinstance(layout, Paths) and not layout.listed:
                 found[name] = list(value)
-            elif isinstance(layout, Within):
+            elif isinstance(layout, Within) and value is not None:
                 found |= value.attributes()
         return found
 
@@ -400,7 +400,9 @@ class Record(Displayed):
             elif isinstance(layout, Ragged):
                 given[field] = _parts_of(values, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
-                given[field] = kind.of(values, attributes, path)
+                of = (get_args(kind) or (kind,))[0]
+                if field not in optional or next(iter(declared(of))) in values:
+                    given[field] = of.of(values, attributes, path)
             elif isinstance(layout, Paths | Sparse):
                 given[field] = layout.read(field, values, attributes)
             elif isinstance(layout, Own):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Named, Own, Record, Rows, Unit, empty
+from vanedamp.files.record import Array, Named, Own, Record, Rows, Unit, Within, declared, empty
 from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.recovery import COMPONENTS
@@ -93,56 +93,45 @@ class Event:
     """energy that the impulses of an impact take, without what completes a chatter"""
 
 
-class PlanarSamples(NamedTuple):
-    """Samples of bodies in the plane, at the times of Response.time (n,): b bodies, c contacts.
+def _written(contacts: Sequence[tuple[int, str, int]]) -> dict[str, Variable]:
+    """Return contacts as variables of a file."""
+    columns = zip(("damper", "side", "corner"), (int, object, int), zip(*contacts, strict=True), strict=True)
+    return {f"contact_{name}": Variable(np.array(column, dtype), ("contact",)) for name, dtype, column in columns}
 
-    body_lift: (n, b) m, height of each body's centre above its height flat on its floor; body_tilt: (n, b) rad,
-    relative to the cavity, counterclockwise. floor_along, floor_across: (n, b) m, displacement of the floor under a
-    body, including a prescribed motion of the base; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
-    contact_closed: (n, c) bool, of methods with time steps whether it carried force in the step before. Lift, tilt and
-    floor_across are nan for sliders. contacts: body, side and corner of each contact, as of an Event.
-    """
 
-    body_lift: np.ndarray
-    body_tilt: np.ndarray
-    floor_along: np.ndarray
-    floor_across: np.ndarray
-    floor_rotation: np.ndarray
-    contact_gap: np.ndarray
-    contact_closed: np.ndarray
-    contacts: tuple[tuple[int, str, int], ...]
+def _contacts(values: Mapping[str, Any]) -> tuple[tuple[int, str, int], ...]:
+    """Return the contacts in the variables of a file."""
+    return tuple(zip(*(values[f"contact_{name}"].tolist() for name in ("damper", "side", "corner")), strict=True))
+
+
+_OfBodies = Annotated[np.ndarray, Array(("time", "damper"), "m")]
+_Angles = Annotated[np.ndarray, Array(("time", "damper"), "rad")]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanarSamples(Record):
+    """Samples of bodies in the plane at the times of Response.time; lift, tilt and floor_across: nan for sliders."""
+
+    body_lift: _OfBodies
+    """height of each body's centre above its height flat on its floor"""
+    body_tilt: _Angles
+    """tilt of bodies relative to their cavities, counterclockwise"""
+    floor_along: _OfBodies
+    """displacement of the floor under a body along it, with a prescribed motion of the base"""
+    floor_across: _OfBodies
+    """the same across it"""
+    floor_rotation: _Angles
+    """rotation of the floor"""
+    contact_gap: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    """gap of each contact"""
+    contact_closed: Annotated[np.ndarray, Array(("time", "contact"), dtype=bool)]
+    """whether it is closed; of methods with time steps, whether it carried force in the step before"""
+    contacts: Annotated[tuple[tuple[int, str, int], ...], Own(_written, _contacts)]
+    """body, side and corner of each contact, as of an Event: `contact_damper`, `contact_side`, `contact_corner`"""
 
     def cut(self, kept: Any) -> PlanarSamples:
         """Return the samples at some of the times, as numpy indexes them."""
-        arrays = {name: getattr(self, name)[kept] for name in self._fields[:-1]}
-        return self._replace(**arrays)
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file, with dimensions and units."""
-        units = {"body_tilt": "rad", "floor_rotation": "rad", "contact_closed": "1"}
-        variables = {
-            name: Variable(
-                np.asarray(values, np.int8 if values.dtype == bool else float),
-                ("time", "contact" if name.startswith("contact") else "damper"),
-                units.get(name, "m"),
-            )
-            for name, values in zip(self._fields[:-1], self[:-1], strict=True)
-        }
-        dampers, sides, corners = zip(*self.contacts, strict=True)
-        variables["contact_damper"] = Variable(np.array(dampers), ("contact",))
-        variables["contact_side"] = Variable(np.array(sides, object), ("contact",))
-        variables["contact_corner"] = Variable(np.array(corners), ("contact",))
-        return variables
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any]) -> PlanarSamples | None:
-        """Return the samples in the variables of a file; None for one of sliders, or of a version that kept none."""
-        if "contact_gap" not in values:
-            return None
-        arrays = {name: np.asarray(values[name], float) for name in cls._fields if name in values}
-        arrays["contact_closed"] = values["contact_closed"].astype(bool)
-        places = (values[f"contact_{name}"].tolist() for name in ("damper", "side", "corner"))
-        return cls(**arrays, contacts=tuple(zip(*places, strict=True)))
+        return replace(self, **{name: getattr(self, name)[kept] for name in declared(type(self)) if name != "contacts"})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,7 +205,7 @@ class Response(Measured, Record, Plotted):
     moved_start: dict[str, Any] | None = None
     """of a second run, whose bodies begin about 1e-9 of their gap aside: status, mean amplitude and its confidence, as
     `amplitude_mean_dynamic`, and whether it `agrees`; None if it was not asked for, and without impacts of bodies"""
-    in_plane: Annotated[PlanarSamples | None, Own(PlanarSamples.variables, PlanarSamples.of)] = None
+    in_plane: Annotated[PlanarSamples | None, Within()] = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
     """advice on the bodies whose shape was chosen automatically"""

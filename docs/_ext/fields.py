@@ -75,7 +75,7 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
         kind, layout = layouts.get(one, (None, None))
         text = texts.get(one, _EVERYWHERE.get(one, ""))
         if isinstance(layout, Within):
-            found += described(kind)
+            found += described((get_args(kind) or (kind,))[0])
         elif isinstance(layout, Rows):
             found += [
                 row._replace(name=f"{layout.dim}_{row.name}", dims=", ".join(filter(None, (layout.dim, row.dims))))
