@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import cache
 from typing import (
     TYPE_CHECKING,
@@ -64,7 +64,10 @@ class Array(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s."""
+    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s.
+
+    Those that have defaults are left out where all rows have all of these.
+    """
 
     dim: str
 
@@ -244,7 +247,7 @@ class Record(Displayed):
                     dims = self.dims((*layout.dims, *one.dims))
                     found[layout.prefix + each] = store.Variable(values, dims, one.unit)
             elif isinstance(layout, Rows) and (value or name not in optional):
-                found |= row_variables(value, get_args(kind)[0], layout.dim)
+                found |= _row_variables(value, get_args(kind)[0], layout.dim, self.unit_in_file)
             elif isinstance(layout, Ragged) and (value or name not in optional):
                 found |= self._ragged_variables(value, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
@@ -267,7 +270,7 @@ class Record(Displayed):
             if isinstance(layout, Rows):
                 whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
                 rows = [row for each in column for row in each]
-                found |= row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
+                found |= _row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
                 found[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
             elif isinstance(layout, Columns):
                 for name, values in joined(column, counts).items():
@@ -396,7 +399,7 @@ class Record(Displayed):
             elif isinstance(layout, Rows):
                 of = get_args(kind)[0]
                 if field not in optional or f"{layout.dim}_{next(iter(_columns(of)))}" in values:
-                    given[field] = rows_of(values, of, layout.dim)
+                    given[field] = _rows_of(values, of, layout.dim)
             elif isinstance(layout, Ragged):
                 given[field] = _parts_of(values, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
@@ -460,7 +463,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
         if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
             columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
         elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
-            columns[field] = rows_of(values, get_args(of)[0], prefix + layout.dim)
+            columns[field] = _rows_of(values, get_args(of)[0], prefix + layout.dim)
         elif name in values:
             columns[field] = values[name]
     of_things = [len(columns[field]) for field in columns if not _has_rows(kind, field, dim)]
@@ -531,14 +534,11 @@ def _optional(cls: Any) -> set[str]:
     return {item.name for item in dataclasses.fields(cls) if not (item.default is item.default_factory is none)}
 
 
-def row_variables(
-    rows: Iterable[Any], kind: type, dim: str, unit_of: Callable[[str], str] = str
+def _row_variables(
+    rows: Sequence[Any], kind: type, dim: str, unit_of: Callable[[str], str]
 ) -> dict[str, store.Variable]:
-    """Return the variables of rows of a class (Rows). unit_of: returns that of a declared one (Record.unit_in_file).
-
-    Fields that have defaults are left out where all rows have all of those.
-    """
-    rows, columns, optional = list(rows), _columns(kind), _optional(kind)
+    """Return the variables of rows of a class."""
+    columns, optional = _columns(kind), _optional(kind)
     if all(getattr(row, name) == getattr(kind, name) for row in rows for name in optional):
         columns = {name: one for name, one in columns.items() if name not in optional}
     return {
@@ -549,7 +549,7 @@ def row_variables(
     }
 
 
-def rows_of(values: Mapping[str, Any], kind: Callable[..., Row], dim: str) -> tuple[Row, ...]:
+def _rows_of(values: Mapping[str, Any], kind: Callable[..., Row], dim: str) -> tuple[Row, ...]:
     """Return the rows of a class in the variables of a file."""
     optional = _optional(kind)
     columns = {

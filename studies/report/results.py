@@ -139,8 +139,22 @@ def _loaded(section: Section, path: Path) -> Result:
     if hasattr(section, "load"):
         return section.load(path)
     record = pkgutil.resolve_name(import_module(section.__package__).RECORD).load(path)
-    scene = getattr(record, "scene", None)
-    return Result.of(record, None if scene is None else scene.to_dict())
+    return Result.of(record, _scene(record))
+
+
+def _scene(record: Any) -> dict[str, Any] | None:
+    """Return the scene of a record as data, with its axes in short; None: it has none."""
+    scene, axes = getattr(record, "scene", None), getattr(record, "axes", {})
+    short = {
+        path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
+        for path, values in axes.items()
+    }
+    return None if scene is None else scene.to_dict() | ({"sweep": short} if axes else {})
+
+
+def format_setting(value: Any) -> str:
+    """Return a value as text, floats in eight digits."""
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
 def _endings(kinds: Iterable[str]) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,13 +29,6 @@ KIND = NAME
 figure = ensemble_figure
 #: curves of a file that are drawn
 _MOST = 6
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp run` or `sweep` wrote of a scene with ranges."""
-    record = Ensemble.load(path)
-    axes = {path: f"{len(values)} values" for path, values in record.axes.items()}
-    return Result.of(record, record.scene.to_dict() | {"sweep": axes})
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
