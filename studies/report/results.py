@@ -44,14 +44,14 @@ class Result:
 
 
 class Section(Protocol):
-    """The contract of a section; studies.kinds says more."""
+    """The contract of a section; studies.kinds says more. Ours leave KIND, and most of them `load`, to their kind."""
 
     KIND: str
     __file__: str
     __package__: str
 
     def load(self, path: Path) -> Result:
-        """Read a file of the kind; ours may leave it to their record. Raises StoreError or InputError."""
+        """Read a file of the kind. Raises StoreError or InputError."""
 
     def section(self, results: Mapping[str, Result], page: Any) -> Any:
         """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
@@ -94,10 +94,11 @@ def sections() -> dict[str, Section]:
     """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
     known: dict[str, Section] = {}
     for section in SECTIONS.all().values():
-        if section.KIND in known:
-            files = f"{known[section.KIND].__file__} and {section.__file__}"
-            raise ExtensionError(f"two sections of the report show results of the kind {section.KIND}: {files}")
-        known[section.KIND] = section
+        kind = getattr(section, "KIND", None) or _folder(section).NAME
+        if kind in known:
+            files = f"{known[kind].__file__} and {section.__file__}"
+            raise ExtensionError(f"two sections of the report show results of the kind {kind}: {files}")
+        known[kind] = section
     return known
 
 
@@ -138,8 +139,13 @@ def collect(paths: Sequence[str | Path]) -> Results:
 def _loaded(section: Section, path: Path) -> Result:
     if hasattr(section, "load"):
         return section.load(path)
-    record = pkgutil.resolve_name(import_module(section.__package__).RECORD).load(path)
+    record = pkgutil.resolve_name(_folder(section).RECORD).load(path)
     return Result.of(record, _scene(record))
+
+
+def _folder(section: Section) -> Any:
+    """Return the kind of a section of ours (studies.kinds)."""
+    return import_module(section.__package__)
 
 
 def _scene(record: Any) -> dict[str, Any] | None:

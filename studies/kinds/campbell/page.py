@@ -10,13 +10,11 @@ import plotly.graph_objects as go
 
 from vanedamp.modal.records.campbell import RPM, Campbell
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.kinds.campbell import NAME
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 40
-KIND = NAME
 _ORDER, _MARK = "#64748b", "#111827"
 #: of modes beyond the colours
 _DASHES = ("solid", "dot", "dashdot")

@@ -8,13 +8,11 @@ from typing import Any
 import plotly.graph_objects as go
 
 from vanedamp.rom.ring.identification import Identified
-from vanedamp.studies.kinds.deviations import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 58
-KIND = NAME
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -10,7 +10,6 @@ import numpy as np
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
 from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.studies.kinds.ensemble import NAME
 from vanedamp.studies.kinds.ensemble.charts import (
     along,
     bands_figure,
@@ -25,7 +24,6 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 52
-KIND = NAME
 figure = ensemble_figure
 #: curves of a file that are drawn
 _MOST = 6

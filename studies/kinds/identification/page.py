@@ -13,7 +13,6 @@ import plotly.graph_objects as go
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.identification.summary import proposal_text
-from vanedamp.studies.kinds.identification import NAME
 from vanedamp.studies.kinds.identification.charts import (
     correlation_figure,
     data_figure,
@@ -25,7 +24,6 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 57
-KIND = NAME
 figure = data_figure
 #: panels side by side, height of a row of them, and of what is around them
 _COLUMNS, _HEIGHT, _LEGEND = 3, 320, 120

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.studies.kinds.life import NAME
 from vanedamp.studies.kinds.life.charts import life_figure
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.charts import dressed
@@ -16,7 +15,6 @@ from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength_charts import wear_figure
 
 ORDER = 57
-KIND = NAME
 figure = life_figure
 
 

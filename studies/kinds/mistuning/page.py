@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from vanedamp.rom.ring.study import MistuningStudy
-from vanedamp.studies.kinds.mistuning import NAME
 from vanedamp.studies.kinds.mistuning.charts import (
     amplification_figure,
     amplification_table,
@@ -19,7 +18,6 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 16
-KIND = NAME
 figure = amplification_figure
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vanedamp.studies.kinds.optimisation import NAME
 from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.charts import dressed
@@ -13,7 +12,6 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 55
-KIND = NAME
 figure = optimisation_figure
 
 

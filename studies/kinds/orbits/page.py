@@ -19,7 +19,6 @@ from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
-from vanedamp.studies.kinds.orbits import NAME
 from vanedamp.studies.kinds.orbits.borders import borders_figure, borders_table, maps_of
 from vanedamp.studies.kinds.orbits.motions import orbits_figure, orbits_table
 from vanedamp.studies.report.charts import Table, axis_title, dressed
@@ -29,7 +28,6 @@ from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
 ORDER = 80
-KIND = NAME
 #: orbits of a file that are drawn
 _MOST_ORBITS = 6
 _BIFURCATIONS = ("fold", "pitchfork", "period doubling", "neimark-sacker")

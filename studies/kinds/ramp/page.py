@@ -14,7 +14,6 @@ from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
-from vanedamp.studies.kinds.ramp import NAME
 from vanedamp.studies.report.charts import COLOURS, Chart, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
@@ -22,7 +21,6 @@ from vanedamp.studies.report.strength import course_chart
 from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 70
-KIND = NAME
 _STATIONARY = "#0f172a"
 #: points of a curve that are drawn; of more periods, the largest of equally many each
 _MOST_POINTS = 2000

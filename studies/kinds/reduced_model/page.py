@@ -12,14 +12,12 @@ from vanedamp.rom.error_estimate import frequency_grid
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.hot_spots import spot_lines, spot_warnings
-from vanedamp.studies.kinds.reduced_model import NAME
 from vanedamp.studies.report.charts import COLOURS, Chart
 from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 30
-KIND = NAME
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

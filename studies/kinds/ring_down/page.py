@@ -12,14 +12,12 @@ from plotly.subplots import make_subplots
 from scipy.ndimage import median_filter
 
 from vanedamp.coupling.transients.ring_down_record import RingDown
-from vanedamp.studies.kinds.ring_down import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength import course_chart
 
 ORDER = 75
-KIND = NAME
 #: how the free motion begins
 _BEGUN = {
     "steady": "after a steady excitation of {frequency:.6g} Hz has ceased",

@@ -10,13 +10,11 @@ import plotly.graph_objects as go
 
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
-from vanedamp.studies.kinds.ring_model import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 31
-KIND = NAME
 #: frequencies that are drawn and listed
 _MOST = 200
 

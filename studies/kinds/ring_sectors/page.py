@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from vanedamp.studies.kinds.ring_model.page import __file__ as TEMPLATE
 from vanedamp.studies.kinds.ring_model.page import figure, section
-from vanedamp.studies.kinds.ring_sectors import NAME as KIND
 
-__all__ = ["KIND", "ORDER", "TEMPLATE", "figure", "section"]
+__all__ = ["ORDER", "TEMPLATE", "figure", "section"]
 
 ORDER = 32

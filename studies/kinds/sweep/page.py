@@ -15,7 +15,6 @@ from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts
 from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
-from vanedamp.studies.kinds.sweep import NAME
 from vanedamp.studies.kinds.sweep.bifurcations import MOST_PANELS as PANELS
 from vanedamp.studies.kinds.sweep.bifurcations import (
     bifurcation_figure,
@@ -55,7 +54,6 @@ from vanedamp.studies.report.sector_charts import ring_shown
 from vanedamp.studies.report.strength import limited, sweep_shown
 
 ORDER = 50
-KIND = NAME
 #: curves of a page, of more the best; drawn at first, of which the reader picks others; panels of the energy
 _MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
 #: steady states in the table below basins

@@ -9,13 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.studies.kinds.system_matrices import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 12
-KIND = NAME
 #: nodes that are drawn, evenly chosen of more
 _MOST = 20_000
 
