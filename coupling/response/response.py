@@ -178,23 +178,23 @@ class Response(Measured, Record, Plotted):
     counters: dict[str, int]
     """counts of what the method did, by name"""
     peak: Annotated[np.ndarray, Array(("full_period",), "m")]
-    """(periods,) largest displacement of each period [m]"""
+    """largest displacement of each period, without its sign"""
     section: Annotated[np.ndarray, Array(("period", "state"), "m, m/s")]
-    """(periods + 1, 2) displacement and velocity at the start of each period [m, m/s]"""
+    """displacement and velocity at the start of each period; one more than periods"""
     slip: Annotated[np.ndarray, Array(("period", "damper"), "m")]
-    """(periods + 1, bodies) displacements of the bodies relative to their cavities at the start of each period [m]"""
+    """displacements of the bodies relative to their cavities at the start of each period"""
     slip_velocity: Annotated[np.ndarray, Array(("period", "damper"), "m/s")]
-    """(periods + 1, bodies) velocities of the bodies relative to their cavities [m/s]"""
+    """velocities of the bodies relative to their cavities there"""
     event_list: Annotated[Sequence[Event], Rows("event")] = ()
     """events, empty if they were not asked for"""
     time: Annotated[np.ndarray, Array(("time",), "s")] = field(default_factory=empty)
-    """(n,) times of the samples, empty if none were asked for [s]"""
+    """of the samples, empty if none were asked for"""
     displacement: Annotated[np.ndarray, Array(("time",), "m")] = field(default_factory=empty)
-    """(n,) displacement at `excitation.at` [m]"""
+    """displacement at `excitation.at`"""
     body_displacement: Annotated[np.ndarray, Array(("time", "damper"), "m")] = field(
         default_factory=lambda: np.zeros((0, 0))
     )
-    """(n, bodies) displacements of the bodies relative to their cavities [m]"""
+    """displacements of the bodies relative to their cavities"""
     estimate: dict[str, Any] | None = None
     """estimate of the error of a reduced model whose number of modes was chosen automatically"""
     final: Annotated[RestartState | None, Own()] = None
@@ -210,7 +210,7 @@ class Response(Measured, Record, Plotted):
     advice: dict[str, Any] | None = None
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: Annotated[np.ndarray | None, Array(("time", "mode"), "kg^0.5 m")] = None
-    """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    """samples of a reduced model's mass-normalised modal coordinates; None without"""
     contact_work: Annotated[tuple[ContactWork, ...] | None, Own()] = None
     """work of friction and impacts of each contact; None without [wear]"""
     wear: tuple[ContactWear, ...] | None = None
