@@ -16,8 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import dimension, dimensions, resonance_axis
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Columns, Own, Record
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.record import Array, Columns, Paths, Record
 
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
@@ -68,12 +67,12 @@ class Ensemble(Record, Plotted):
     """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers."""
 
     KIND: ClassVar[str] = "ensemble"
-    IN_JSON = ()
+    IN_JSON = ("axes",)
     scene: SceneField
     """with its ranges"""
-    axes: Annotated[Mapping[str, np.ndarray], Own()]
+    axes: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of)]
     """dotted path -> values, of its [sweep] table; empty for a run at one frequency"""
-    samples: Annotated[Mapping[str, np.ndarray], Own()]
+    samples: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of, "sample", "number")]
     """dotted path -> (s,) values of each range"""
     members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
     """(s, *grid) quantities of all points (results.md), of bodies, hot spots and sectors the largest; nan where
@@ -144,12 +143,11 @@ class Ensemble(Record, Plotted):
         return f"; in {share:.0%} of the samples the peak lies at an edge of the range" if share else ""
 
     def derived(self) -> dict[str, Any]:
-        """Return axes, ranges, quantiles and indices; the file has all members."""
-        own = {path: values.tolist() for path, values in self.axes.items()}
+        """Return ranges, quantiles and indices; the file has all members."""
         units = {path: unit_of(path) for path in (*self.axes, *self.samples)}
         units |= {name: one.unit for name, one in spreads().items()}
         return {
-            "axes": own, "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
+            "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
             "samples": len(self.status), "points_not_ok": self.not_ok, "quantiles": list(QUANTILES),
             "quantile": {name: values.tolist() for name, values in self.quantile.items()},
             "indices": {
@@ -162,34 +160,11 @@ class Ensemble(Record, Plotted):
 
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
-        return {"number": self.numbers, "index": INDICES}
+        return {"number": self.numbers, "index": INDICES, "quantile": np.array(QUANTILES)}
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
         """Return the dimensions of the grid, and of its curves."""
         return dimensions(self.scene, self.axes)
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        found = super().variables() | {"quantile": Variable(np.array(QUANTILES), ("quantile",))}
-        for path, values in self.axes.items():
-            found[dimension(path)] = Variable(values, (dimension(path),), unit_of(path))
-        for path, values in self.samples.items():
-            found[f"sample_{dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
-        return found
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        return super().attributes() | {"axes": list(self.axes)}
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
-        """Return the record in the variables and attributes of a file."""
-        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
-        return cls(
-            axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
-            samples={number: frozen(values[f"sample_{dimension(number)}"]) for number in values["number"]},
-            **cls.given(values, attributes, path),
-        )
 
 
 def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:

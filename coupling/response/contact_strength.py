@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from vanedamp.coupling.response.contact_work import contact_name
 
@@ -46,7 +45,3 @@ class ContactStrength:
             f"{self.name}: up to {self.fastest:.3g} m/s, {self.peak_force:.4g} N for {1e6 * self.duration:.3g} us, "
             f"{self.pressure / 1e6:.4g} MPa{used}"
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,7 +74,3 @@ class ContactWear:
     def hours_to(self, depth: float) -> float | None:
         """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
         return depth / self.depth_rate if self.depth_rate else None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self)

@@ -19,8 +19,7 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import dimension, dimensions
 from vanedamp.coupling.sweep.row import TEXTS
 from vanedamp.files.display import Plotted, html_table
-from vanedamp.files.record import Array, Columns, Own, Record
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.record import Array, Columns, Paths, Record
 
 #: amplitudes that earlier files have of bodies without static loads only, which they are then as well
 _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
@@ -29,6 +28,10 @@ PEAKS = tuple(one.name for one in declared_in(linear_peaks))
 
 def _of_points() -> dict[str, Quantity]:
     return {name: one for name, one in table().items() if name not in PEAKS}
+
+
+def _in_json() -> dict[str, Quantity]:
+    return {name: one for name, one in _of_points().items() if "section" not in one.dims}
 
 
 def _peaks() -> dict[str, Quantity]:
@@ -49,12 +52,12 @@ class Sweep(Measured, Record, Plotted):
     """
 
     KIND: ClassVar[str] = "sweep"
-    IN_JSON = ("status", "classification", "quantities", "peaks")
+    IN_JSON = ("axes", "status", "classification", "quantities", "peaks")
     scene: SceneField
     """of the sweep, with its [sweep] table"""
-    axes: Annotated[Mapping[str, np.ndarray], Own()]
+    axes: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of)]
     """dotted path -> values"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",))]
+    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",), in_json=_in_json)]
     """by name; sections are those of the last evaluated periods"""
     status: Annotated[np.ndarray, Array(("grid",), dtype=object)]
     """"ok", another response.response.Status, or "error: ..." for a run that broke, without quantities"""
@@ -121,37 +124,20 @@ class Sweep(Measured, Record, Plotted):
         """Return the dimensions of the grid, and of its curves."""
         return dimensions(self.scene, self.axes)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data, quantities as nested lists (nan where there is none), without sections."""
-        return {name: values for name, values in super().to_json().items() if name not in self.sections}
-
     def derived(self) -> dict[str, Any]:
-        """Return axes and units by path, and what the user is to know."""
+        """Return units by path and name, and what the user is to know."""
         notes: dict[str, Any] = {"warnings": list(self.warnings)}
         kept = ("estimate", "advice", "moved_starts")
         notes |= {name: self.provenance[name] for name in kept if self.provenance.get(name)}
-        axes = {path: values.tolist() for path, values in self.axes.items()}
         units = {name: table()[name].unit for name in (*self.quantities, *self.peaks)}
-        return {"axes": axes, "units": self.units() | units, "loss": list(labels("loss"))} | notes
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        units = self.units()
-        axes = {dimension(axis): Variable(v, (dimension(axis),), units[axis]) for axis, v in self.axes.items()}
-        return axes | super().variables()
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        return super().attributes() | {"axes": list(self.axes)}
+        return {"units": self.units() | units, "loss": list(labels("loss"))} | notes
 
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Sweep:
-        """Return the record in the variables and attributes of a file."""
+        """Return the record in the variables and attributes of a file, which may be an earlier one."""
         earlier = {f"{name}_dynamic": values[name] for name in _ALSO_DYNAMIC}
         earlier[penetration.name] = np.full(np.shape(values["status"]), np.nan)
-        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
-        given = cls.given(earlier | dict(values), attributes, path)
-        return cls(axes={axis: frozen(array, array.dtype) for axis, array in axes.items()}, **given)
+        return super().of(earlier | dict(values), attributes, path)
 
 
 def _text(value: Any) -> str:

@@ -241,7 +241,7 @@ def test_a_quantity_has_its_unit_in_one_file():
 
 
 #: methods by which records of results write or read parts by hand: fewer are better, more need a reason
-BY_HAND = 25
+BY_HAND = 15
 
 
 def test_records_declare_what_they_are():
