@@ -27,15 +27,16 @@ class Displayed:
 
     def __repr__(self) -> str:
         """Return the record's name and a line for each of its fields that has a value."""
-        lines = self._lines()
+        lines = self.lines()
         width = max(map(len, lines))
         return "\n".join([type(self).__name__, *(f"{name:>{width + 2}}: {text}" for name, text in lines.items())])
 
     def _repr_html_(self) -> str:
         """Return the same as the table that a notebook shows."""
-        return html_table((type(self).__name__, ""), self._lines().items())
+        return html_table((type(self).__name__, ""), self.lines().items())
 
-    def _lines(self) -> dict[str, str]:
+    def lines(self) -> dict[str, str]:
+        """Return the values that are there as short texts with their units, by name."""
         shown, units = {name: _shown(value) for name, value in self.shown().items()}, self.printed_units()
         return {name: f"{text} {units.get(name, '')}".rstrip() for name, text in shown.items() if text is not None}
 

@@ -8,8 +8,8 @@
         status: str
 
 A field is an array (Array), arrays by name (Columns), a tuple of small records of one class, whose fields are columns
-(Rows), a tuple of parts that have arrays of different lengths (Ragged), or plain data that pydantic knows: an attribute
-of the file.
+(Rows), a tuple of parts that have arrays of different lengths (Ragged), arrays by dotted path (Paths), a sparse matrix
+(Sparse), another record in the same file (Within), or plain data that pydantic knows: an attribute of the file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import cache
 from typing import (
     TYPE_CHECKING,
@@ -64,7 +64,10 @@ class Array(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s."""
+    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s.
+
+    Those that have defaults are left out where all rows have all of these.
+    """
 
     dim: str
 
@@ -72,12 +75,14 @@ class Rows(NamedTuple):
 class Columns(NamedTuple):
     """A mapping of arrays by name, a variable each: of a table that knows unit, further dims and dtype of every name.
 
-    known: returns the table; dims: first dimensions of all of them; prefix: of names in the file.
+    known: returns the table; dims: first dimensions of all of them; prefix: of names in the file; in_json: returns the
+    part of the table that JSON has (None: all).
     """
 
     known: Callable[[], Mapping[str, Any]]
     dims: tuple[str, ...] = ()
     prefix: str = ""
+    in_json: Callable[[], Mapping[str, Any]] | None = None
 
 
 class Ragged(NamedTuple):
@@ -92,14 +97,84 @@ class Ragged(NamedTuple):
     prefix: str = ""
 
 
+class Paths(NamedTuple):
+    """A mapping of arrays by dotted path, a variable each, along itself.
+
+    called, unit: return name and unit of a path; dim: along it instead, and before the names; listed: variable with the
+    paths ("": the attribute of the field's name).
+    """
+
+    called: Callable[[str], str]
+    unit: Callable[[str], str]
+    dim: str = ""
+    listed: str = ""
+
+    def name(self, path: str) -> str:
+        """Return the name of the variable of a path."""
+        return f"{self.dim}_{self.called(path)}" if self.dim else self.called(path)
+
+    def written(self, _: str, arrays: Mapping[str, Any]) -> dict[str, store.Variable]:
+        """Return the variables of the file."""
+        return {
+            self.name(path): store.Variable(values, (self.dim or self.called(path),), self.unit(path))
+            for path, values in arrays.items()
+        }
+
+    def read(self, field: str, values: Mapping[str, Any], attributes: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Return the arrays in a file."""
+        paths = values[self.listed] if self.listed else attributes[field]
+        arrays = {path: values[self.name(path)] for path in paths}
+        return {path: store.frozen(array, array.dtype) for path, array in arrays.items()}
+
+
+class Sparse(NamedTuple):
+    """A square sparse matrix, compressed by rows: its entries, "<name>_column" and "<name>_row_start"."""
+
+    unit: str
+
+    def written(self, name: str, matrix: Any) -> dict[str, store.Variable]:
+        """Return the variables of the file."""
+        entry = (f"{name}_entry",)
+        return {
+            name: store.Variable(matrix.data, entry, self.unit),
+            f"{name}_column": store.Variable(matrix.indices, entry),
+            f"{name}_row_start": store.Variable(matrix.indptr, ("row_edge",)),
+        }
+
+    def read(self, name: str, values: Mapping[str, Any], _: Mapping[str, Any]) -> Any:
+        """Return the matrix in a file."""
+        from scipy.sparse import csr_array
+
+        starts = values[f"{name}_row_start"]
+        return csr_array((values[name], values[f"{name}_column"], starts), (len(starts) - 1,) * 2)
+
+
 class Own(NamedTuple):
-    """A field that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`."""
+    """A field with functions that return its variables, and find it in those of a file.
+
+    Without: one that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`.
+    """
+
+    variables: Callable[[Any], dict[str, store.Variable]] | None = None
+    found: Callable[[Mapping[str, Any]], Any] | None = None
+
+
+class Within(NamedTuple):
+    """A record in the same file, or None where that lacks its first field; JSON has some of its fields."""
+
+    json: tuple[str, ...] = ()
 
 
 class Unit(NamedTuple):
     """The unit of a number."""
 
     unit: str
+
+
+class Named(NamedTuple):
+    """Plain data whose attribute and key have another name than the field."""
+
+    name: str
 
 
 class Coded(NamedTuple):
@@ -109,7 +184,9 @@ class Coded(NamedTuple):
     decode: Callable[[Any, str], Any]
 
 
-Layout = Array | Columns | Rows | Ragged | Own | Coded | Unit | None
+Layout = Array | Columns | Rows | Ragged | Paths | Sparse | Within | Own | Named | Coded | Unit | None
+#: layouts of what is no attribute
+_VARIABLES = (Columns, Rows, Ragged, Paths, Sparse, Within, Own)
 
 
 def empty() -> np.ndarray:
@@ -134,7 +211,7 @@ class Record(Displayed):
                 object.__setattr__(self, name, value.item())
 
     def labels(self) -> dict[str, Any]:
-        """Return the names along dimensions that have some, by dimension."""
+        """Return the names, or numbers, along dimensions that have some, by dimension."""
         return {}
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
@@ -162,18 +239,26 @@ class Record(Displayed):
             if isinstance(layout, Array) and not layout.attribute and not _missing(value, name in optional):
                 stored = np.asarray(value, np.int8 if layout.dtype is bool else layout.dtype)
                 for part, values in _parts(stored, layout.imaginary).items():
-                    found[(layout.name or name) + part] = store.Variable(values, self.dims(layout.dims), layout.unit)
+                    dims, unit = self.dims(layout.dims), self.unit_in_file(layout.unit)
+                    found[(layout.name or name) + part] = store.Variable(values, dims, unit)
             elif isinstance(layout, Columns):
                 for each, values in value.items():
                     one = layout.known()[each]
                     dims = self.dims((*layout.dims, *one.dims))
                     found[layout.prefix + each] = store.Variable(values, dims, one.unit)
-            elif isinstance(layout, Rows):
-                found |= row_variables(value, get_args(kind)[0], layout.dim)
+            elif isinstance(layout, Rows) and (value or name not in optional):
+                found |= _row_variables(value, get_args(kind)[0], layout.dim, self.unit_in_file)
             elif isinstance(layout, Ragged) and (value or name not in optional):
                 found |= self._ragged_variables(value, get_args(kind)[0], layout)
+            elif isinstance(layout, Within):
+                found |= value.variables() if value is not None else {}
+            elif isinstance(layout, Paths | Sparse):
+                found |= layout.written(name, value)
+            elif isinstance(layout, Own) and layout.variables and value is not None:
+                found |= layout.variables(value)
         return found | {
-            dim: store.Variable(np.array(list(names), object), (dim,)) for dim, names in self.labels().items()
+            dim: store.Variable(names if isinstance(names, np.ndarray) else np.array(list(names), object), (dim,))
+            for dim, names in self.labels().items()
         }
 
     def _ragged_variables(self, parts: Sequence[Any], kind: type, ragged: Ragged) -> dict[str, store.Variable]:
@@ -185,7 +270,7 @@ class Record(Displayed):
             if isinstance(layout, Rows):
                 whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
                 rows = [row for each in column for row in each]
-                found |= row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
+                found |= _row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
                 found[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
             elif isinstance(layout, Columns):
                 for name, values in joined(column, counts).items():
@@ -212,11 +297,11 @@ class Record(Displayed):
     def plain(self, names: Container[str] | None = None) -> dict[str, Any]:
         """Return the fields that are neither arrays nor rows, as plain data. names: of those wanted; None: all."""
         return {
-            name: layout.encode(getattr(self, name))
+            _name(name, layout): layout.encode(getattr(self, name))
             if isinstance(layout, Coded)
             else _adapter(kind).dump_python(getattr(self, name), mode="json")
             for name, (kind, layout) in declared(type(self)).items()
-            if not isinstance(layout, Array | Columns | Rows | Ragged | Own) and (names is None or name in names)
+            if not isinstance(layout, (Array, *_VARIABLES)) and (names is None or name in names)
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -234,6 +319,10 @@ class Record(Displayed):
             value = getattr(self, name)
             if isinstance(layout, Array) and layout.attribute and not _missing(value, name in optional):
                 found[layout.name or name] = list(value) if _is_tuple(kind) else value
+            elif isinstance(layout, Paths) and not layout.listed:
+                found[name] = list(value)
+            elif isinstance(layout, Within) and value is not None:
+                found |= value.attributes()
         return found
 
     def to_json(self) -> dict[str, Any]:
@@ -241,6 +330,10 @@ class Record(Displayed):
         wanted = self.IN_JSON
         if wanted is None:
             wanted = tuple(name for name in declared(type(self)) if name != "provenance")
+        return self._in_json(wanted) | self.derived()
+
+    def _in_json(self, wanted: tuple[str, ...]) -> dict[str, Any]:
+        """Return some fields as plain data."""
         found = self.plain(wanted)
         for name, (_, layout) in declared(type(self)).items():
             value = getattr(self, name)
@@ -250,10 +343,15 @@ class Record(Displayed):
                 for part, values in _parts(np.asarray(value), layout.imaginary).items():
                     found[(layout.json or layout.name or name) + part] = values.tolist()
             elif isinstance(layout, Columns):
-                found |= {layout.prefix + each: values.tolist() for each, values in value.items()}
+                known = (layout.in_json or layout.known)()
+                found |= {layout.prefix + each: values.tolist() for each, values in value.items() if each in known}
             elif isinstance(layout, Rows):
                 found[name] = [dataclasses.asdict(row) for row in value]
-        return found | self.derived()
+            elif isinstance(layout, Paths):
+                found[name] = {path: values.tolist() for path, values in value.items()}
+            elif isinstance(layout, Within):
+                found |= value._in_json(layout.json)
+        return found
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as."""
@@ -299,11 +397,21 @@ class Record(Displayed):
                     name: store.frozen(array, one.dtype) for name, (array, one) in _named(values, layout).items()
                 }
             elif isinstance(layout, Rows):
-                given[field] = rows_of(values, get_args(kind)[0], layout.dim)
+                of = get_args(kind)[0]
+                if field not in optional or f"{layout.dim}_{next(iter(_columns(of)))}" in values:
+                    given[field] = _rows_of(values, of, layout.dim)
             elif isinstance(layout, Ragged):
                 given[field] = _parts_of(values, get_args(kind)[0], layout)
-            elif not isinstance(layout, Own) and (field in attributes or field not in optional):
-                value = attributes.get(field) if type(None) in get_args(kind) else attributes[field]
+            elif isinstance(layout, Within):
+                of = (get_args(kind) or (kind,))[0]
+                if field not in optional or next(iter(declared(of))) in values:
+                    given[field] = of.of(values, attributes, path)
+            elif isinstance(layout, Paths | Sparse):
+                given[field] = layout.read(field, values, attributes)
+            elif isinstance(layout, Own):
+                given |= {field: layout.found(values)} if layout.found else {}
+            elif (name := _name(field, layout)) in attributes or field not in optional:
+                value = attributes.get(name) if type(None) in get_args(kind) else attributes[name]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
                 coded = layout if isinstance(layout, Coded) else None
                 given[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
@@ -321,9 +429,7 @@ def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next(
-            (note for note in notes if isinstance(note, Array | Columns | Rows | Ragged | Own | Coded | Unit)), None
-        )
+        layout = next((note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, Unit))), None)
         found[item.name] = (kind, layout)
     return found
 
@@ -357,7 +463,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
         if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
             columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
         elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
-            columns[field] = rows_of(values, get_args(of)[0], prefix + layout.dim)
+            columns[field] = _rows_of(values, get_args(of)[0], prefix + layout.dim)
         elif name in values:
             columns[field] = values[name]
     of_things = [len(columns[field]) for field in columns if not _has_rows(kind, field, dim)]
@@ -396,7 +502,7 @@ def _part(
 
 
 def _name(field: str, layout: Layout) -> str:
-    return (layout.name if isinstance(layout, Array) else "") or field
+    return (layout.name if isinstance(layout, Array | Named) else "") or field
 
 
 def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
@@ -419,7 +525,7 @@ def _is_frozen(value: Any, dtype: Any) -> bool:
 
 
 def _missing(value: Any, optional: bool) -> bool:
-    return value is None or (optional and np.shape(value) == (0,))
+    return value is None or (optional and np.size(value) == 0)
 
 
 def _optional(cls: Any) -> set[str]:
@@ -428,26 +534,30 @@ def _optional(cls: Any) -> set[str]:
     return {item.name for item in dataclasses.fields(cls) if not (item.default is item.default_factory is none)}
 
 
-def row_variables(
-    rows: Iterable[Any], kind: type, dim: str, unit_of: Callable[[str], str] = str
+def _row_variables(
+    rows: Sequence[Any], kind: type, dim: str, unit_of: Callable[[str], str]
 ) -> dict[str, store.Variable]:
-    """Return the variables of rows of a class (Rows). unit_of: returns that of a declared one (Record.unit_in_file)."""
-    rows = list(rows)
+    """Return the variables of rows of a class."""
+    columns, optional = _columns(kind), _optional(kind)
+    if all(getattr(row, name) == getattr(kind, name) for row in rows for name in optional):
+        columns = {name: one for name, one in columns.items() if name not in optional}
     return {
         f"{dim}_{name}": store.Variable(
             np.array([getattr(row, name) for row in rows], dtype), (dim, *dims), unit_of(unit)
         )
-        for name, (dtype, unit, dims) in _columns(kind).items()
+        for name, (dtype, unit, dims) in columns.items()
     }
 
 
-def rows_of(values: Mapping[str, Any], kind: Callable[..., Row], dim: str) -> tuple[Row, ...]:
+def _rows_of(values: Mapping[str, Any], kind: Callable[..., Row], dim: str) -> tuple[Row, ...]:
     """Return the rows of a class in the variables of a file."""
-    columns = (
-        map(store.frozen, values[f"{dim}_{name}"]) if dims else values[f"{dim}_{name}"].tolist()
+    optional = _optional(kind)
+    columns = {
+        name: map(store.frozen, values[f"{dim}_{name}"]) if dims else values[f"{dim}_{name}"].tolist()
         for name, (_, _, dims) in _columns(kind).items()
-    )
-    return tuple(map(kind, *columns))
+        if name not in optional or f"{dim}_{name}" in values
+    }
+    return tuple(kind(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
 
 
 @cache
@@ -464,7 +574,9 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def _is_tuple(kind: Any) -> bool:
-    return get_origin(kind) is tuple
+    """Whether a type is that of a tuple, or of None else."""
+    kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
+    return any(get_origin(one) is tuple for one in kinds)
 
 
 def _is_text(kind: Any) -> bool:

@@ -5,18 +5,16 @@ Plain numpy and scipy: users of another FE code enter here with their own sparse
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
-from vanedamp.files.display import Displayed
 from vanedamp.files.errors import LARGEST, VanedampError
+from vanedamp.files.record import Array, Own, Record, Sparse
 from vanedamp.files.sparse_indices import SparseError, within_shape
 
 # assembly adds the same numbers in another order above and below the diagonal
@@ -64,30 +62,54 @@ class Patch:
         return float(self.weights.sum())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SystemMatrices(Displayed):
-    """Unconstrained finite element matrices in displacement DOFs, dof = 3 * node + component, N = 3 * n_nodes.
+def _patch_variables(patches: Mapping[str, Patch]) -> dict[str, store.Variable]:
+    """Return patches as variables of a file."""
+    parts = list(patches.values())
+    return {
+        "patch": store.Variable(np.array(list(patches), dtype=object), ("patch",)),
+        "patch_offset": store.Variable(np.cumsum([0] + [part.nodes.size for part in parts]), ("patch_edge",)),
+        "patch_nodes": store.Variable(
+            np.concatenate([np.empty(0, np.int64), *(part.nodes for part in parts)]), ("patch_entry",)
+        ),
+        "patch_weights": store.Variable(
+            np.concatenate([np.empty(0), *(part.weights for part in parts)]), ("patch_entry",), "m^2"
+        ),
+        "patch_normal": store.Variable(np.reshape([part.normal for part in parts], (-1, 3)), ("patch", "axis")),
+    }
 
-    stiffness      (N, N) symmetric CSR, N/m
-    mass           (N, N) symmetric CSR, kg
-    coordinates    (n_nodes, 3) m
-    fixed          (n_fixed,) sorted indices of the DOFs that the supports hold at zero
-    patches        label -> Patch
-    damping_ratio  modal damping ratio of every mode
-    provenance     where the numbers come from: mesh hash, versions, parameters (JSON-able)
-    vertices       (n_nodes, n_vertices) linear shape functions of the mesh's vertices at the nodes, of elements of a
-                   higher degree, for the iterative solver; None: unknown, as after `load`
-    """
+
+def _patches_of(values: Mapping[str, Any]) -> dict[str, Patch]:
+    """Return the patches in the variables of a file."""
+    offsets = values["patch_offset"]
+    normals = values.get("patch_normal", np.zeros((len(offsets) - 1, 3)))
+    return {
+        str(label): Patch(values["patch_nodes"][start:stop], values["patch_weights"][start:stop], normal)
+        for label, start, stop, normal in zip(values["patch"], offsets[:-1], offsets[1:], normals, strict=True)
+    }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SystemMatrices(Record):
+    """Unconstrained finite element matrices in displacement DOFs, dof = 3 * node + component, N = 3 * n_nodes."""
 
     KIND: ClassVar[str] = "system-matrices"
-    stiffness: sparse.csr_array
-    mass: sparse.csr_array
-    coordinates: np.ndarray
-    fixed: np.ndarray
-    patches: Mapping[str, Patch]
+    stiffness: Annotated[sparse.csr_array, Sparse("N/m")]
+    """(N, N), symmetric"""
+    mass: Annotated[sparse.csr_array, Sparse("kg")]
+    """(N, N), symmetric"""
+    coordinates: Annotated[np.ndarray, Array(("node", "axis"), "m")]
+    """of the nodes"""
+    fixed: Annotated[np.ndarray, Array(("fixed_dof",), dtype=np.int64)]
+    """sorted indices of the DOFs that the supports hold at zero"""
+    patches: Annotated[Mapping[str, Patch], Own(_patch_variables, _patches_of)]
+    """by label: in files `patch`, whose `patch_nodes` and `patch_weights` begin at its `patch_offset`"""
     damping_ratio: float
+    """modal damping ratio of every mode"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    vertices: sparse.csr_array | None = None
+    """where the numbers come from: mesh hash, versions, parameters (JSON-able)"""
+    vertices: Annotated[sparse.csr_array | None, Own()] = None
+    """(n_nodes, n_vertices) linear shape functions of the mesh's vertices at the nodes, of elements of a higher degree,
+    for the iterative solver; None: unknown, as after `load`"""
 
     def __post_init__(self) -> None:
         coordinates = store.frozen(self.coordinates)
@@ -161,54 +183,6 @@ class SystemMatrices(Displayed):
         if label not in self.patches:
             raise MatricesError(f"no patch {label!r}; there are: {', '.join(sorted(self.patches)) or 'none'}")
         return self.patches[label]
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an HDF5 record."""
-        patches = list(self.patches.values())
-        offsets = np.cumsum([0] + [patch.nodes.size for patch in patches])
-        nodes = np.concatenate([np.empty(0, np.int64), *(patch.nodes for patch in patches)])
-        weights = np.concatenate([np.empty(0), *(patch.weights for patch in patches)])
-        variables = {
-            "coordinates": store.Variable(self.coordinates, ("node", "axis"), "m"),
-            "fixed": store.Variable(self.fixed, ("fixed_dof",)),
-            "patch": store.Variable(np.array(list(self.patches), dtype=object), ("patch",)),
-            "patch_offset": store.Variable(offsets, ("patch_edge",)),
-            "patch_nodes": store.Variable(nodes, ("patch_entry",)),
-            "patch_weights": store.Variable(weights, ("patch_entry",), "m^2"),
-            "patch_normal": store.Variable(np.reshape([patch.normal for patch in patches], (-1, 3)), ("patch", "axis")),
-        }
-        for name, matrix, units in (("stiffness", self.stiffness, "N/m"), ("mass", self.mass, "kg")):
-            variables[name] = store.Variable(matrix.data, (f"{name}_entry",), units)
-            variables[f"{name}_column"] = store.Variable(matrix.indices, (f"{name}_entry",))
-            variables[f"{name}_row_start"] = store.Variable(matrix.indptr, ("row_edge",))
-        store.save(
-            path, self.KIND, variables, {"damping_ratio": self.damping_ratio, "provenance": dict(self.provenance)}
-        )
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> SystemMatrices:
-        """Read the record that `save` wrote. Raises files.store.StoreError."""
-        values, attributes = store.load(path, cls.KIND)
-        offsets = values["patch_offset"]
-        normals = values.get("patch_normal", np.zeros((len(offsets) - 1, 3)))
-        patches = {
-            str(label): Patch(values["patch_nodes"][start:stop], values["patch_weights"][start:stop], normal)
-            for label, start, stop, normal in zip(values["patch"], offsets[:-1], offsets[1:], normals, strict=True)
-        }
-        size = values["coordinates"].size
-        found = {
-            name: sparse.csr_array((values[name], values[f"{name}_column"], values[f"{name}_row_start"]), (size, size))
-            for name in ("stiffness", "mass")
-        }
-        return cls(
-            **found,
-            coordinates=values["coordinates"],
-            fixed=values["fixed"],
-            patches=patches,
-            damping_ratio=attributes["damping_ratio"],
-            provenance=json.loads(attributes["provenance"]),
-        )
 
 
 def _merged(patches: Sequence[Patch]) -> Patch:

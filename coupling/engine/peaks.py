@@ -45,7 +45,7 @@ def highest(system, flows, st, scratch, s, response, tau, constant, grows, peak,
     if size <= peak or tau <= 0.0:
         return peak
     peak = max(peak, _height(x0, side), _height(x1, side))
-    if not _may_exceed(peak, side, x0, v0, x1, v1, tau, fourth):
+    if not may_exceed(peak, side, x0, v0, x1, v1, tau, fourth):
         return peak
     h, level = 0.125 * system.period, ZERO
     while level < GRIDS and fourth * min(h, tau) ** 4 > 0.384 * size:
@@ -123,7 +123,7 @@ def _search_grid(
                     x1 += (drives[j] * growths[j]).real
                     v1 += (drives[j] * (rates[j] * growths[j] + turns[k])).real
             peak = max(peak, _height(x1, side))
-        if v0 * v1 < 0.0 and _may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
+        if v0 * v1 < 0.0 and may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
             top = _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h)
             peak = max(peak, _height(top, side))
         x0, v0 = x1, v1
@@ -153,7 +153,7 @@ def _height(x, side):
 
 
 @inlined
-def _may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
+def may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
     """Whether the height of x may exceed peak within [0, h]: cubic interpolant of the ends and bound of its error."""
     room = peak - fourth * h * h * h * h * (1 / 384)
     # the interpolant's basis functions of the slopes stay below 4/27 h

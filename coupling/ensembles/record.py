@@ -16,8 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import dimension, resonance_axis
 from vanedamp.coupling.sweep.over_axes import OverAxes
-from vanedamp.files.record import Array, Columns, Own
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.record import Array, Columns, Paths
 
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
@@ -62,12 +61,12 @@ class Ensemble(OverAxes):
     """Responses of a scene over samples of the numbers that it gives as ranges: N (d + 2) samples s of d numbers."""
 
     KIND: ClassVar[str] = "ensemble"
-    IN_JSON = ()
+    IN_JSON = ("axes",)
     scene: SceneField
     """with its ranges"""
-    axes: Annotated[Mapping[str, np.ndarray], Own()]
+    axes: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of)]
     """dotted path -> values, of its [sweep] table; empty for a run at one frequency"""
-    samples: Annotated[Mapping[str, np.ndarray], Own()]
+    samples: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of, "sample", "number")]
     """dotted path -> (s,) values of each range"""
     members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
     """(s, *grid) quantities of all points (results.md), of bodies, hot spots and sectors the largest; nan where
@@ -137,12 +136,11 @@ class Ensemble(OverAxes):
         return f"; in {share:.0%} of the samples the peak lies at an edge of the range" if share else ""
 
     def derived(self) -> dict[str, Any]:
-        """Return axes, ranges, quantiles and indices; the file has all members."""
-        own = {path: values.tolist() for path, values in self.axes.items()}
+        """Return ranges, quantiles and indices; the file has all members."""
         units = self.units() | {path: unit_of(path) for path in self.samples}
         units |= {name: one.unit for name, one in spreads().items()}
         return {
-            "axes": own, "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
+            "ranges": {path: list(ends) for path, ends in self.scene.ranges.items()}, "units": units,
             "samples": len(self.status), "points_not_ok": self.not_ok, "quantiles": list(QUANTILES),
             "quantile": {name: values.tolist() for name, values in self.quantile.items()},
             "indices": {
@@ -155,20 +153,7 @@ class Ensemble(OverAxes):
 
     def labels(self) -> dict[str, Any]:
         """Return the names along dimensions that have some."""
-        return {"number": self.numbers, "index": INDICES}
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        found = super().variables() | {"quantile": Variable(np.array(QUANTILES), ("quantile",))}
-        for path, values in self.samples.items():
-            found[f"sample_{dimension(path)}"] = Variable(values, ("sample",), unit_of(path))
-        return found
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Ensemble:
-        """Return the record in the variables and attributes of a file."""
-        samples = {number: frozen(values[f"sample_{dimension(number)}"]) for number in values["number"]}
-        return cls(samples=samples, **cls.given(values, attributes, path))
+        return {"number": self.numbers, "index": INDICES, "quantile": np.array(QUANTILES)}
 
 
 def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:

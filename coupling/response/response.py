@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -20,13 +20,13 @@ from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Own, Record, Unit, row_variables
+from vanedamp.files.record import Array, Named, Own, Record, Rows, Unit, Within, declared, empty
 from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.recovery import COMPONENTS
 
 #: attributes of a file that are tables
-_NESTED = ("wear", "contact_strength", "stress", "strength", "sectors")
+_NESTED = ("stress", "strength", "sectors")
 
 
 #: what runs do not have, and why
@@ -70,7 +70,7 @@ class Event:
     """One event. Speeds are relative to the wall or body met; of planar bodies and at stops, of the gap."""
 
     time: Annotated[float, Unit("s")]
-    """time [s]"""
+    """time"""
     kind: str
     """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
     neighbour, and "detach" from it"""
@@ -80,69 +80,58 @@ class Event:
     """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
     "stop" for a stop; of other elements the name of their table"""
     relative_velocity_before: Annotated[float, Unit("m/s")]
-    """relative speed before [m/s]"""
+    """relative speed before"""
     relative_velocity_after: Annotated[float, Unit("m/s")]
-    """relative speed after [m/s]"""
+    """relative speed after"""
     impulse: Annotated[float, Unit("N s")]
-    """impulse along the normal [N s]"""
+    """impulse along the normal"""
     corner: int = -1
     """corner of a body, from 0 (of a block 0 to 3) against the clock from the lower left one; -1: none"""
     tangential_impulse: Annotated[float, Unit("N s")] = 0.0
-    """impulse of friction [N s]"""
+    """impulse of friction"""
     loss: Annotated[float, Unit("J")] = 0.0
-    """energy that the impulses of an impact take, without what completes a chatter [J]"""
+    """energy that the impulses of an impact take, without what completes a chatter"""
 
 
-class PlanarSamples(NamedTuple):
-    """Samples of bodies in the plane, at the times of Response.time (n,): b bodies, c contacts.
+def _written(contacts: Sequence[tuple[int, str, int]]) -> dict[str, Variable]:
+    """Return contacts as variables of a file."""
+    columns = zip(("damper", "side", "corner"), (int, object, int), zip(*contacts, strict=True), strict=True)
+    return {f"contact_{name}": Variable(np.array(column, dtype), ("contact",)) for name, dtype, column in columns}
 
-    body_lift: (n, b) m, height of each body's centre above its height flat on its floor; body_tilt: (n, b) rad,
-    relative to the cavity, counterclockwise. floor_along, floor_across: (n, b) m, displacement of the floor under a
-    body, including a prescribed motion of the base; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
-    contact_closed: (n, c) bool, of methods with time steps whether it carried force in the step before. Lift, tilt and
-    floor_across are nan for sliders. contacts: body, side and corner of each contact, as of an Event.
-    """
 
-    body_lift: np.ndarray
-    body_tilt: np.ndarray
-    floor_along: np.ndarray
-    floor_across: np.ndarray
-    floor_rotation: np.ndarray
-    contact_gap: np.ndarray
-    contact_closed: np.ndarray
-    contacts: tuple[tuple[int, str, int], ...]
+def _contacts(values: Mapping[str, Any]) -> tuple[tuple[int, str, int], ...]:
+    """Return the contacts in the variables of a file."""
+    return tuple(zip(*(values[f"contact_{name}"].tolist() for name in ("damper", "side", "corner")), strict=True))
+
+
+_OfBodies = Annotated[np.ndarray, Array(("time", "damper"), "m")]
+_Angles = Annotated[np.ndarray, Array(("time", "damper"), "rad")]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanarSamples(Record):
+    """Samples of bodies in the plane at the times of Response.time; lift, tilt and floor_across: nan for sliders."""
+
+    body_lift: _OfBodies
+    """height of each body's centre above its height flat on its floor"""
+    body_tilt: _Angles
+    """tilt of bodies relative to their cavities, counterclockwise"""
+    floor_along: _OfBodies
+    """displacement of the floor under a body along it, with a prescribed motion of the base"""
+    floor_across: _OfBodies
+    """the same across it"""
+    floor_rotation: _Angles
+    """rotation of the floor"""
+    contact_gap: Annotated[np.ndarray, Array(("time", "contact"), "m")]
+    """gap of each contact"""
+    contact_closed: Annotated[np.ndarray, Array(("time", "contact"), dtype=bool)]
+    """whether it is closed; of methods with time steps, whether it carried force in the step before"""
+    contacts: Annotated[tuple[tuple[int, str, int], ...], Own(_written, _contacts)]
+    """body, side and corner of each contact, as of an Event: `contact_damper`, `contact_side`, `contact_corner`"""
 
     def cut(self, kept: Any) -> PlanarSamples:
         """Return the samples at some of the times, as numpy indexes them."""
-        arrays = {name: getattr(self, name)[kept] for name in self._fields[:-1]}
-        return self._replace(**arrays)
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file, with dimensions and units."""
-        units = {"body_tilt": "rad", "floor_rotation": "rad", "contact_closed": "1"}
-        variables = {
-            name: Variable(
-                np.asarray(values, np.int8 if values.dtype == bool else float),
-                ("time", "contact" if name.startswith("contact") else "damper"),
-                units.get(name, "m"),
-            )
-            for name, values in zip(self._fields[:-1], self[:-1], strict=True)
-        }
-        dampers, sides, corners = zip(*self.contacts, strict=True)
-        variables["contact_damper"] = Variable(np.array(dampers), ("contact",))
-        variables["contact_side"] = Variable(np.array(sides, object), ("contact",))
-        variables["contact_corner"] = Variable(np.array(corners), ("contact",))
-        return variables
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any]) -> PlanarSamples | None:
-        """Return the samples in the variables of a file; None for one of sliders, or of a version that kept none."""
-        if "contact_gap" not in values:
-            return None
-        arrays = {name: np.asarray(values[name], float) for name in cls._fields if name in values}
-        arrays["contact_closed"] = values["contact_closed"].astype(bool)
-        places = (values[f"contact_{name}"].tolist() for name in ("damper", "side", "corner"))
-        return cls(**arrays, contacts=tuple(zip(*places, strict=True)))
+        return replace(self, **{name: getattr(self, name)[kept] for name in declared(type(self)) if name != "contacts"})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -189,21 +178,23 @@ class Response(Measured, Record, Plotted):
     counters: dict[str, int]
     """counts of what the method did, by name"""
     peak: Annotated[np.ndarray, Array(("full_period",), "m")]
-    """(periods,) largest displacement of each period [m]"""
+    """largest displacement of each period, without its sign"""
     section: Annotated[np.ndarray, Array(("period", "state"), "m, m/s")]
-    """(periods + 1, 2) displacement and velocity at the start of each period [m, m/s]"""
+    """displacement and velocity at the start of each period; one more than periods"""
     slip: Annotated[np.ndarray, Array(("period", "damper"), "m")]
-    """(periods + 1, bodies) displacements of the bodies relative to their cavities at the start of each period [m]"""
+    """displacements of the bodies relative to their cavities at the start of each period"""
     slip_velocity: Annotated[np.ndarray, Array(("period", "damper"), "m/s")]
-    """(periods + 1, bodies) velocities of the bodies relative to their cavities [m/s]"""
-    event_list: Annotated[Sequence[Event], Own()]
+    """velocities of the bodies relative to their cavities there"""
+    event_list: Annotated[Sequence[Event], Rows("event")] = ()
     """events, empty if they were not asked for"""
-    time: Annotated[np.ndarray, Own()]
-    """(n,) times of the samples, empty if none were asked for [s]"""
-    displacement: Annotated[np.ndarray, Own()]
-    """(n,) displacement at `excitation.at` [m]"""
-    body_displacement: Annotated[np.ndarray, Own()]
-    """(n, bodies) displacements of the bodies relative to their cavities [m]"""
+    time: Annotated[np.ndarray, Array(("time",), "s")] = field(default_factory=empty)
+    """of the samples, empty if none were asked for"""
+    displacement: Annotated[np.ndarray, Array(("time",), "m")] = field(default_factory=empty)
+    """displacement at `excitation.at`"""
+    body_displacement: Annotated[np.ndarray, Array(("time", "damper"), "m")] = field(
+        default_factory=lambda: np.zeros((0, 0))
+    )
+    """displacements of the bodies relative to their cavities"""
     estimate: dict[str, Any] | None = None
     """estimate of the error of a reduced model whose number of modes was chosen automatically"""
     final: Annotated[RestartState | None, Own()] = None
@@ -214,21 +205,21 @@ class Response(Measured, Record, Plotted):
     moved_start: dict[str, Any] | None = None
     """of a second run, whose bodies begin about 1e-9 of their gap aside: status, mean amplitude and its confidence, as
     `amplitude_mean_dynamic`, and whether it `agrees`; None if it was not asked for, and without impacts of bodies"""
-    in_plane: Annotated[PlanarSamples | None, Own()] = None
+    in_plane: Annotated[PlanarSamples | None, Within()] = None
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
     """advice on the bodies whose shape was chosen automatically"""
     coordinates: Annotated[np.ndarray | None, Array(("time", "mode"), "kg^0.5 m")] = None
-    """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
+    """samples of a reduced model's mass-normalised modal coordinates; None without"""
     contact_work: Annotated[tuple[ContactWork, ...] | None, Own()] = None
     """work of friction and impacts of each contact; None without [wear]"""
-    wear: Annotated[tuple[ContactWear, ...] | None, Own()] = None
+    wear: tuple[ContactWear, ...] | None = None
     """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
     stress: Annotated[tuple[SpotStress, ...] | None, Own()] = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
     sectors: Annotated[SectorResponse | None, Own()] = None
     """response of each sector of a ring; None for other structures"""
-    contacts: Annotated[tuple[ContactStrength, ...] | None, Own()] = None
+    contacts: Annotated[tuple[ContactStrength, ...] | None, Named("contact_strength")] = None
     """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
@@ -271,25 +262,19 @@ class Response(Measured, Record, Plotted):
         found = {name: found.pop(name) for name in ("status", "frequency", *self._plain)} | found
         if not events:
             return found
-        fields = self._event_fields()
-        listed = [{name: getattr(event, name) for name in fields} for event in self.event_list]
+        planar = () if self.tilt_max is not None else ("corner", "tangential_impulse", "loss")
+        listed = [{k: v for k, v in asdict(event).items() if k not in planar} for event in self.event_list]
         return found | {"event_list": listed}
 
     def derived(self) -> dict[str, Any]:
         """Return what only some runs have."""
-        names = ("moved_start", "estimate", "advice")
-        data: dict[str, Any] = {name: value for name in names if (value := getattr(self, name)) is not None}
+        names = ("moved_start", "estimate", "advice", "wear", "contacts", "lyapunov")
+        data = {name: value for name, value in self.plain(names).items() if value is not None}
         data |= {name: _listed(table()[name], value) for name, value in self._plain.items()}
-        if self.wear is not None:
-            data["wear"] = [contact.to_json() for contact in self.wear]
         if self.stress is not None:
             data["stress"] = {spot.name: spot.to_json() for spot in self.stress}
             data["strength"] = {spot.name: dict(spot.strength) for spot in self.stress if spot.strength}
-        if self.contacts is not None:
-            data["contact_strength"] = [contact.to_json() for contact in self.contacts]
-        if self.sectors is not None:
-            data["sectors"] = self.sectors.to_json()
-        return data | ({} if self.lyapunov is None else {"lyapunov": self.lyapunov})
+        return data if self.sectors is None else data | {"sectors": self.sectors.to_json()}
 
     def save(self, path: str | os.PathLike[str], provenance: Mapping[str, Any] | None = None) -> None:  # type: ignore[override]
         """Write HDF5 that xarray opens: per-period series, samples and events, with the scene. Raises StoreError."""
@@ -298,37 +283,32 @@ class Response(Measured, Record, Plotted):
     def _made(self) -> dict[str, Any]:
         return ({} if self.scene is None else {"scene": self.scene.to_dict()}) | dict(self.provenance)
 
+    def labels(self) -> dict[str, Any]:
+        """Return the numbers of periods, and the names along dimensions that have some."""
+        named = {"hot_spot": [spot.name for spot in self.stress], "stress_component": COMPONENTS} if self.stress else {}
+        return {"period": np.arange(len(self.section)), **named}
+
     def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        found = super().variables() | {"period": Variable(np.arange(len(self.section)), ("period",))}
-        if len(self.time):
-            found["time"] = Variable(self.time, ("time",), "s")
-            found["displacement"] = Variable(self.displacement, ("time",), "m")
-            found["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
-        if self.in_plane is not None:
-            found |= self.in_plane.variables()
-        for name, one in table().items():
-            if one.dims[:1] in (("hot_spot",), ("sector",)) and (value := getattr(self, name)) is not None:
-                found[name] = Variable(value, one.dims, one.unit)
-        if self.stress:
-            found["hot_spot"] = Variable(np.array([spot.name for spot in self.stress], object), ("hot_spot",))
-            found["stress_component"] = Variable(np.array(COMPONENTS, object), ("stress_component",))
-        events = row_variables(self.event_list, Event, "event") if self.event_list else {}
-        return found | {name: events[name] for name in map("event_{}".format, self._event_fields()) if name in events}
+        """Return the variables of a file, with the quantities of its hot spots or sectors."""
+        return super().variables() | {
+            name: Variable(value, one.dims, one.unit)
+            for name, one in table().items()
+            if one.dims[:1] in (("hot_spot",), ("sector",)) and (value := getattr(self, name)) is not None
+        }
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        plain = self._plain
-        own = {name: value for name, value in self.derived().items() if name not in plain}
-        for name in own.keys() & {"wear", "contact_strength"}:
-            own[name] = json.dumps(own[name])
-        own |= {name: value for name, value in plain.items() if value is not None}
+        own = {name: value for name, value in self.derived().items() if name in _NESTED}
+        own |= {name: value for name, value in self._plain.items() if value is not None}
         return super().attributes() | own | {"provenance": self._made(), "warnings": list(self.warnings)}
 
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Response:
         """Return the response in a file: all but `final` and `contact_work`."""
-        given = cls.given(values, attributes, path)
+        earlier = dict[str, Any]()
+        if "event_corner" in values and "event_loss" not in values:
+            earlier["event_loss"] = np.full(len(values["event_corner"]), np.nan)
+        given = cls.given(earlier | dict(values), attributes, path)
         scene = given["provenance"].pop("scene", None)
         nested = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
         kept = [name for name, one in table().items() if not one.exists(cls.__dataclass_fields__)]
@@ -337,29 +317,13 @@ class Response(Measured, Record, Plotted):
             for name in kept
             if name in attributes
         }
-        of_events = {name.removeprefix("event_"): values[name] for name in values if name.startswith("event_")}
-        columns = zip(*(column.tolist() for column in of_events.values()), strict=True)
-        unknown: dict[str, Any] = (
-            {"loss": np.nan} if "corner" in of_events and "loss" not in of_events else {}
-        )  # of earlier files
         return cls(
             quantities=quantities,
-            event_list=[Event(**dict(zip(of_events, row, strict=True)), **unknown) for row in columns],
-            time=values.get("time", np.zeros(0)), displacement=values.get("displacement", np.zeros(0)),
-            body_displacement=values.get("body_displacement", np.zeros((0, 0))), in_plane=PlanarSamples.of(values),
-            wear=tuple(ContactWear(**one) for one in nested["wear"]) if "wear" in nested else None,
-            contacts=tuple(ContactStrength(**one) for one in nested["contact_strength"])
-            if "contact_strength" in nested else None,
             stress=tuple(SpotStress.of(name, facts, nested.get("strength", {}).get(name, {}))
                          for name, facts in nested["stress"].items()) if "stress" in nested else None,
             sectors=SectorResponse.of(values, nested["sectors"]) if "sectors" in nested else None,
             scene=None if scene is None else validate(Scene, scene, path), **given,
         )  # fmt: skip
-
-    def _event_fields(self) -> list[str]:
-        """Return the names of the fields of events; some apply to planar bodies only."""
-        planar = {"corner", "tangential_impulse", "loss"}
-        return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
 
 
 def units() -> dict[str, str]:

@@ -9,14 +9,14 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.sweep.grid import dimension, dimensions, resonance_axis
+from vanedamp.coupling.sweep.grid import dimensions, resonance_axis
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Record
-from vanedamp.files.store import Variable, frozen
+from vanedamp.files.store import frozen
 
 
 class OverAxes(Record, Plotted):
-    """Base of such records, whose axes are coordinates of the file; axes: dotted path -> values."""
+    """Base of such records; axes: dotted path -> values."""
 
     scene: Scene
     axes: Mapping[str, np.ndarray]
@@ -39,21 +39,6 @@ class OverAxes(Record, Plotted):
     def dimensions(self) -> dict[str, tuple[str, ...]]:
         """Return the dimensions of the grid, and of its curves."""
         return dimensions(self.scene, self.axes)
-
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file."""
-        own = ((dimension(path), self.axes[path], unit) for path, unit in self.units().items())
-        return {dim: Variable(values, (dim,), unit) for dim, values, unit in own} | super().variables()
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a file."""
-        return super().attributes() | {"axes": list(self.axes)}
-
-    @classmethod
-    def given(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-        """Return the fields in a file by name, its axes among them."""
-        axes = {axis: values[dimension(axis)] for axis in attributes["axes"]}
-        return {"axes": of_axes(axes), **super().given(values, attributes, path)}
 
 
 def of_axes(axes: Mapping[str, Any]) -> dict[str, np.ndarray]:

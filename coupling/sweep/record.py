@@ -15,10 +15,12 @@ from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, declared_in, labels, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
+from vanedamp.coupling.scene.units import unit_of
+from vanedamp.coupling.sweep.grid import dimension
 from vanedamp.coupling.sweep.over_axes import OverAxes
 from vanedamp.coupling.sweep.row import TEXTS
 from vanedamp.files.display import html_table
-from vanedamp.files.record import Array, Columns, Own
+from vanedamp.files.record import Array, Columns, Paths
 
 #: amplitudes that earlier files have of bodies without static loads only, which they are then as well
 _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
@@ -27,6 +29,10 @@ PEAKS = tuple(one.name for one in declared_in(linear_peaks))
 
 def _of_points() -> dict[str, Quantity]:
     return {name: one for name, one in table().items() if name not in PEAKS}
+
+
+def _in_json() -> dict[str, Quantity]:
+    return {name: one for name, one in _of_points().items() if "section" not in one.dims}
 
 
 def _peaks() -> dict[str, Quantity]:
@@ -47,12 +53,12 @@ class Sweep(Measured, OverAxes):
     """
 
     KIND: ClassVar[str] = "sweep"
-    IN_JSON = ("status", "classification", "quantities", "peaks")
+    IN_JSON = ("axes", "status", "classification", "quantities", "peaks")
     scene: SceneField
     """of the sweep, with its [sweep] table"""
-    axes: Annotated[Mapping[str, np.ndarray], Own()]
+    axes: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of)]
     """dotted path -> values"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",))]
+    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",), in_json=_in_json)]
     """by name; sections are those of the last evaluated periods"""
     status: Annotated[np.ndarray, Array(("grid",), dtype=object)]
     """"ok", another response.response.Status, or "error: ..." for a run that broke, without quantities"""
@@ -106,25 +112,20 @@ class Sweep(Measured, OverAxes):
         """Return the names along dimensions that have some."""
         return labels_along(self.quantities, self.hot_spots)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data, quantities as nested lists (nan where there is none), without sections."""
-        return {name: values for name, values in super().to_json().items() if name not in self.sections}
-
     def derived(self) -> dict[str, Any]:
-        """Return axes and units by path, and what the user is to know."""
+        """Return units by path and name, and what the user is to know."""
         notes: dict[str, Any] = {"warnings": list(self.warnings)}
         kept = ("estimate", "advice", "moved_starts")
         notes |= {name: self.provenance[name] for name in kept if self.provenance.get(name)}
-        axes = {path: values.tolist() for path, values in self.axes.items()}
         units = {name: table()[name].unit for name in (*self.quantities, *self.peaks)}
-        return {"axes": axes, "units": self.units() | units, "loss": list(labels("loss"))} | notes
+        return {"units": self.units() | units, "loss": list(labels("loss"))} | notes
 
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Sweep:
-        """Return the record in the variables and attributes of a file."""
+        """Return the record in the variables and attributes of a file, which may be an earlier one."""
         earlier = {f"{name}_dynamic": values[name] for name in _ALSO_DYNAMIC}
         earlier[penetration.name] = np.full(np.shape(values["status"]), np.nan)
-        return cls(**cls.given(earlier | dict(values), attributes, path))
+        return super().of(earlier | dict(values), attributes, path)
 
 
 def _text(value: Any) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Sequence
+from dataclasses import is_dataclass
 from enum import Enum
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
@@ -15,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
-from vanedamp.files.record import Array, Record, declared
+from vanedamp.files.record import Array, Named, Record, Rows, Sparse, Unit, Within, declared
 from vanedamp.files.reference import unit_in
 from vanedamp.studies import kinds
 
@@ -64,19 +65,41 @@ class Described(NamedTuple):
 
 
 def described(record: type, names: Sequence[str] = ()) -> list[Described]:
-    """Return the fields of a record: the unit of its annotation, else that at the end of the docstring after it."""
+    """Return the fields of a record: the unit of its annotation, else that at the end of the docstring after it.
+
+    With those of a record within it, and of its rows.
+    """
     texts, found = _texts(record), []
-    layouts = declared(record) if issubclass(record, Record) else {}
+    layouts = declared(record) if is_dataclass(record) else {}
     for one in names or layouts or texts:
-        layout, text = layouts[one][1] if layouts else None, texts.get(one, _EVERYWHERE.get(one, ""))
-        if isinstance(layout, Array) and not layout.attribute:
+        kind, layout = layouts.get(one, (None, None))
+        text = texts.get(one, _EVERYWHERE.get(one, ""))
+        if isinstance(layout, Within):
+            found += described((get_args(kind) or (kind,))[0])
+        elif isinstance(layout, Rows):
+            found += [
+                row._replace(name=f"{layout.dim}_{row.name}", dims=", ".join(filter(None, (layout.dim, row.dims))))
+                for row in described(get_args(kind)[0])
+            ]
+        elif isinstance(layout, Sparse):
+            found += [
+                Described(one, f"{one}_entry", layout.unit, f"entries of the matrix {text}"),
+                Described(f"{one}_column", f"{one}_entry", "", "their columns, from 0"),
+                Described(f"{one}_row_start", "row_edge", "", "places among them where rows begin, and the last ends"),
+            ]
+        elif isinstance(layout, Array) and not layout.attribute:
             parts = ("_real", "_imaginary") if layout.dtype is complex else ("",)
             own = ", ".join((layout.name or one) + part for part in parts)
-            found.append(Described(own, ", ".join(layout.dims), "" if layout.unit == "1" else layout.unit, text))
+            found.append(Described(own, ", ".join(layout.dims), _unit(layout), text))
         else:
-            unit = unit_in(text) or ""
-            found.append(Described(one, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
+            unit = _unit(layout) if isinstance(layout, Array | Unit) else unit_in(text) or ""
+            name = layout.name if isinstance(layout, Named) else one
+            found.append(Described(name, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
     return found
+
+
+def _unit(layout: Array | Unit) -> str:
+    return "" if layout.unit == "1" else layout.unit
 
 
 def _texts(record: type) -> dict[str, str]:

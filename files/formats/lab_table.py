@@ -124,7 +124,7 @@ class LabTable:
         )
 
     def taken(self, needed: Sequence[Sequence[str]], further: Sequence[str] = ()) -> dict[str, Column]:
-        """Return the columns by their roles, of which of each of `needed` one must be there.
+        """Return the columns by their roles, of which of each of `needed` one must be there; a role may be a header.
 
         Raises the table's error for a missing, unknown or doubled column.
         """
@@ -137,14 +137,14 @@ class LabTable:
         known = {*further, *(role for roles in needed for role in roles)}
         found: dict[str, Column] = {}
         for column in self.columns:
-            if column.role not in known:
+            role = column.header if column.header in known else column.role
+            if role not in known:
                 raise self.error(f"{self.path}: unknown column {column.header!r}; expected {expected}")
-            if column.role in found:
+            if role in found:
                 raise self.error(
-                    f"{self.path}: {found[column.role].header!r} and {column.header!r} are both {column.role}; leave "
-                    "one out"
+                    f"{self.path}: {found[role].header!r} and {column.header!r} are both {role}; leave one out"
                 )
-            found[column.role] = column
+            found[role] = column
         for roles in needed:
             if not found.keys() & set(roles):
                 raise self.error(f"{self.path}: no column {_title(roles[0])}; expected {expected}")
@@ -158,8 +158,10 @@ class LabTable:
 
 def _title(role: str) -> str:
     """Return a header that names a role and its SI unit."""
-    ending = _EXAMPLES.get(role, "").lower() if role == "frequency" else _EXAMPLES.get(role, "")
-    return f"{role}_{ending}".replace("/", "_").replace("^", "").rstrip("_")
+    if role not in _EXAMPLES:
+        return role
+    ending = _EXAMPLES[role].lower() if role == "frequency" else _EXAMPLES[role]
+    return f"{role}_{ending}".replace("/", "_").replace("^", "")
 
 
 def lab_table(path: str | os.PathLike[str], error: type[VanedampError]) -> LabTable:

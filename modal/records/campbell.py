@@ -17,15 +17,16 @@ RPM = 30.0 / np.pi
 
 @dataclass(frozen=True)
 class Crossing:
-    """A natural frequency met by an engine order.
-
-    mode: counted from 0; order: periods per revolution; frequency_hz: of both.
-    """
+    """A natural frequency met by an engine order."""
 
     mode: int
+    """counted from 0"""
     order: float
+    """periods per revolution"""
     speed: Annotated[float, Unit("rad/s")]
+    """where they meet"""
     frequency_hz: Annotated[float, Unit("Hz")]
+    """of both"""
 
     @property
     def rpm(self) -> float:
@@ -40,23 +41,23 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Approach:
-    """The closest approach of two tracked modes.
-
-    kind             "veering" or "crossing"
-    first, second    modes: of lower and higher frequency before it
-    frequency_hz     middle of the two
-    gap_hz           their distance; zero at a crossing
-    exchange         MAC of the first one after a veering with the second one before it, the largest over the range: 1
-                     for a full exchange of shapes
-    """
+    """The closest approach of two tracked modes."""
 
     kind: str
+    """"veering" or "crossing\""""
     first: int
+    """mode of lower frequency before it"""
     second: int
+    """mode of higher frequency before it"""
     speed: Annotated[float, Unit("rad/s")]
+    """where they approach"""
     frequency_hz: Annotated[float, Unit("Hz")]
+    """middle of the two"""
     gap_hz: Annotated[float, Unit("Hz")]
+    """their distance; zero at a crossing"""
     exchange: float
+    """MAC of the first one after a veering with the second one before it, the largest over the range: 1 for a full
+    exchange of shapes"""
 
     @property
     def rpm(self) -> float:

@@ -8,51 +8,45 @@ Vargo, Schiffer and Dello (1988), Proceedings of the 17th Turbomachinery Symposi
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.files import store
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import row_variables, rows_of
+from vanedamp.files.record import Array, Named, Record, Rows, Within, empty
 from vanedamp.modal.cyclic import aliased
 from vanedamp.modal.records.campbell import RPM, Crossing
 from vanedamp.modal.records.ring_modes import RingModes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Interference(Plotted):
-    """Modes of a ring, and the engine orders that meet them.
-
-    modes          of the ring, at `speed`, which is in rad/s; None: the ring does not turn
-    orders         engine orders that are considered, whole numbers from 1
-    operating      lowest and highest speed of operation, rad/s; None: not known
-    speeds         (s,) rad/s, ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds
-    over_speed_hz  (m, s) frequencies there; nan where a mode is not among those computed
-    crossings      of the orders and the modes of the diagram
-    """
+class Interference(Record, Plotted):
+    """Modes of a ring, and the engine orders that meet them."""
 
     KIND: ClassVar[str] = RingModes.KIND
-    modes: RingModes
-    orders: tuple[int, ...]
-    speed: float | None = None
-    operating: tuple[float, float] | None = None
-    speeds: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    over_speed_hz: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    crossings: tuple[Crossing, ...] = ()
+    IN_JSON = ("modes",)
+    modes: Annotated[RingModes, Within(("sectors", "diameters", "families", "frequencies_hz", "residuals"))]
+    """of the ring, at `speed`"""
+    orders: Annotated[tuple[int, ...], Array(("engine_order",), dtype=np.int64, name="engine_order")] = ()
+    """engine orders that are considered, whole numbers from 1; without any 1 to N"""
+    speed: Annotated[float | None, Named("at_speed")] = None
+    """of rotation; None: the ring does not turn [rad/s]"""
+    operating: Annotated[tuple[float, float] | None, Array(("edge",), "rad/s", attribute=True)] = None
+    """lowest and highest speed of operation; None: not known"""
+    speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")] = field(default_factory=empty)
+    """ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds"""
+    over_speed_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency_over_speed")] = field(
+        default_factory=empty
+    )
+    """frequencies there; nan where a mode is not among those computed"""
+    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")] = ()
+    """of the orders and the modes of the diagram"""
 
     def __post_init__(self) -> None:
-        for name in ("speeds", "over_speed_hz"):
-            object.__setattr__(self, name, store.frozen(getattr(self, name)))
-
-    @classmethod
-    def of(cls, modes: RingModes, orders: Sequence[int] | None = None, **known: Any) -> Interference:
-        """Return the modes of a ring with engine orders, by default 1 to N; known: further fields."""
-        return cls(modes, tuple(orders or range(1, modes.sectors + 1)), **known)
+        super().__post_init__()
+        object.__setattr__(self, "orders", tuple(self.orders) or tuple(range(1, self.modes.sectors + 1)))
 
     @property
     def diameters(self) -> np.ndarray:
@@ -128,52 +122,17 @@ class Interference(Plotted):
         places = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
         return half * (1.0 - np.abs(places % 2.0 - 1.0)), fold * places
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the result as plain data."""
-        modes = self.modes
+    def derived(self) -> dict[str, Any]:
+        """Return speeds, the diameters that orders excite, and where they meet."""
+        modes, operating = self.modes, self.operating
         return {
-            "sectors": modes.sectors,
-            "diameter": modes.diameters.tolist(),
-            "family": modes.families.tolist(),
-            "frequency_hz": modes.frequencies_hz.tolist(),
-            "residual": modes.residuals.tolist(),
-            "speed": self.speed,
-            "operating": self.operating,
+            "speed": self.speed, "operating": operating,
             "excited": {order: self.excited(order) for order in self.orders},
             "meetings": [
                 asdict(each)
                 | {"diameter": int(modes.diameters[each.mode]), "family": int(modes.families[each.mode])}
-                | {"order": int(each.order), "rpm": each.rpm}
-                | {"margin": self.operating and each.margin(self.operating)}
+                | {"order": int(each.order), "rpm": each.rpm, "margin": operating and each.margin(operating)}
                 for each in self.meetings
             ],
             "campbell": {"rpm": (self.speeds * RPM).tolist(), "frequency_hz": self.over_speed_hz.tolist()},
-        }
-
-    def riding(self) -> tuple[dict[str, store.Variable], dict[str, Any]]:
-        """Return the variables and attributes that ride along in the file of the ring's modes."""
-        variables = {"engine_order": store.Variable(np.array(self.orders, dtype=np.int64), ("engine_order",))}
-        if self.speeds.size:
-            variables |= {
-                "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
-                "frequency_over_speed": store.Variable(self.over_speed_hz, ("mode", "speed"), "Hz"),
-            }
-            variables |= row_variables(self.crossings, Crossing, "crossing")
-        given = {"at_speed": self.speed, "operating": self.operating and list(self.operating)}
-        return variables, {name: value for name, value in given.items() if value is not None}
-
-    @classmethod
-    @store.reader
-    def load(cls, path: str | os.PathLike[str]) -> Interference:
-        """Read the record of a ring's modes. Raises files.store.StoreError."""
-        modes = RingModes.load(path)
-        values, attributes = store.load(path, cls.KIND)
-        return cls.of(
-            modes,
-            values["engine_order"].tolist() if "engine_order" in values else None,
-            speed=attributes.get("at_speed"),
-            operating=tuple(attributes["operating"]) if "operating" in attributes else None,
-            speeds=values.get("speed", np.zeros(0)),
-            over_speed_hz=values.get("frequency_over_speed", np.zeros((0, 0))),
-            crossings=rows_of(values, Crossing, "crossing") if "speed" in values else (),
-        )
+        }  # fmt: skip

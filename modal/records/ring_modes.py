@@ -23,6 +23,7 @@ class RingModes(Record):
 
     KIND: ClassVar[str] = "ring-modes"
     sectors: int
+    """N"""
     axis: Annotated[np.ndarray, Array(("axis",), attribute=True)]
     """unit vector"""
     point: Annotated[np.ndarray, Array(("axis",), "m", attribute=True)]

@@ -18,7 +18,6 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.record import Array, Coded, Record
-from vanedamp.files.store import Variable
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.forced import load_of, place_of
 from vanedamp.rom.ring.ring_model import RingModel
@@ -51,9 +50,9 @@ class Identified(Record):
     """per unit of the responses' load as given, complex; 0 for natural modes [N]"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of the file, with the numbers of the sectors."""
-        return super().variables() | {"sector": Variable(np.arange(len(self.stiffness)), ("sector",))}
+    def labels(self) -> dict[str, Any]:
+        """Return the numbers of the sectors."""
+        return {"sector": np.arange(len(self.stiffness))}
 
     @property
     def deviations(self) -> Deviations:

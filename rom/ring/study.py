@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, cast
 
 import numpy as np
 
-from vanedamp.files import store
 from vanedamp.files.record import Array, Record
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
@@ -62,6 +61,7 @@ class MistuningStudy(Record):
     """Amplification of a ring under engine orders, over draws of its deviations."""
 
     KIND: ClassVar[str] = "mistuning"
+    IN_JSON = ("sectors", "label", "band_hz")
     sectors: int
     """N"""
     label: str
@@ -113,8 +113,8 @@ class MistuningStudy(Record):
         except RingError:
             return None
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the results by order as plain data: largest, mean, quantiles with intervals, and the fit."""
+    def derived(self) -> dict[str, Any]:
+        """Return the results by order: largest, mean, quantiles with intervals, and the fit."""
         rows = []
         for index, order in enumerate(self.orders.tolist()):
             factors, fit = self.amplification[index], self.fit(index)
@@ -135,11 +135,7 @@ class MistuningStudy(Record):
                 ],
                 "weibull": None if fit is None else asdict(fit),
             })  # fmt: skip
-        data = {
-            "sectors": self.sectors, "label": self.label, "seeds": len(self.seeds), "band_hz": self.band_hz.tolist(),
-            "whitehead_bound": self.bound, "orders": rows,
-        }  # fmt: skip
-        return cast("dict[str, Any]", store.finite(data))
+        return {"seeds": len(self.seeds), "whitehead_bound": self.bound, "orders": rows}
 
 
 def amplification(

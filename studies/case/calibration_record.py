@@ -9,13 +9,13 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.record import Array, Record, empty
-from vanedamp.files.store import Variable
 from vanedamp.modal.frf import UNITS
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel
 
 _OfTargets = Annotated[np.ndarray, Array(("target",))]
 _OfParts = Annotated[np.ndarray, Array(("part",))]
-_Responses = Annotated[np.ndarray, Array(("label", "line"), dtype=complex)]
+_QUANTITY = "of its quantity"
+_Responses = Annotated[np.ndarray, Array(("label", "line"), _QUANTITY, complex)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,12 +80,6 @@ class CalibrationRecord(Record):
         """Errors (n,) of the computed frequencies before and after tuning, %."""
         return 100.0 * (self.before_hz / self.target_hz - 1.0), 100.0 * (self.after_hz / self.target_hz - 1.0)
 
-    def variables(self) -> dict[str, Variable]:
-        """Return the variables of the file, with the unit of the measured response."""
-        found = super().variables()
-        measured = [name for name, one in found.items() if one.dims == ("label", "line")]
-        return found | {name: found[name]._replace(units=self.unit) for name in measured}
-
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of the file; cavities if there are some."""
-        return {name: value for name, value in super().attributes().items() if name != "cavity" or value}
+    def unit_in_file(self, declared: str) -> str:
+        """Return the unit of declared fields, of the measured response its own."""
+        return self.unit if declared == _QUANTITY else declared

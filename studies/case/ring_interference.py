@@ -32,17 +32,15 @@ def ring_interference(
     done, and of all, for the Campbell diagram. Raises InputError for an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
-    given = orders or (table.engine_orders if table else ()) or None
-    if given is not None and any(order != int(order) or order < 1 for order in given):
+    given = orders or (table.engine_orders if table else ()) or ()
+    if any(order != int(order) or order < 1 for order in given):
         raise InputError("engine orders: expected whole numbers from 1, since a fraction excites every nodal diameter")
     speed = rotation.omega if rotation is not None else None
     if operating is None and table is not None:
         operating = table.operation
     if operating is None and speed:
         operating = ((1.0 - _ABOUT) * speed, (1.0 + _ABOUT) * speed)
-    found = Interference.of(
-        modes, None if given is None else [int(order) for order in given], speed=speed, operating=operating
-    )
+    found = Interference(modes, tuple(int(order) for order in given), speed, operating)
     if table is None:
         return found
     wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=found.orders)

@@ -63,9 +63,8 @@ def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str
     modes, (mesh, cell_type) = found.modes, structure.mesh()
 
     def save(path: str) -> None:
-        variables, attributes = found.riding()
-        attributes |= {"vtk_cell_type": cell_type, "damping_ratio": structure.matrices.damping_ratio}
-        modes.save(path, mesh | variables, attributes)
+        ratio = structure.matrices.damping_ratio
+        found.save(path, mesh, {"vtk_cell_type": cell_type, "damping_ratio": ratio})
 
     def vtu(path: str) -> None:
         from vanedamp.studies.report.pictures import save_vtk

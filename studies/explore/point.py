@@ -91,6 +91,7 @@ def panel(of: str = "") -> html.Div:
         html.Button("higher ▶", id=f"{name}-higher", type="button", title="next higher point of the curve"),
     ]
     views = [
+        html.Details([html.Summary("All quantities"), html.Dl(id=f"{name}-quantities")]),
         dcc.Graph(id=f"{name}-history", config=GRAPH),
         html.H3("Phase planes"),
         dcc.Graph(id=f"{name}-phase", config=GRAPH),
@@ -155,6 +156,7 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         return key, "running …", value, {"scene": scene, "sweep": sweep}
 
     @app.callback(
+        Output(f"{name}-quantities", "children"),
         Output(f"{name}-history", "figure"),
         Output(f"{name}-phase", "figure"),
         Output(f"{name}-motion", "srcDoc"),
@@ -170,11 +172,12 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
     def look(_: Any, key: Any, frame: dict[str, Any]) -> tuple[Any, ...]:
         view = runs.look(key)
         if isinstance(view, str):
-            return *[no_update] * 5, view, no_update
+            return *[no_update] * 6, view, no_update
         if view.history is None:
-            return *[no_update] * 4, _HIDDEN, view.summary, key
+            return *[no_update] * 5, _HIDDEN, view.summary, key
         shown = frame | {"display": "block" if view.motion else "none"}
-        return view.history, view.phase, view.motion, shown, {}, view.summary, key
+        told = [part for one, text in view.quantities.items() for part in (html.Dt(one), html.Dd(text))]
+        return told, view.history, view.phase, view.motion, shown, {}, view.summary, key
 
     app.clientside_callback(  # an answer that is late is of a run before: the clock goes on until the last run is shown
         ClientsideFunction("explore", "seen"),

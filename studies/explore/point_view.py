@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import plotly.graph_objects as go
@@ -26,12 +27,13 @@ _SAMPLES, _MOST_SAMPLES, _MOST_PERIODS = 200, 1_000_000, 100_000
 
 
 class PointView(NamedTuple):
-    """A run as it is shown: its results in words, two charts, and the document of the motion.
+    """A run as it is shown: its results in words, all its quantities, two charts, and the document of the motion.
 
-    Charts are None, and the document is empty, where there is nothing to show.
+    Charts are None, and the others empty, where there is nothing to show.
     """
 
     summary: str
+    quantities: Mapping[str, str] = MappingProxyType({})
     history: go.Figure | None = None
     phase: go.Figure | None = None
     motion: str = ""
@@ -63,7 +65,8 @@ def view_of(scene: Scene, response: Response) -> PointView:
     if not len(response.time):
         return PointView(f"{_summary(response)}. The run ended within its first period: there is nothing to draw.")
     late = History.of(response, scene).late()
-    return PointView(_summary(response), history_figure(late), phase_figure(response), _motion(scene, late))
+    told = {name: text for name, text in response.lines().items() if name in response.quantities}
+    return PointView(_summary(response), told, history_figure(late), phase_figure(response), _motion(scene, late))
 
 
 def _motion(scene: Scene, late: History) -> str:

@@ -9,11 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from vanedamp.coupling.quantities import amplitude as amplitudes
+from vanedamp.coupling.quantities.quantity import Quantity, declared_in
 from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.measurements import check_phase
 from vanedamp.studies.identification.tables import DecayTable, ForcedTable, ImpactsTable
+from vanedamp.studies.measure import known
 
 #: phase that is in degrees if it is said to be in rad
 _TURNS = 4.0 * np.pi
@@ -24,6 +27,8 @@ Kind = Literal["forced", "decay", "impacts"]
 #: what a history of a decay may be of, and units
 MOTION = ("displacement", "velocity", "acceleration")
 _UNITS = {"amplitude": "m", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+_MEAN, _RMS = amplitudes.amplitude_mean.name, amplitudes.amplitude_rms.name
+_OF_ORDER_1 = amplitudes.amplitude_harmonic.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +74,9 @@ class Measured:
     """A measurement.
 
     name: for people; changes: of the scene as it was made, by paths; at: (n,) frequencies, Hz, or times, s; channels:
-    what was measured there; measure: of a forced response, which amplitude; direction: of a forced response, (n,) "up",
-    "down" or "": from where each frequency was reached; source: how its file was read, in words; levels: numbers of the
-    scene that differ from place to place, (n,) by paths; remarks: what to know before it is used.
+    what was measured there; measure: of a forced response, which quantity (studies.measure); direction: of a forced
+    response, (n,) "up", "down" or "": from where each frequency was reached; source: how its file was read, in words;
+    levels: numbers of the scene that differ from place to place, (n,) by paths; remarks: what to know before use.
     """
 
     kind: Kind
@@ -79,7 +84,7 @@ class Measured:
     changes: Mapping[str, float]
     at: np.ndarray
     channels: tuple[Channel, ...]
-    measure: str = "amplitude_mean"
+    measure: str = _MEAN
     direction: Sequence[str] = field(default_factory=tuple)
     source: str = ""
     levels: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -92,26 +97,34 @@ class Measured:
 
 
 def forced(
-    name: str, frequency: Sequence[float] | np.ndarray, amplitude: Sequence[float] | np.ndarray,
+    name: str, frequency: Sequence[float] | np.ndarray, values: Sequence[float] | np.ndarray,
     changes: Mapping[str, float], table: ForcedTable | None = None, phase: np.ndarray | None = None,
     direction: Sequence[str] = (), noise: float | None = None, measure: str | None = None, source: str = "",
     levels: Mapping[str, np.ndarray] | None = None, remarks: Sequence[str] = (),
 ) -> Measured:  # fmt: skip
-    """Return a forced response: frequencies (n,) Hz, amplitudes (n,) m, phases (n,) rad; noise as in its table.
+    """Return a forced response: frequencies (n,) Hz, values (n,) of what was measured, phases (n,) rad.
 
-    measure: which amplitude (default: the table's, or else amplitude_mean); source, levels, remarks: as of `Measured`.
+    noise: as in its table; measure: what the values are of (default: the table's, or else amplitude_mean), in its unit
+    in results; source, levels, remarks: as of `Measured`. Raises InputError for a measure that is no quantity.
     """
     table = table or ForcedTable("", noise=noise)
-    channels = [_sized("amplitude", "m", amplitude, table.noise, table.deviation)]
+    measure = measure or table.measure or _MEAN
+    of = known(measure, f"forced '{name}': measure")
+    title = "amplitude" if _is_amplitude(of) else measure
+    channels = [_sized(title, of.unit, values, table.noise, table.deviation)]
     if phase is not None:
         deviation = table.phase_deviation or table.noise
         channels.append(Channel("phase", "rad", frozen(phase), "angle", deviation))
     frequencies = frozen(frequency)
     return Measured(
-        "forced", name, dict(changes), frequencies, tuple(channels),
-        measure or table.measure or "amplitude_mean", tuple(direction) or ("",) * len(frequencies), source,
-        levels or {}, remarks,
+        "forced", name, dict(changes), frequencies, tuple(channels), measure,
+        tuple(direction) or ("",) * len(frequencies), source, levels or {}, remarks,
     )  # fmt: skip
+
+
+def _is_amplitude(of: Quantity) -> bool:
+    """Whether a quantity is an amplitude of the displacement, which columns call so."""
+    return of.unit == "m" and of.name in [one.name for one in declared_in(amplitudes)]
 
 
 def decay(
@@ -150,10 +163,19 @@ def _sized(
 def read_forced(table: ForcedTable, folder: Path) -> Measured:
     """Return the forced response in a table's file. Raises InputError."""
     own = _rows(folder / table.file)
-    found = own.taken([("frequency",), ("amplitude", *MOTION)], ("phase", "direction"))
+    roles: tuple[str, ...] = ("amplitude", *MOTION)
+    of = known(table.measure or _MEAN, f"forced '{Path(table.file).stem}': measure")
+    if table.measure is not None and not _is_amplitude(of):
+        roles = (table.measure if of.unit == "1" else f"{table.measure} [{of.unit}]",)
+    found = own.taken([("frequency",), roles], ("phase", "direction"))
     frequency = _positive(own, found["frequency"], "frequency", "Hz")
-    motion = next(column for role, column in found.items() if role in ("amplitude", *MOTION))
-    amplitude, measure, told = _amplitude(own, motion, table.measure, 2 * np.pi * frequency)
+    motion = next(column for role, column in found.items() if role in roles)
+    if motion.header in roles and table.measure is not None:
+        amplitude, measure, told = own.numbers(motion), table.measure, {motion.header: of.name}
+        if table.deviation is None:
+            _check_positive(own, motion, amplitude, "; or give deviation")
+    else:
+        amplitude, measure, told = _amplitude(own, motion, table.measure, 2 * np.pi * frequency)
     direction, phase = [""] * len(frequency), None
     if "phase" in found:
         phase = own.si(found["phase"], "phase")
@@ -192,12 +214,12 @@ def _amplitude(
     """
     quantity = column.unit.quantity if column.unit and column.unit.quantity in MOTION else "displacement"
     values, kind = _positive(table, column, quantity), column.kind or "pk"
-    measure = measure or ("amplitude_rms" if kind == "rms" else "amplitude_mean")
-    sine, where = measure == "amplitude_harmonic", f"{table.path}: {column.header!r}: measure"
+    measure = measure or (_RMS if kind == "rms" else _MEAN)
+    sine, where = measure == _OF_ORDER_1, f"{table.path}: {column.header!r}: measure"
     if quantity != "displacement" and not sine:
-        raise InputError(f'{where}: {quantity} gives the displacement of a sine only; take "amplitude_harmonic"')
-    if (kind == "rms") != (measure == "amplitude_rms") and not (sine and kind == "rms"):
-        raise InputError(f'{where}: "{measure}" is no {kind} value; take "amplitude_harmonic" for that of a sine')
+        raise InputError(f'{where}: {quantity} gives the displacement of a sine only; take "{_OF_ORDER_1}"')
+    if (kind == "rms") != (measure == _RMS) and not (sine and kind == "rms"):
+        raise InputError(f'{where}: "{measure}" is no {kind} value; take "{_OF_ORDER_1}" for that of a sine')
     scale = {"pk-pk": 0.5, "rms": np.sqrt(2.0) if sine else 1.0, "pk": 1.0}[kind]
     text = f"{measure} of {quantity} in {table.unit_of(column, quantity).text}, {kind}"
     return scale * values / omega ** MOTION.index(quantity), measure, {column.header: text}
@@ -248,10 +270,14 @@ def _rows(path: Path) -> LabTable:
 
 def _positive(table: LabTable, column: Column, quantity: str, default: str = "") -> np.ndarray:
     values = table.si(column, quantity, default)
+    _check_positive(table, column, values)
+    return values
+
+
+def _check_positive(table: LabTable, column: Column, values: np.ndarray, hint: str = "") -> None:
     for row, value in enumerate(values.tolist()):
         if value <= 0.0:
-            raise InputError(f"{table.place(row)}: {column.header}: expected a positive number, not {value:g}")
-    return values
+            raise InputError(f"{table.place(row)}: {column.header}: expected a positive number, not {value:g}{hint}")
 
 
 def _rising(table: LabTable, column: Column) -> np.ndarray:

@@ -8,13 +8,15 @@ from functools import partial
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import phase
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Follower, Steady, over_orbit, run
+from vanedamp.studies.identification.steady import Follower, Steady, run
 from vanedamp.studies.identification.study import IdentificationStudy
+from vanedamp.studies.measure import Measure
 
 #: steps of differences over the range of a number: of motions that are exact, and of means of runs
 _EXACT, _MEAN = 1e-5, 2e-2
@@ -28,7 +30,8 @@ class Forced(Model):
 
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         super().__init__(study, measured, count)
-        self._names = (measured.measure, *(["phase"] if len(measured.channels) > 1 else []))
+        names, scene = [measured.measure, phase.name][: len(measured.channels)], study.base.replace(measured.changes)
+        self._measures = [Measure.of_runs(scene, name, "measure") for name in names]
         self.followers = [Follower(study.paths, count) for _ in measured.at]
 
     def quick(self, values: np.ndarray) -> Predicted:
@@ -72,10 +75,10 @@ class Forced(Model):
         """Return derivatives (c, P) of the channels at a place."""
         follower = self.followers[place]
         found, motion = follower.sensitivity(), follower.motion
-        if found is not None:
-            return np.array([found.derivatives[name] for name in self._names])
+        if found is not None and all(one.key in found.derivatives for one in self._measures):
+            return np.array([found.derivatives[one.key] for one in self._measures])
         if motion is None:
-            return np.zeros((len(self._names), len(values)))
+            return np.zeros((len(self._measures), len(values)))
         return self.differences(values, partial(self._beside, place, motion), _EXACT if motion.repeats else _MEAN)
 
     def _rough_slopes(self, values: np.ndarray, place: int) -> np.ndarray:
@@ -97,16 +100,16 @@ class Forced(Model):
         return self.scene(values, levels | {FREQUENCY: float(self.measured.at[place])})
 
     def _figures(self, steady: Steady) -> tuple[np.ndarray, float]:
-        """Return the measured quantities (c,) of a motion, and the relative error of the amplitude."""
-        if steady.orbit is not None and self._names in (("amplitude_mean",), ("amplitude_max",)):
-            return np.array([getattr(steady.orbit, self._names[0])]), 0.0
-        response = steady.response or over_orbit(steady, self.count)
-        figures = np.array([getattr(response, name) for name in self._names])
-        error = 0.0 if steady.repeats else response.amplitude_mean_confidence
-        return figures, (error or 0.0) / _NORMAL / max(response.amplitude_mean, _TINY)
+        """Return the measured quantities (c,) of a motion, and the relative error, taken as that of the amplitude."""
+        self.count["passages"] += steady.orbit is not None
+        figures = np.array([one.value(steady.orbit or steady.response) for one in self._measures])
+        if steady.repeats or steady.response is None:
+            return figures, 0.0
+        error = steady.response.amplitude_mean_confidence or 0.0
+        return figures, error / _NORMAL / max(steady.response.amplitude_mean, _TINY)
 
     def _predicted(self, motions: Sequence[Steady | None]) -> Predicted:
-        nothing = np.full(len(self._names), np.nan), 0.0
+        nothing = np.full(len(self._measures), np.nan), 0.0
         figures, errors = zip(*(nothing if one is None else self._figures(one) for one in motions), strict=True)
         of = dict(zip((channel.name for channel in self.measured.channels), np.transpose(figures), strict=True))
         repeats = [one is not None and not error for one, error in zip(motions, errors, strict=True)]

@@ -13,7 +13,7 @@ from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
-from vanedamp.coupling.scene.scene import Scene, Time
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity
 from vanedamp.coupling.simulation import simulate
@@ -105,11 +105,3 @@ def settled(steady: Steady | None, count: Counter[str]) -> Steady | None:
     count["passages"] += orbit.iterations + 1
     good = orbit.status is OrbitStatus.OK and (orbit.undetermined or orbit.stable)
     return Steady(steady.scene, orbit, None) if good else steady
-
-
-def over_orbit(steady: Steady, count: Counter[str]) -> Response:
-    """Return the response of an orbit, from a run over it."""
-    assert steady.orbit is not None
-    count["passages"] += 1
-    scene = replace(steady.scene, time=Time(periods=steady.orbit.periods, transient=0))
-    return simulate(scene, start=steady.restart)

@@ -20,6 +20,7 @@ from vanedamp.files.toml_input import InputError, plain, read_toml, tables, vali
 from vanedamp.studies.identification.data import Measured, read_decay, read_forced, read_impacts
 from vanedamp.studies.identification.sine_sweep import read_sine_sweep
 from vanedamp.studies.identification.tables import IdentificationFile, Number, SearchTable
+from vanedamp.studies.measure import Measure
 from vanedamp.studies.scene_checks import check_moved, load_scene
 
 #: levels over the measured ones, and frequencies over their range, of which the next measurement is chosen by default
@@ -90,6 +91,8 @@ class IdentificationStudy:
         try:
             scene = self.base.replace(measured.changes)
             check_moved(scene) if measured.kind != "decay" else table_of(scene)
+            if measured.kind == "forced":
+                Measure.of_runs(scene, measured.measure, "measure", single=True)
             ends = (measured.at[0], measured.at[-1]) if measured.kind == "forced" else ()
             for frequency in ends or (scene.frequency,):
                 assemble(scene.replace({FREQUENCY: float(frequency)}))

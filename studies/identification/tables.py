@@ -56,20 +56,22 @@ class MeasuredTable:
     set: dict[str, Real] = Field(default_factory=dict)
     """numbers of the scene as the measurement was made, by their dotted paths [units of the numbers]"""
     noise: Annotated[Real, Field(gt=0, lt=1)] | None = None
-    """standard deviation of an amplitude or a speed, relative (default, without `deviation`: from the residuals) [-]"""
+    """standard deviation of an amplitude, a speed or a quantity, relative (default, without `deviation`: from the
+    residuals) [-]"""
 
 
 @dataclass(frozen=True, config=STRICT)
 class ForcedTable(MeasuredTable):
-    """A forced response: frequency_hz, amplitude_m and, if measured, phase_rad and direction (up or down)."""
+    """A forced response: frequency_hz, amplitude_m (or a quantity of results, by its name and unit there, such as
+    `stress_von_mises.root [Pa]`) and, if measured, phase_rad and direction (up or down)."""
 
-    measure: Literal["amplitude_mean", "amplitude_max", "amplitude_rms", "amplitude_harmonic"] | None = None
-    """which amplitude of a response was measured, by its name there (default: amplitude_rms if the header says rms, or
-    else amplitude_mean)"""
+    measure: str | None = None
+    """which quantity of a response was measured, by its name in results; of one with dimensions which number, such as
+    "stress_von_mises.root" (default: amplitude_rms if the header says rms, or else amplitude_mean)"""
     conjugate: bool = False
     """whether phases are those of exp(-iwt), which rise through a resonance"""
     deviation: Positive | None = None
-    """standard deviation of an amplitude in place of a relative one [m]"""
+    """standard deviation of the amplitude or quantity in place of a relative one [its unit]"""
     phase_deviation: Positive | None = None
     """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
 

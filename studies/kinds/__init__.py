@@ -10,7 +10,7 @@ A kind is a folder named like the attribute `kind` of its HDF5 files (with _ for
 
 and whose `page.py`, which draws, has
 
-    load(path)                read a file; returns a studies.report.results.Result
+    load(path)                read a file; returns a studies.report.results.Result. Without: by `load` of RECORD
     section(results, page)    the data of page.html; results: of the kind, by the path of their file, page: a
                               studies.report.page.Page, which makes the charts
     ORDER                     place on the page

@@ -35,7 +35,7 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     if isinstance(result, Response):
         result = History.of(result, scene)
     if isinstance(result, RingModes):
-        result = Interference.of(result)
+        result = Interference(result)
     kind = getattr(result, "KIND", None)
     if kind not in sections():
         raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import amplitude_mean
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneCheckpoint
 from vanedamp.coupling.scene.scene import Scene
@@ -18,6 +19,7 @@ from vanedamp.coupling.sweep.worker import OF_A_POINT, SweepError
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError, tables
 from vanedamp.studies.life.study import HALVINGS, Contact, LifeStudy
+from vanedamp.studies.measure import Measure
 
 #: statuses of runs that came to their end, whose figures count; those but the first are reported
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
@@ -29,7 +31,7 @@ class Found(NamedTuple):
     """Means over the band at a state.
 
     rate, confidence: (c,) volumes of wear per hour, m^3/h, and half widths of their 95 % confidence intervals.
-    amplitude, spread: (f,) amplitudes over the reference and half widths; nan where a run failed.
+    amplitude, spread: (f,) what counts over the reference and half widths; nan where a run failed.
     reduction, reduction_confidence: of what counts of the band.
     """
 
@@ -41,8 +43,11 @@ class Found(NamedTuple):
     reduction_confidence: float
 
 
-def run_point(scene: Scene, measure: str) -> tuple[np.ndarray, list[Contact]]:
-    """Return the row of a run and its contacts; nan, and none, where it failed: the task of a worker."""
+def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[Contact]]:
+    """Return the row of a run and its contacts; nan, and none, where it failed: the task of a worker.
+
+    The confidence of what counts is taken to be that of the mean amplitude, relative to it.
+    """
     try:
         response = simulate(scene)
     except OF_A_POINT as error:
@@ -54,7 +59,10 @@ def run_point(scene: Scene, measure: str) -> tuple[np.ndarray, list[Contact]]:
         Contact(one.damper, one.side, one.corner, np.nan if one.area is None else one.area, one.share) for one in wear
     ]
     usable = response.status in _USABLE
-    known = [getattr(response, f"{measure}_dynamic"), _or(response.amplitude_mean_confidence, 0.0)]
+    value, confidence = measure.value(response), _or(response.amplitude_mean_confidence, 0.0)
+    if measure.quantity.unit != amplitude_mean.unit:
+        confidence *= value / max(response.amplitude_mean, np.finfo(float).tiny)
+    known = [value, confidence]
     rates = [one.volume_rate for one in wear], [_or(one.volume_rate_confidence, 0.0) for one in wear]
     row = np.array([*known, float(response.status == Status.OK), *rates[0], *rates[1]])
     return np.where(usable, row, np.r_[np.nan, np.nan, 0.0, np.full(2 * len(wear), np.nan)]), contacts
@@ -140,7 +148,7 @@ class Runs(SceneCheckpoint):
         return {"runs": Variable(rows, ("run", "column"))}, {"contacts": contacts}, f"{len(rows)} runs are finished"
 
     def _run(self, points: Sequence[Scene]) -> Any:
-        measures = [self.study.table.measure] * len(points)
+        measures = [self.study.measure] * len(points)
         if self._executor is None:
             return map(run_point, points, measures)
         return _handed_out(self._executor, points, measures)
@@ -180,7 +188,7 @@ def _height(row: np.ndarray) -> float:
     return float(row[_AMPLITUDE]) if np.isfinite(row[_AMPLITUDE]) else -np.inf
 
 
-def _handed_out(executor: Executor, points: Sequence[Scene], measures: Sequence[str]) -> Any:
+def _handed_out(executor: Executor, points: Sequence[Scene], measures: Sequence[Measure]) -> Any:
     try:
         yield from executor.map(run_point, points, measures)
     except BrokenExecutor as error:

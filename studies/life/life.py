@@ -79,7 +79,7 @@ class _Expected:
         end, step = table.hours, 0.0 if table.steps is None else table.hours / table.steps
         if before is not None:
             step = now.time - before.time
-            left = now.found.reduction + now.found.reduction_confidence - table.threshold
+            left = now.found.reduction + now.found.reduction_confidence - self._study.threshold
             falls = (before.found.reduction - now.found.reduction) / step
             if falls > 0.0 and left > 0.0 and now.time + left / falls < end:
                 end = now.time + left / falls
@@ -136,17 +136,17 @@ class _Course:
 
 def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
     """Yield the moments, those between two steps as well where the threshold is passed."""
-    table, before, damped = course.study.table, None, False
+    table, threshold, before, damped = course.study.table, course.study.threshold, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
     start = np.zeros(course.wearing.gap.shape[1])
     with suppress(WornAway):
         for now in integrate(course.rates, start, table.hours, steps):
-            if before is not None and _passes(before, now, table.threshold):
+            if before is not None and _passes(before, now, threshold):
                 yield from _halved(course, before, now)
             yield now
             expected.at(course.asked, before, now, steps)
-            damped = damped or now.found.reduction >= table.threshold
-            if damped and now.found.reduction + now.found.reduction_confidence < table.threshold:
+            damped = damped or now.found.reduction >= threshold
+            if damped and now.found.reduction + now.found.reduction_confidence < threshold:
                 return
             if np.any(course.wearing.lost(now.state) >= 1.0 - _LEFT):
                 return
@@ -179,7 +179,7 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
         volume, band = between(before, after, middle)
         moment = Moment(middle, volume, course.rates(volume), band, after.error)
         found.append(moment)
-        first, last = (first, moment) if _passes(first, moment, table.threshold) else (moment, last)
+        first, last = (first, moment) if _passes(first, moment, course.study.threshold) else (moment, last)
     yield from sorted(found, key=lambda moment: moment.time)
 
 
@@ -208,7 +208,7 @@ def _record(
         "amplitude": np.array([moment.found.amplitude for moment in moments]),
     }  # fmt: skip
     late = np.divide(shift, gap_rate, out=np.zeros_like(shift), where=gap_rate > 0.0).max(axis=1)
-    hours = _hours(values["time"], values["reduction"], values["reduction_band"], late, study.table.threshold)
+    hours = _hours(values["time"], values["reduction"], values["reduction_band"], late, study.threshold)
     last = moments[-1]
     early_end = last.time < study.table.hours * (1.0 - 1e-12) and not hours[0]
     thin = bool(np.any(wearing.lost(last.state) >= 1.0 - _LEFT))
@@ -218,7 +218,7 @@ def _record(
         reference=study.reference, frequency=study.frequencies, contacts=tuple(runs.contacts),
         **{name: frozen(array) for name, array in values.items()},
         hours=hours, runs=runs.asked, trouble=runs.trouble,
-        sentence=sentence_of(hours, study.table, values, starts, worn), starts=starts,
+        sentence=sentence_of(hours, study, values, starts, worn), starts=starts,
         worn_away=None if worn is None else worn[0], provenance=provenance,
     )  # fmt: skip
 

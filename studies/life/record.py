@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.files.record import Array, Record
-from vanedamp.studies.life.study import Contact, Life
+from vanedamp.studies.life.study import Contact, LifeStudy
 from vanedamp.studies.worst_start import worst_words
 
 _Moments = Annotated[np.ndarray, Array(("time",))]
@@ -24,7 +24,7 @@ class LifeRecord(Record):
     study: Mapping[str, Any]
     """the [life] table and the scene, as plain data"""
     reference: float
-    """amplitude without bodies in the band: its maximum, or its mean [m]"""
+    """amplitude without bodies in the band: its maximum, or its mean [m]; or the limit of what counts, in its unit"""
     contacts: tuple[Contact, ...]
     """that wear: body, side and corner, area of the patch, share of the cavity"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
@@ -99,7 +99,7 @@ class LifeRecord(Record):
 
 
 def sentence_of(
-    hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray],
+    hours: tuple[float | None, float | None, float | None], study: LifeStudy, values: Mapping[str, np.ndarray],
     starts: Mapping[str, Any], worn: tuple[float, int] | None = None,
 ) -> str:  # fmt: skip
     """Return how long the damper damps, in words: at rest at first, and what is left from the worst start.
@@ -109,31 +109,32 @@ def sentence_of(
     worst = [f"{word}, {worst_words(starts[name])}" for name, word in (("new", "as new"), ("end", "at the end"))]
     if starts["new"]["starts"] == 1:
         worst = [worst_words(starts["new"])]
-    return "; ".join([_hours_of(hours, table, values, worn), *worst])
+    return "; ".join([_hours_of(hours, study, values, worn), *worst])
 
 
 def _hours_of(
-    hours: tuple[float | None, float | None, float | None], table: Life, values: Mapping[str, np.ndarray],
+    hours: tuple[float | None, float | None, float | None], study: LifeStudy, values: Mapping[str, np.ndarray],
     worn: tuple[float, int] | None,
 ) -> str:  # fmt: skip
     """Return how long the damper damps, by runs that begin as the scene."""
-    lost, early, late = hours
-    reduction, first, last = f"{table.threshold:.0%}", values["reduction"][0], values["reduction"][-1]
+    (lost, early, late), table, quantity = hours, study.table, study.measure.quantity
+    first, last = values["reduction"][0], values["reduction"][-1]
+    least = f"{study.threshold:.0%}"
+    keeps, keep, left = "Damps", f"damp by {least}", "reduction"
+    if table.limit is not None:
+        limit = f"{table.measure} below {table.limit:g} {quantity.unit}".removesuffix(" 1")
+        keeps, keep, left, least = f"Keeps {limit}", f"keep {limit}", "margin", "0"
     if worn is not None:
-        doubt = "" if lost is None else f", and does not damp by {reduction} before"
+        doubt = "" if lost is None else f", and does not {keep} before"
         return (
-            f"Body {worn[1]} is worn away after {worn[0]:.0f} h{doubt}: the reduction is {first:.0%} as new and "
+            f"Body {worn[1]} is worn away after {worn[0]:.0f} h{doubt}: the {left} is {first:.0%} as new and "
             f"{last:.0%} at the end"
         )
     if lost == 0.0:
-        return (
-            f"Does not damp by {reduction} at any time in {table.hours:g} h: {first:.0%} as new, {last:.0%} at the end"
-        )
+        return f"Does not {keep} at any time in {table.hours:g} h: {left} {first:.0%} as new, {last:.0%} at the end"
     if lost is None:
         doubt = "" if early is None else f", from {early:.0f} h on without certainty"
-        return f"Damps for all {table.hours:g} h{doubt}: the reduction is {first:.0%} as new and {last:.0%} at the end"
+        return f"{keeps} for all {table.hours:g} h{doubt}: the {left} is {first:.0%} as new and {last:.0%} at the end"
     until = f"more than {values['time'][-1]:.0f}" if late is None else f"{late:.0f}"
-    begin = "" if first >= table.threshold else f" once worn in (as new {first:.0%})"
-    return (
-        f"Damps for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the reduction falls below {reduction}"
-    )
+    begin = "" if first >= study.threshold else f" once worn in (as new {first:.0%})"
+    return f"{keeps} for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the {left} falls below {least}"

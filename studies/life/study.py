@@ -13,6 +13,12 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.quantities.amplitude import (
+    amplitude_max,
+    amplitude_max_dynamic,
+    amplitude_mean,
+    amplitude_mean_dynamic,
+)
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
 from vanedamp.coupling.scene.paths import Range
@@ -24,12 +30,15 @@ from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplitude, scene_in
+from vanedamp.studies.measure import Measure
 from vanedamp.studies.worst_start import STARTS
 
 #: about how often a life is evaluated over its band
 _EVALUATIONS = 20
 #: how often the spacing of a band is halved about its worst point
 HALVINGS = 3
+#: what counts of a run without a limit, by the quantity that it is
+_AMPLITUDES = {amplitude_mean.name: amplitude_mean_dynamic.name, amplitude_max.name: amplitude_max_dynamic.name}
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
 
@@ -44,9 +53,12 @@ class Life(Band):
     """time spent at the points of the band: "uniform"; "peak", all at the one with the largest amplitude; or a list of
     weights [-]"""
     threshold: _Ratio = 0.5
-    """reduction of the amplitude without bodies below which the damper is lost [-]"""
-    measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
-    """amplitude of a run that counts: mean of the peaks of its periods, or largest; without static deflection"""
+    """reduction of the amplitude without bodies below which the damper is lost; not with `limit` [-]"""
+    measure: str = amplitude_mean.name
+    """what counts of a run: "amplitude_mean", mean of the peaks of its periods, or "amplitude_max", largest, without
+    static deflection; with `limit` any quantity of results, such as "stress_von_mises", of several the largest"""
+    limit: Positive | None = None
+    """value of the measure above which the damper is lost, in its unit in results; reductions are relative to it"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     tolerance: _Ratio = 0.02
@@ -58,6 +70,8 @@ class Life(Band):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.limit is None and self.measure not in _AMPLITUDES:
+            raise ValueError(f"limit: missing; {self.measure} needs one, {' and '.join(_AMPLITUDES)} do not")
         if not isinstance(self.dwell, str):
             if len(self.dwell) != self.count:
                 raise ValueError(f"dwell: {len(self.dwell)} weights for {self.count} points of the band; give as many")
@@ -92,13 +106,14 @@ class Contact(NamedTuple):
 class LifeStudy(NamedTuple):
     """A scene, its [life] table, and what its curves refer to.
 
-    frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m.
+    frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m, or the limit of what counts.
     """
 
     scene: Scene
     table: Life
     frequencies: np.ndarray
     reference: float
+    measure: Measure
 
     @classmethod
     def load(cls, path: str | Path) -> LifeStudy:
@@ -113,12 +128,19 @@ class LifeStudy(NamedTuple):
             scene, band = placed(scene_in(file), file.life)
             _check(scene)
             assemble(scene)
-            reference = reference_amplitude(scene, band, file.life.over_band)
+            reference = file.life.limit or reference_amplitude(scene, band, file.life.over_band)
+            named = file.life.measure if file.life.limit else _AMPLITUDES[file.life.measure]
+            measure = Measure.of_runs(scene, named, "life.measure")
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         if reference == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        return cls(scene, file.life, frozen(band), reference)
+        return cls(scene, file.life, frozen(band), reference, measure)
+
+    @property
+    def threshold(self) -> float:
+        """Reduction below which the damper is lost."""
+        return 0.0 if self.table.limit else self.table.threshold
 
     @property
     def starts(self) -> int:

@@ -27,7 +27,7 @@ from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.motion_page import environment
-from vanedamp.studies.report.results import Results, Section, sections
+from vanedamp.studies.report.results import Results, Section, format_setting, sections
 from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
@@ -218,11 +218,6 @@ def _flat(data: Any, path: str = "") -> dict[str, str]:
     else:
         return {path: format_setting(data)}
     return {key: text for name, value in items for key, text in _flat(value, name).items()}
-
-
-def format_setting(value: Any) -> str:
-    """Return a value as text, floats in eight digits."""
-    return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
 def body_note(notes: Mapping[str, Any], scene: Scene | None) -> str | None:

@@ -1,10 +1,12 @@
-"""Results in files, the parts of a report. Each kind is read by its section (studies.kinds)."""
+"""Results in files, the parts of a report. Each kind is read by its section, or its record (studies.kinds)."""
 
 from __future__ import annotations
 
 import contextlib
+import pkgutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -42,10 +44,11 @@ class Result:
 
 
 class Section(Protocol):
-    """The contract of a section; studies.kinds says more."""
+    """The contract of a section; studies.kinds says more. Ours leave KIND, and most of them `load`, to their kind."""
 
     KIND: str
     __file__: str
+    __package__: str
 
     def load(self, path: Path) -> Result:
         """Read a file of the kind. Raises StoreError or InputError."""
@@ -91,10 +94,11 @@ def sections() -> dict[str, Section]:
     """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
     known: dict[str, Section] = {}
     for section in SECTIONS.all().values():
-        if section.KIND in known:
-            files = f"{known[section.KIND].__file__} and {section.__file__}"
-            raise ExtensionError(f"two sections of the report show results of the kind {section.KIND}: {files}")
-        known[section.KIND] = section
+        kind = getattr(section, "KIND", None) or _folder(section).NAME
+        if kind in known:
+            files = f"{known[kind].__file__} and {section.__file__}"
+            raise ExtensionError(f"two sections of the report show results of the kind {kind}: {files}")
+        known[kind] = section
     return known
 
 
@@ -124,12 +128,39 @@ def collect(paths: Sequence[str | Path]) -> Results:
             kind = _kind(file, known)
             if kind in known:
                 with contextlib.nullcontext() if kind in _endings(known) else decoding(file):
-                    results.kinds[kind][str(file)] = known[kind].load(file)
+                    results.kinds[kind][str(file)] = _loaded(known[kind], file)
             elif not path.is_dir():
                 raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
     if not results.files:
         raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(known)})")
     return results
+
+
+def _loaded(section: Section, path: Path) -> Result:
+    if hasattr(section, "load"):
+        return section.load(path)
+    record = pkgutil.resolve_name(_folder(section).RECORD).load(path)
+    return Result.of(record, _scene(record))
+
+
+def _folder(section: Section) -> Any:
+    """Return the kind of a section of ours (studies.kinds)."""
+    return import_module(section.__package__)
+
+
+def _scene(record: Any) -> dict[str, Any] | None:
+    """Return the scene of a record as data, with its axes in short; None: it has none."""
+    scene, axes = getattr(record, "scene", None), getattr(record, "axes", {})
+    short = {
+        path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
+        for path, values in axes.items()
+    }
+    return None if scene is None else scene.to_dict() | ({"sweep": short} if axes else {})
+
+
+def format_setting(value: Any) -> str:
+    """Return a value as text, floats in eight digits."""
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
 def _endings(kinds: Iterable[str]) -> list[str]:

@@ -75,6 +75,10 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path, browser):
         names = page.locator("#point-history .legendtext").all_text_contents()
         assert {"structure", "body 1 in its cavity"} <= set(names)
         assert page.locator("#point-phase .xaxislayer-above").count() == 2
+        page.get_by_text("All quantities").click()
+        told = page.locator("#point-quantities")
+        assert {"amplitude_rms", "phase", "energy_share"} <= {*told.locator("dt").all_text_contents()}
+        assert told.locator("dd").all_text_contents()[0].endswith(" m")
         frame = page.frame_locator("#point-motion")
         playwright.expect(frame.locator("polygon.body")).to_be_visible()
 

@@ -143,7 +143,7 @@ def test_checkpoints_and_records_of_others(said, folder):
 def test_results_are_read_without_finite_elements(folder, tmp_path):
     one, none = np.ones(1), np.zeros(1, dtype=int)
     ring = vd.RingModes(3, np.array([1.0, 0, 0]), np.zeros(3), none, none, one, one, np.ones((1, 3)))
-    ring.save(tmp_path / "ring.h5", *vd.Interference.of(ring).riding())
+    vd.Interference(ring).save(tmp_path / "ring.h5")
     files = [tmp_path / "ring.h5", *(folder / f"{command}.h5" for command in RESULTS)]
     code = """
 import contextlib, sys

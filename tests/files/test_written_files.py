@@ -40,6 +40,7 @@ OF_COMMANDS = {
     "sweep": {"designs", "headlines"},
 }  # fmt: skip
 IN_FILES = {
+    "ring-modes": {"cell", "coordinates", "damping_ratio", "vtk_cell_type"},
     "modes": {
         "axis", "cell", "coordinates", "damping_ratio", "effective_mass", "fatigue", "first_bending", "movable_mass",
         "rigid", "stress_error", "stress_per_amplitude", "stress_place", "stress_singular", "versions", "volume",

@@ -11,7 +11,7 @@ from vanedamp.modal.records.interference import Interference
 @pytest.mark.parametrize("sectors", [8, 9])
 def test_an_order_excites_the_wave_that_it_is_at_the_sectors(sectors):
     """Sampled at N sectors, cos(r j alpha) has no part in any cosine or sine but those of one diameter."""
-    found = Interference.of(plate_waves(sectors), range(1, 3 * sectors + 1))
+    found = Interference(plate_waves(sectors), range(1, 3 * sectors + 1))
     angles = 2 * np.pi * np.arange(sectors) / sectors
     for order in found.orders:
         load = np.exp(1j * order * angles)
@@ -24,7 +24,7 @@ def test_an_order_excites_the_wave_that_it_is_at_the_sectors(sectors):
 @pytest.mark.parametrize("sectors", [8, 9])
 def test_orders_lie_on_the_folded_line(sectors):
     """Order r at r speed / (2 pi): on the line through the corners, at the diameter that it excites."""
-    found = Interference.of(plate_waves(sectors), range(1, 40))
+    found = Interference(plate_waves(sectors), range(1, 40))
     speed = 150.0
     corners, heights = found.zigzag(speed)
     assert heights[-1] == pytest.approx(found.top) and set(corners[:-1]) == {0.0, sectors / 2}
@@ -37,7 +37,7 @@ def test_orders_lie_on_the_folded_line(sectors):
 def test_meetings_at_constant_frequencies():
     """Speed = 2 pi f / r, of all orders and modes within the range of operation."""
     modes = plate_waves(8)
-    found = Interference.of(modes, operating=(100.0, 400.0))
+    found = Interference(modes, operating=(100.0, 400.0))
     expected = sorted(
         2 * np.pi * f / r
         for h, f in zip(modes.diameters, modes.frequencies_hz, strict=True) for r in range(1, 9)
@@ -46,13 +46,13 @@ def test_meetings_at_constant_frequencies():
     assert len(expected) > 5
     assert [each.speed for each in found.meetings] == pytest.approx(expected, rel=1e-12)
     assert found.in_operation == found.meetings
-    assert Interference.of(modes).meetings == ()
+    assert Interference(modes).meetings == ()
 
 
 def test_meetings_of_a_campbell_diagram():
     """Its crossings, of which those within the range of operation are in operation."""
     crossings = tuple(Crossing(mode, 2.0, speed, speed / np.pi) for mode, speed in ((2, 100.0), (3, 250.0), (2, 400.0)))
-    found = Interference.of(plate_waves(8), operating=(200.0, 300.0), speeds=[0.0, 500.0],
+    found = Interference(plate_waves(8), operating=(200.0, 300.0), speeds=[0.0, 500.0],
                             over_speed_hz=np.ones((10, 2)), crossings=crossings)  # fmt: skip
     assert found.meetings == crossings and found.in_operation == crossings[1:2]
 
@@ -64,7 +64,7 @@ def test_waves_that_turn_apart_are_met_by_their_own_orders():
     rows = np.r_[0:5, 1:4]
     split = type(modes)(8, modes.axis, modes.point, signed, np.zeros(8, int), modes.frequencies_hz[rows],
                         np.zeros(8), modes.shapes[rows])  # fmt: skip
-    found = Interference.of(split)
+    found = Interference(split)
     assert [found.excited(order) for order in range(1, 9)] == [1, 2, 3, 4, -3, -2, -1, 0]
     assert found.name(1) == "diameter 1 backward, family 1" and found.name(5) == "diameter 1 forward, family 1"
     assert found.exciting(-2) == [6]
@@ -72,10 +72,10 @@ def test_waves_that_turn_apart_are_met_by_their_own_orders():
 
 def test_file_keeps_it(tmp_path):
     modes = plate_waves(8)
-    given = Interference.of(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
+    given = Interference(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
                             over_speed_hz=np.ones((10, 2)), crossings=(Crossing(2, 3.0, 60.0, 28.6),))  # fmt: skip
-    modes.save(tmp_path / "ring.h5", *given.riding())
+    given.save(tmp_path / "ring.h5")
     found = Interference.load(tmp_path / "ring.h5")
     assert found.to_json() == given.to_json() and found.orders == (3, 5)
     modes.save(tmp_path / "bare.h5")
-    assert Interference.load(tmp_path / "bare.h5").to_json() == Interference.of(modes).to_json()
+    assert Interference.load(tmp_path / "bare.h5").to_json() == Interference(modes).to_json()

@@ -1,7 +1,8 @@
 """The energy balance of a segment, its harmonics, peak and tilts, and the motion within it.
 
-All but tilts is in closed form. Forms of the amplitudes have what the modes contribute (energy_forms); bodies also have
-a linear speed, speed + drift t, whose products with modes are integrated here.
+All is in closed form, but for extremes of tilts, which are sought as peaks are (engine.peaks). Forms of the amplitudes
+have what the modes contribute (energy_forms); bodies also have a linear speed, speed + drift t, whose products with
+modes are integrated here.
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ from vanedamp.coupling.engine.energy_forms import (
     slow_product,
     turning_back,
 )
+from vanedamp.coupling.engine.peaks import may_exceed
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, OPEN, PERIOD, SINGLE
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
-from vanedamp.coupling.response.recorder import cubic_extremum
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant, is_slip, row_speed
 
-#: pieces of a period on which a tilt is interpolated
-_PIECES = 16
+#: pieces of a period in which a tilt has one extremum at most, and most pieces of a segment where modes are faster
+_PIECES, _MOST_PIECES = 16, 4096
+#: most steps to an extremum of a tilt, and its error, relative, at which they end
+_STEPS, _CLOSE = 40, 1e-15
 
 
 @inlined
@@ -185,15 +188,54 @@ def _note_tilt(system, rec, period, b, tilt):
 
 @kernel
 def _note_rocking(system, flows, st, rec, scratch, b, tau, q, v):
-    """Note the largest tilt within a segment in which its rate is not constant, by cubics on pieces of a period."""
-    period, pieces = st.counters[PERIOD], math.ceil(_PIECES * tau / system.period)
+    """Note the largest tilt within a segment in which its rate is not constant; q and v end as at its end."""
+    period, pieces = st.counters[PERIOD], _pieces(system, flows, st, b, tau)
     h, x0, rate0 = tau / pieces, _tilt(system, b, st.q), _tilt(system, b, st.v)
     for piece in range(pieces):
-        move(system, flows, st, scratch, tau if piece == pieces - 1 else h * (piece + 1), q, v)
+        end = tau if piece == pieces - 1 else h * (piece + 1)
+        move(system, flows, st, scratch, end, q, v)
         x1, rate1 = _tilt(system, b, q), _tilt(system, b, v)
         _note_tilt(system, rec, period, b, x1)
-        _note_tilt(system, rec, period, b, cubic_extremum(h, x0, x1, rate0, rate1))
+        if rate0 * rate1 < 0.0 and may_exceed(0.99 * rec.tilt[period, b], 0.0, x0, rate0, x1, rate1, h, 0.0):
+            _note_extremum(system, flows, st, rec, scratch, b, h * piece, rate0, end, rate1, q, v)
+            move(system, flows, st, scratch, end, q, v)
         x0, rate0 = x1, rate1
+
+
+@kernel
+def _pieces(system, flows, st, b, tau):
+    """Return the pieces of a segment on which a tilt is all but a cubic, as in engine.peaks.highest."""
+    s, size, fourth = st.counters[FLOW], 0.0, 0.0
+    for j in range(st.counters[ACTIVE]):
+        rate, row = flows.eigenvalue[s, j], flows.motion[s, system.tilt[b], j]
+        for i in range(len(st.q)):
+            row -= system.turn[b, i] * flows.motion[s, i, j]
+        part, square = abs(row * st.amplitude[j]), rate.real * rate.real + rate.imag * rate.imag
+        size += part
+        fourth += part * (square * square)
+    fine = tau * math.sqrt(math.sqrt(fourth / (0.384 * size))) if size > 0.0 else 0.0
+    return max(math.ceil(_PIECES * tau / system.period), min(math.ceil(fine), _MOST_PIECES), 1)
+
+
+@kernel
+def _note_extremum(system, flows, st, rec, scratch, b, lo, low_rate, hi, high_rate, q, v):
+    """Note the extremum of a tilt between two times with rates of opposite sign, by the rule of Illinois."""
+    slope, kept = abs(high_rate - low_rate) / (hi - lo), 0
+    for _ in range(_STEPS):
+        t = lo + (hi - lo) * (low_rate / (low_rate - high_rate))
+        move(system, flows, st, scratch, t, q, v)
+        x, rate = _tilt(system, b, q), _tilt(system, b, v)
+        _note_tilt(system, rec, st.counters[PERIOD], b, x)
+        if rate * rate <= _CLOSE * slope * abs(x) or not lo < t < hi:
+            break
+        if rate * high_rate > 0.0:
+            hi, high_rate = t, rate
+            low_rate *= 0.5 if kept > 0 else 1.0
+            kept = 1
+        else:
+            lo, low_rate = t, rate
+            high_rate *= 0.5 if kept < 0 else 1.0
+            kept = -1
 
 
 @inlined

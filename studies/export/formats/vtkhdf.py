@@ -150,7 +150,7 @@ def modes_of(record: Record) -> ModesOnMesh:
     if record.kind == "ring-modes":
         waves = record.source if isinstance(record.source, RingModes) else RingModes.load(record.source)
         ring = whole_ring(waves, mesh.points, mesh.cells)
-        names = [Interference.of(waves).name(mode) for mode in range(len(waves))]
+        names = [Interference(waves).name(mode) for mode in range(len(waves))]
         on = Mesh(ring.points, ring.cells, mesh.cell_type)
         return ModesOnMesh(on, waves.frequencies_hz, names, lambda mode: ring.shape(waves, mode))
     if "gyroscopic_frequency" in record.variables:

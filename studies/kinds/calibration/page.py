@@ -13,13 +13,11 @@ from plotly.subplots import make_subplots
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.case.calibration_record import CalibrationRecord
 from vanedamp.studies.hot_spots import level_warnings
-from vanedamp.studies.kinds.calibration import NAME
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 20
-KIND = NAME
 _BEFORE, _AFTER, _MEASURED = "#64748b", COLOURS[0], COLOURS[1]
 _STEM = "#cbd5e1"
 #: names of the columns of `_frequency_rows`

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,22 +10,14 @@ import plotly.graph_objects as go
 
 from vanedamp.modal.records.campbell import RPM, Campbell
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.kinds.campbell import NAME
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 40
-KIND = NAME
 _ORDER, _MARK = "#64748b", "#111827"
 #: of modes beyond the colours
 _DASHES = ("solid", "dot", "dashdot")
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp campbell` wrote."""
-    diagram = Campbell.load(path)
-    return Result(diagram, diagram.provenance)
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import plotly.graph_objects as go
 
 from vanedamp.rom.ring.identification import Identified
-from vanedamp.studies.kinds.deviations import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 58
-KIND = NAME
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp identify` wrote of a ring."""
-    return Result.of(Identified.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

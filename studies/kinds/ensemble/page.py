@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from vanedamp.coupling.ensembles.design import INDICES, QUANTILES
 from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.studies.kinds.ensemble import NAME
 from vanedamp.studies.kinds.ensemble.charts import (
     along,
     bands_figure,
@@ -26,17 +24,9 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 52
-KIND = NAME
 figure = ensemble_figure
 #: curves of a file that are drawn
 _MOST = 6
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp run` or `sweep` wrote of a scene with ranges."""
-    record = Ensemble.load(path)
-    axes = {path: f"{len(values)} values" for path, values in record.axes.items()}
-    return Result.of(record, record.scene.to_dict() | {"sweep": axes})
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

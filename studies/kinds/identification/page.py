@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ import plotly.graph_objects as go
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.identification.record import Identification
 from vanedamp.studies.identification.summary import proposal_text
-from vanedamp.studies.kinds.identification import NAME
 from vanedamp.studies.kinds.identification.charts import (
     correlation_figure,
     data_figure,
@@ -26,7 +24,6 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 57
-KIND = NAME
 figure = data_figure
 #: panels side by side, height of a row of them, and of what is around them
 _COLUMNS, _HEIGHT, _LEGEND = 3, 320, 120
@@ -36,12 +33,6 @@ _PROFILES = (
 )
 _CORRELATIONS = "Correlations of the numbers."
 _NEXT = "The next measurement: what each would leave of the largest uncertainty."
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp identify` wrote."""
-    record = Identification.load(path)
-    return Result(record, dict(record.provenance), record.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -16,8 +16,10 @@ def life_figure(record: LifeRecord) -> go.Figure:
     """Draw reduction, free travel and depth of wear over hours, with their 95 % bands."""
     scene, table = record.study["scene"], record.study["life"]
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    _curve(figure, 1, record.time, 100 * record.reduction, 100 * record.reduction_band, "reduction", 0)
-    figure.add_hline(y=100 * table["threshold"], line={"dash": "dot", "color": "#64748b"}, row=1, col=1)
+    limited = table.get("limit") is not None
+    left, least = (f"margin of {table['measure']}", 0.0) if limited else ("reduction", table["threshold"])
+    _curve(figure, 1, record.time, 100 * record.reduction, 100 * record.reduction_band, left, 0)
+    figure.add_hline(y=100 * least, line={"dash": "dot", "color": "#64748b"}, row=1, col=1)
     for place, cavity in enumerate(scene["cavity"]):
         gap, band = 1e6 * record.gap[:, place], 1e6 * record.gap_band[:, place]
         _curve(figure, 2, record.time, gap, band, f"gap of {cavity['name']}", 1 + place)
@@ -25,7 +27,7 @@ def life_figure(record: LifeRecord) -> go.Figure:
         band = np.linalg.norm(record.depth_band[:, places], axis=1) + record.depth_error[:, places].sum(axis=1)
         depth = record.depth[:, places].mean(axis=1)
         _curve(figure, 3, record.time, 1e6 * depth, 1e6 * band / len(places), name, 2 + number)
-    for row, title in enumerate(("reduction, %", "gap, µm", "depth of wear, µm"), 1):
+    for row, title in enumerate((f"{left}, %", "gap, µm", "depth of wear, µm"), 1):
         figure.update_yaxes(title_text=title, rangemode="tozero", row=row, col=1)
     figure.update_xaxes(title_text="hours", row=3, col=1)
     for hours, dash in zip(record.hours, ("solid", "dash", "dash"), strict=True):

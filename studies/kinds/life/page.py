@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vanedamp.studies.kinds.life import NAME
 from vanedamp.studies.kinds.life.charts import life_figure
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.charts import dressed
@@ -17,13 +15,7 @@ from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength_charts import wear_figure
 
 ORDER = 57
-KIND = NAME
 figure = life_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp life` wrote."""
-    return Result.of(LifeRecord.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vanedamp.rom.ring.study import MistuningStudy
-from vanedamp.studies.kinds.mistuning import NAME
 from vanedamp.studies.kinds.mistuning.charts import (
     amplification_figure,
     amplification_table,
@@ -20,14 +18,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 16
-KIND = NAME
 figure = amplification_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ring --mistuning` wrote."""
-    study = MistuningStudy.load(path)
-    return Result(study, study.provenance)
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -21,12 +21,11 @@ from vanedamp.studies.report.pictures import mode_picture
 from vanedamp.studies.report.results import Result
 
 ORDER = 10
-KIND = NAME
 
 
 def load(path: Path) -> Result:
     """Read what `vanedamp modal` wrote."""
-    values, attributes = load_record(path, KIND)
+    values, attributes = load_record(path, NAME)
     provenance = {
         "matrices": json.loads(attributes["provenance"]), "versions": json.loads(attributes.get("versions", "{}"))
     }  # fmt: skip

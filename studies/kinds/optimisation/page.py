@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from vanedamp.studies.kinds.optimisation import NAME
 from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.charts import dressed
@@ -14,13 +12,7 @@ from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 55
-KIND = NAME
 figure = optimisation_figure
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp optimise` wrote."""
-    return Result.of(Optimisation.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -6,7 +6,6 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -20,7 +19,6 @@ from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
-from vanedamp.studies.kinds.orbits import NAME
 from vanedamp.studies.kinds.orbits.borders import borders_figure, borders_table, maps_of
 from vanedamp.studies.kinds.orbits.motions import orbits_figure, orbits_table
 from vanedamp.studies.report.charts import Table, axis_title, dressed
@@ -30,7 +28,6 @@ from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sweep_beside import sweeps_beside, system_of
 
 ORDER = 80
-KIND = NAME
 #: orbits of a file that are drawn
 _MOST_ORBITS = 6
 _BIFURCATIONS = ("fold", "pitchfork", "period doubling", "neimark-sacker")
@@ -46,12 +43,6 @@ _SYMBOLS = {
 _POINT = "#9ca3af"  # of a sweep
 #: modulus as which smaller ones are drawn
 _SMALLEST = 1e-3
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp orbits` wrote."""
-    branches = Branches.load(path)
-    return Result.of(branches, branches.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -15,7 +14,6 @@ from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
-from vanedamp.studies.kinds.ramp import NAME
 from vanedamp.studies.report.charts import COLOURS, Chart, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
@@ -23,19 +21,12 @@ from vanedamp.studies.report.strength import course_chart
 from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 70
-KIND = NAME
 _STATIONARY = "#0f172a"
 #: points of a curve that are drawn; of more periods, the largest of equally many each
 _MOST_POINTS = 2000
 #: rates of Lewis' curve, and how far it extends beyond the runs'
 _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ramp` wrote."""
-    ramp = Ramp.load(path)
-    return Result.of(ramp, ramp.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,19 +12,12 @@ from vanedamp.rom.error_estimate import frequency_grid
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.hot_spots import spot_lines, spot_warnings
-from vanedamp.studies.kinds.reduced_model import NAME
 from vanedamp.studies.report.charts import COLOURS, Chart
 from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 30
-KIND = NAME
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp reduce` or `vanedamp import` wrote."""
-    return Result.of(ReducedModel.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -14,7 +14,6 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.response.response import Response
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import without_round_off
-from vanedamp.studies.kinds.response import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
@@ -24,7 +23,6 @@ from vanedamp.studies.report.strength import contacts_shown, spots_shown
 from vanedamp.studies.report.time_history import History, history_figure
 
 ORDER = 60
-KIND = NAME
 HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import zip_longest
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,12 @@ from plotly.subplots import make_subplots
 from scipy.ndimage import median_filter
 
 from vanedamp.coupling.transients.ring_down_record import RingDown
-from vanedamp.studies.kinds.ring_down import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength import course_chart
 
 ORDER = 75
-KIND = NAME
 #: how the free motion begins
 _BEGUN = {
     "steady": "after a steady excitation of {frequency:.6g} Hz has ceased",
@@ -36,12 +33,6 @@ HEADER = [
     "time_s", "amplitude_m", "frequency_hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
     "damping_ratio_energy", "energy_loss_j",
 ]  # fmt: skip
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp ringdown` wrote."""
-    record = RingDown.load(path)
-    return Result(record, dict(record.provenance), record.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

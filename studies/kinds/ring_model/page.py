@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from vanedamp.rom.ring.ring_model import RingModel
-from vanedamp.rom.ring.sector_ring import SectorRing, load_ring
-from vanedamp.studies.kinds.ring_model import NAME
+from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 31
-KIND = NAME
 #: frequencies that are drawn and listed
 _MOST = 200
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp reduce` wrote of a case with [ring]."""
-    return Result.of(load_ring(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

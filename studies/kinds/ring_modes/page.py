@@ -25,12 +25,11 @@ from vanedamp.studies.report.results import Result
 from vanedamp.studies.ring_mesh import WholeRing
 
 ORDER = 15
-KIND = NAME
 
 
 def load(path: Path) -> Result:
     """Read what `vanedamp ring` wrote."""
-    found, (values, _) = Interference.load(path), load_record(path, KIND)
+    found, (values, _) = Interference.load(path), load_record(path, NAME)
     return Result((found, ring_surface(found.modes, values)), found.modes.provenance)
 
 

@@ -71,7 +71,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     The layout's `meta` has what `ring.js` needs for any mode at any phase: nodes at rest, sector and node of each, and
     of every mode the diameter and the shape on sector 0 at these nodes over its largest displacement, as whole numbers.
     """
-    points, named = 1e3 * ring.points, Interference.of(modes)
+    points, named = 1e3 * ring.points, Interference(modes)
     nodes, place = np.unique(ring.node, return_inverse=True)
     shapes = modes.shapes.reshape(len(modes.shapes), -1, 3)[:, nodes]
     largest = np.sqrt((np.abs(shapes) ** 2).sum(axis=2)).max(axis=1)

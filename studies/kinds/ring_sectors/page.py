@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from vanedamp.studies.kinds.ring_model.page import __file__ as TEMPLATE
-from vanedamp.studies.kinds.ring_model.page import figure, load, section
-from vanedamp.studies.kinds.ring_sectors import NAME as KIND
+from vanedamp.studies.kinds.ring_model.page import figure, section
 
-__all__ = ["KIND", "ORDER", "TEMPLATE", "figure", "load", "section"]
+__all__ = ["ORDER", "TEMPLATE", "figure", "section"]
 
 ORDER = 32

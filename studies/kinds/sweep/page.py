@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts
 from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import SteadyState, steady_states
-from vanedamp.studies.kinds.sweep import NAME
 from vanedamp.studies.kinds.sweep.bifurcations import MOST_PANELS as PANELS
 from vanedamp.studies.kinds.sweep.bifurcations import (
     bifurcation_figure,
@@ -50,13 +48,12 @@ from vanedamp.studies.report.map_chart import (
     panel_rows,
     state_rows,
 )
-from vanedamp.studies.report.page import Page, body_note, format_setting
+from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sector_charts import ring_shown
 from vanedamp.studies.report.strength import limited, sweep_shown
 
 ORDER = 50
-KIND = NAME
 #: curves of a page, of more the best; drawn at first, of which the reader picks others; panels of the energy
 _MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
 #: steady states in the table below basins
@@ -67,12 +64,6 @@ _COLUMNS = {
     "mistuning": (attached_mass_fraction.name, impacts_per_period.name),
     "energy": LOSSES,
 }
-
-
-def load(path: Path) -> Result:
-    """Read what `vanedamp sweep` wrote."""
-    sweep = Sweep.load(path)
-    return Result.of(sweep, _scene(sweep))
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
@@ -100,15 +91,6 @@ def figure(record: Sweep) -> go.Figure:
 
 def _body_note(sweep: Sweep) -> str | None:
     return body_note(sweep.provenance, sweep.scene)
-
-
-def _scene(sweep: Sweep) -> dict[str, Any]:
-    """Return the scene as data, with the sweep's axes in short."""
-    axes = {
-        path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
-        for path, values in sweep.axes.items()
-    }
-    return sweep.scene.to_dict() | {"sweep": axes}
 
 
 def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:

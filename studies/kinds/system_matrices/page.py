@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.studies.kinds.system_matrices import NAME
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
 
 ORDER = 12
-KIND = NAME
 #: nodes that are drawn, evenly chosen of more
 _MOST = 20_000
-
-
-def load(path: Path) -> Result:
-    """Read what SystemMatrices.save wrote."""
-    return Result.of(SystemMatrices.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

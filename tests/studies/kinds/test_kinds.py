@@ -45,15 +45,10 @@ def facts(found):
 PAGE = """
 import plotly.graph_objects as go
 
-from vanedamp.studies.kinds.cooling import NAME, Cooling
+from vanedamp.studies.kinds.cooling import NAME
 from vanedamp.studies.report.charts import dressed
-from vanedamp.studies.report.results import Result
 
-ORDER, KIND = 900, NAME
-
-
-def load(path):
-    return Result.of(Cooling.load(path))
+ORDER = 900
 
 
 def section(results, page):

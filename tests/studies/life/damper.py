@@ -54,5 +54,6 @@ class Damper:
         amplitude = 3e-5 * self.share * wide
         return SimpleNamespace(
             status=self.status, amplitude_mean_dynamic=mean(amplitude), amplitude_max_dynamic=1.1 * amplitude,
+            amplitude_mean=amplitude, wear_work_rate=5.0 * wide,
             amplitude_mean_confidence=1.96 * self.scatter * amplitude, wear=tuple(wear),
         )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import math
 import tomllib
 
 import numpy as np
@@ -53,6 +54,21 @@ def test_gap_and_hours_in_closed_form(found):
     assert f"Damps for {lost:.0f} h ({early:.0f} to {late:.0f} h)" in record.sentence
     assert record.time[-1] < 1.2 * LOST  # it ends where nothing is left to find out
     assert record.trouble == 0 and record.runs % 2 == 0
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.02])
+def test_a_limit_of_any_quantity_is_kept_for_so_long(found, scatter):
+    """The sliding work grows by exp(t/T) from 5 W: to 12.5 W after T ln 2.5."""
+    case = study(measure="wear_work_rate", limit=12.5)
+    record, _ = found(case, scatter=scatter)
+    assert record.hours[0] == pytest.approx(HOURS * math.log(2.5), rel=2e-3 + scatter)
+    assert record.reference == 12.5 and record.reduction[0] == pytest.approx(1 - 5.0 / 12.5)
+    assert record.reduction_band[0] == pytest.approx(1.96 * scatter * 5.0 / 12.5, rel=0.1)
+    assert record.sentence.startswith("Keeps wear_work_rate below 12.5 W for ") and "then the margin" in record.sentence
+    assert "margin of wear_work_rate, %" in plot(record).to_json()
+    assert found(study(measure="wear_work_rate", limit=4.0, hours=10.0))[0].sentence.startswith(
+        "Does not keep wear_work_rate below 4 W at any time in 10 h"
+    )
 
 
 @pytest.mark.parametrize("count", [6, 12])
@@ -298,6 +314,9 @@ def test_a_body_that_is_worn_away_ends_the_life(monkeypatch, tmp_path, steps):
         ("life", {"threshold": 1.0}, "life.threshold"),
         ("life", {"threshold": -0.1}, "life.threshold"),
         ("life", {"hours": 0.0}, "life.hours"),
+        ("life", {"measure": "wear_work_rate"}, "limit: missing; wear_work_rate needs one"),
+        ("life", {"measure": "wear_work", "limit": 1.0}, "life.measure: unknown quantity 'wear_work'; there are"),
+        ("life", {"measure": "utilisation", "limit": 1.0}, "life.measure: runs of this scene have no utilisation"),
         ("life", {"dwell": [1.0]}, "1 weights for 2 points"),
         ("life", {"dwell": [0.0, 0.0]}, "all weights are 0"),
         ("life", {"band": None}, "life.band: missing"),

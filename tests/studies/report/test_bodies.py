@@ -141,7 +141,7 @@ def test_walls_and_ceilings_that_turn_are_drawn_so(folder):
     for side, corner in (("right", 2), ("left", 0), ("ceiling", 3)):
         gap = history.plane.contact_gap.copy()
         gap[-1, history.plane.contacts.index((0, side, corner))] += more
-        changed = replace(history, plane=history.plane._replace(contact_gap=gap)).motion()
+        changed = replace(history, plane=replace(history.plane, contact_gap=gap)).motion()
         (before,), (after,) = history.motion().cavities, changed.cavities
         unit = changed.scale * changed.factor * more
         shares = {

@@ -27,15 +27,14 @@ def modes():
 def found(modes):
     speeds = np.array([0.0, 200.0, 400.0])
     over = np.sqrt(modes.frequencies_hz[:, None] ** 2 + 2.0 * (speeds / (2 * np.pi)) ** 2)
-    crossings = Interference.of(modes, operating=(100.0, 400.0)).meetings
-    return Interference.of(modes, range(1, 9), speed=150.0, operating=(140.0, 180.0), speeds=speeds,
+    crossings = Interference(modes, operating=(100.0, 400.0)).meetings
+    return Interference(modes, range(1, 9), speed=150.0, operating=(140.0, 180.0), speeds=speeds,
                            over_speed_hz=over, crossings=crossings)  # fmt: skip
 
 
 @pytest.fixture
 def file(modes, found, tmp_path):
-    (variables, attributes), (mesh, more) = found.riding(), mesh_variables(SECTORS)
-    modes.save(tmp_path / "ring.h5", variables | mesh, attributes | more)
+    found.save(tmp_path / "ring.h5", *mesh_variables(SECTORS))
     return tmp_path / "ring.h5"
 
 

@@ -15,15 +15,20 @@ def facts(path: str | Path) -> list[Fact]:
     """Return the facts of the study in a file. Raises InputError, as `vanedamp life` does."""
     study = LifeStudy.load(path)
     check_life(study, available_cores())
-    band, wear = study.frequencies, study.scene.wear
+    band, wear, of = study.frequencies, study.scene.wear, study.measure.quantity
     assert wear is not None
     *found, warnings = facts_of(study.scene)
+    reference = Fact("reference_amplitude", study.reference, "m", "undamped, that damped amplitudes are divided by")
+    end = f"or until the reduction is below {study.threshold:.0%}"
+    if study.table.limit is not None:
+        reference = Fact("limit", study.reference, of.unit, f"of {study.table.measure}, {of.about}")
+        end = f"or until {study.table.measure} is above its limit"
     return [
         Fact("commands", ["life"]),
         *found,
         Fact("band_hz", [float(band[0]), float(band[-1])], "Hz", f"{len(band)} frequencies"),
-        Fact("reference_amplitude", study.reference, "m", "undamped, that damped amplitudes are divided by"),
-        Fact("hours", study.table.hours, "h", f"or until the reduction is below {study.table.threshold:.0%}"),
+        reference,
+        Fact("hours", study.table.hours, "h", end),
         Fact("sliding_wear_rate", wear.sliding_rate, "1/Pa", "K/H, but for pairs of their own"),
         Fact("impact_wear_rate", wear.impact_rate, "m^3/J^n", f"n = {wear.impact_exponent:g}"),
         warnings,
