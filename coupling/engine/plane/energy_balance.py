@@ -23,13 +23,14 @@ from vanedamp.coupling.engine.energy_forms import (
 from vanedamp.coupling.engine.peaks import may_exceed
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, OPEN, PERIOD, SINGLE
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
+from vanedamp.coupling.numerics.tolerances import PEAK
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant, is_slip, row_speed
 
 #: pieces of a period in which a tilt has one extremum at most, and most pieces of a segment where modes are faster
 _PIECES, _MOST_PIECES = 16, 4096
-#: most steps to an extremum of a tilt, and its error, relative, at which they end
-_STEPS, _CLOSE = 40, 1e-15
+#: most steps to an extremum of a tilt
+_STEPS = 40
 
 
 @inlined
@@ -226,7 +227,7 @@ def _note_extremum(system, flows, st, rec, scratch, b, lo, low_rate, hi, high_ra
         move(system, flows, st, scratch, t, q, v)
         x, rate = _tilt(system, b, q), _tilt(system, b, v)
         _note_tilt(system, rec, st.counters[PERIOD], b, x)
-        if rate * rate <= _CLOSE * slope * abs(x) or not lo < t < hi:
+        if rate * rate <= PEAK * slope * abs(x) or not lo < t < hi:
             break
         if rate * high_rate > 0.0:
             hi, high_rate = t, rate
