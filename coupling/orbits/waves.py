@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Problem, least_squares, solve
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, least_squares, zero_of_map
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
@@ -31,11 +31,10 @@ def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
             "orbit.wave: a wave travels over equal sectors with bodies in equal steps (cavities such as c@0, c@1), "
             "without mistuning or scatter, under one engine order that is no multiple of their number; over one period"
         )
-    problem = Problem(replace(period_map, wave=True, _earlier=[]))
-    begin = problem.pack(np.asarray(start, float), math.nan)
-    found = solve(problem, begin, problem.along_parameter, np.zeros(problem.size))
+    wave = replace(period_map, wave=True, _earlier=[])
+    found = zero_of_map(wave, start)
     if found.status is not OrbitStatus.OK:
-        found = _from_beside(problem.map, np.asarray(start, float)) or found
+        found = _from_beside(wave, np.asarray(start, float)) or found
     if found.status is not OrbitStatus.OK:
         return found
     passage, own = period_map(found.state, derivative=False), found.passage

@@ -64,13 +64,14 @@ class ClosedMap:
         return np.array(columns).T
 
     def at(self, value: float) -> ClosedMap:
-        if value < self.lowest:
-            raise InputError(f"scene: value: {self.lowest:g} is the least")
-        return replace(self, value=value)
+        return self.with_numbers({self.parameter: value})
 
     def with_numbers(self, values: dict[str, float]) -> ClosedMap:
-        """Return the map at two values, a tuple of them."""
-        return replace(self, value=tuple(values.values()))
+        """Return the map at a value, or at a tuple of two."""
+        first, *more = values.values()
+        if first < self.lowest:
+            raise InputError(f"scene: value: {self.lowest:g} is the least")
+        return replace(self, value=(first, *more) if more else first)
 
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
@@ -161,6 +162,9 @@ class ImpactOscillator:
 
     def at(self, value: float) -> ImpactOscillator:
         return replace(self, value=value)
+
+    def with_numbers(self, values: dict[str, float]) -> ImpactOscillator:
+        return replace(self, value=values[self.parameter])
 
     def over(self, periods: int) -> ImpactOscillator:
         return replace(self, periods=periods)

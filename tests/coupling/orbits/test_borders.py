@@ -11,12 +11,12 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools import closed_maps as maps
 from tests.tools.closed_form_scenes import scene
-from vanedamp.coupling.orbits.border_newton import place_of, solved
 from vanedamp.coupling.orbits.border_path import BorderPath
+from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.conditions import Pair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
-from vanedamp.coupling.orbits.surface import Surface
+from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -27,32 +27,31 @@ TABLE = Table(**{"from": 0.0, "to": 1.0, "step": 0.01, "max_step": 0.05})
 
 def followed(function, size, start, numbers, kind, low, high):
     """The path of a border of a map through a state and two numbers, both of which range from low to high."""
-    span = high - low
-    surface = Surface(
-        maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, span),
-        left=np.zeros((size, 0)), right=np.zeros((size, 0)),
-    )  # fmt: skip
-    y = surface.pack(np.array(start, float), np.array(numbers, float))
-    passage = surface.passage(y)
+    problem = Problem(maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, high - low))
+    y = problem.pack(np.array(start, float), *numbers)
+    passage = problem.passage(y)
     pair = np.linalg.eigvals(passage.derivative)
-    condition = Pair(surface, 0, pair.sum().real) if kind == "pair" else Singular.of(surface, kind, 0, passage)
-    row = np.eye(len(y))[-1]
-    first = solved(surface, place_of(surface, condition, y, passage, row), y, row, 1.0)
-    path = BorderPath(surface, TABLE, first, float(y[-1]))
+    condition = Pair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage)
+    first = first_point(condition, y)
+    return end_of(BorderPath(TABLE, first, 500, float(y[-1])))
+
+
+def end_of(path):
+    """The path, followed to its end."""
     while not path.end:
-        path.advance(500)
-    return surface, path
+        path.advance()
+    return path
 
 
-def named(surface, path):
+def named(path):
     """The named points by their kinds: numbers (2,) of each."""
-    return {point.kind: surface.numbers(point.y) for _, point in path.named}
+    return {point.kind: np.array([point.parameter, point.second]) for point in path.special}
 
 
-def points(surface, path):
+def points(path):
     """States and numbers along a path."""
-    y = [place.border for place in path.places]
-    return np.array([surface.state(at) for at in y]), np.array([surface.numbers(at) for at in y])
+    y = [point.exact for point in path.points]
+    return np.array([path.problem.state(at) for at in y]), np.array([path.problem.numbers(at) for at in y])
 
 
 def test_a_fold_passes_its_cusp():
@@ -62,16 +61,15 @@ def test_a_fold_passes_its_cusp():
         a, b = ab
         return [x[0] + a + b * x[0] - x[0] ** 3, 0.5 * x[1] + 0.1 * x[0]], [[1 + b - 3 * x[0] ** 2, 0], [0.1, 0.5]]
 
-    surface, path = followed(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
+    path = followed(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
     # towards larger b the border ends at b = 1; the other way it passes the cusp
-    back = BorderPath(surface, TABLE, path.places[0]._replace(tangent=-path.places[0].tangent), 0.875)
-    while not back.end:
-        back.advance(500)
-    x, numbers = points(surface, back)
+    first = path.points[0]
+    back = end_of(BorderPath(TABLE, replace(first, row=-first.tangent), 500, 0.875))
+    x, numbers = points(back)
     assert numbers[:, 1] == pytest.approx(3 * x[:, 0] ** 2, abs=CLOSE)
     assert numbers[:, 0] == pytest.approx(-2 * x[:, 0] ** 3, abs=CLOSE)
-    assert named(surface, back).keys() == {"cusp"}
-    assert named(surface, back)["cusp"] == pytest.approx([0.0, 0.0], abs=NAMED)
+    assert named(back).keys() == {"cusp"}
+    assert named(back)["cusp"] == pytest.approx([0.0, 0.0], abs=NAMED)
     assert back.end == path.end == "the end of a number's range"
     assert len(back.visits) == 1  # the other fold at b = 3/4
 
@@ -83,10 +81,10 @@ def test_a_doubling_turns_from_soft_to_hard():
         a, b = ab
         return [-(1 + a) * x[0] + b * x[0] ** 3 + x[0] ** 5], [[-(1 + a) + 3 * b * x[0] ** 2 + 5 * x[0] ** 4]]
 
-    surface, path = followed(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0)
-    assert np.abs(points(surface, path)[1][:, 0]).max() < CLOSE
-    assert named(surface, path).keys() == {"generalised doubling"}
-    assert named(surface, path)["generalised doubling"] == pytest.approx([0.0, 0.0], abs=NAMED)
+    path = followed(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0)
+    assert np.abs(points(path)[1][:, 0]).max() < CLOSE
+    assert named(path).keys() == {"generalised doubling"}
+    assert named(path)["generalised doubling"] == pytest.approx([0.0, 0.0], abs=NAMED)
 
 
 def test_a_fold_meets_a_doubling_and_a_double_multiplier():
@@ -97,8 +95,8 @@ def test_a_fold_meets_a_doubling_and_a_double_multiplier():
         derivative = [[1, 1, 0], [2 * x[0], 1 + b, 0], [0, 0, -(0.5 + b)]]
         return [x[0] + x[1], x[1] + a + b * x[1] + x[0] ** 2, -(0.5 + b) * x[2]], derivative
 
-    surface, path = followed(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0)
-    found = named(surface, path)
+    path = followed(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0)
+    found = named(path)
     assert found["1:1 resonance"] == pytest.approx([0.0, 0.0], abs=NAMED)
     assert found["fold-flip"] == pytest.approx([0.0, 0.5], abs=NAMED)
     assert path.end == "the end of a number's range"
@@ -113,8 +111,8 @@ def test_a_pair_on_the_unit_circle_passes_strong_resonances():
         turn = (1 + a) * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
         return turn @ x * (1 - r2), turn @ ((1 - r2) * np.eye(2) - 2 * np.outer(x, x))
 
-    surface, path = followed(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6)
-    found = named(surface, path)
+    path = followed(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6)
+    found = named(path)
     assert found["1:4 resonance"] == pytest.approx([0.0, 0.25], abs=NAMED)
     assert found["1:3 resonance"] == pytest.approx([0.0, 1 / 3], abs=NAMED)
 
