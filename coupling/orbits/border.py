@@ -1,40 +1,96 @@
-"""The record of a border: special points of branches over a second number of the scene."""
+"""The records of curves of orbits, and of a border: special points of branches over a second number of the scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Measured, table
-from vanedamp.files.record import Array, Columns, Rows, Unit
+from vanedamp.files.record import Array, Columns, Rows, Unit, declared, joined
+from vanedamp.files.store import frozen
 
 
 @dataclass(frozen=True, eq=False)
-class BorderPoint:
-    """A named point of a border: of codimension two, a change of the event sequence, an extremum."""
+class NamedPoint:
+    """A point of a curve of orbits at which something happens."""
 
     index: int
-    """of the border's point before it"""
-    parameter: Annotated[float, Unit("parameter")]
-    """the branches' number"""
-    second: Annotated[float, Unit("second")]
-    """the second one"""
+    """of the curve's point before it"""
     kind: str
-    """what happens there"""
+    """what it is, a name of docs/orbits.md"""
     note: str
     """more on that"""
     state: Annotated[np.ndarray, Array(("coordinate",))]
     """(k,) at the start of the period"""
+    parameter: Annotated[float, Unit("parameter")]
+    """the branches' number"""
 
 
 @dataclass(frozen=True, eq=False)
-class Border(Measured):
-    """A border of m points, in order, over the branches' number and a second one.
+class Curve(Measured):
+    """A curve of m orbits with states of k coordinates, in order. All their quantities (results.md) are attributes."""
 
-    All quantities of its orbits (docs/reference/results.md) are attributes, but for exponents, of which one is zero.
+    periods: int
+    """of the excitation that its orbits take"""
+    parameter: Annotated[np.ndarray, Array(("point",), "parameter")]
+    """(m,) the branches' number"""
+    state: Annotated[np.ndarray, Array(("point", "coordinate"))]
+    """(m, k) at the start of a period, in the units of Branches.names"""
+    multipliers: Annotated[
+        np.ndarray, Array(("point", "multiplier"), dtype=complex, name="multiplier", imaginary="_imag")
+    ]
+    """(m, k) complex, the largest first"""
+    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
+    """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
+
+    @classmethod
+    def arrays(cls) -> dict[str, Array]:
+        """Return the layouts of its arrays over points."""
+        layouts = {name: layout for name, (_, layout) in declared(cls).items() if isinstance(layout, Array)}
+        return {name: layout for name, layout in layouts.items() if layout.dims[0] == "point"}
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, Any]], **others: Any) -> Self:
+        """Return the curve of some points, rows of values by the names of arrays, and of their quantities."""
+        arrays: dict[str, Any] = {
+            name: frozen([row[name] for row in rows], layout.dtype) for name, layout in cls.arrays().items()
+        }
+        return cls(quantities=stacked([row["quantities"] for row in rows]), **arrays, **others)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Its points one by one."""
+        return [
+            {name: getattr(self, name)[at] for name in self.arrays()}
+            | {"quantities": {name: values[at] for name, values in self.quantities.items()}}
+            for at in range(len(self.parameter))
+        ]
+
+
+def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+    """Return the quantities of points as arrays over them."""
+    rows: list[dict[str, np.ndarray]] = [
+        {name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points
+    ]  # fmt: skip
+    return {name: frozen(values, values.dtype) for name, values in joined(rows, [1] * len(rows)).items()}
+
+
+@dataclass(frozen=True, eq=False)
+class BorderPoint(NamedPoint):
+    """A named point of a border: of codimension two, a change of the event sequence, an extremum."""
+
+    second: Annotated[float, Unit("second")]
+    """the second one"""
+
+
+@dataclass(frozen=True, eq=False)
+class Border(Curve):
+    """A border: special points of branches over the branches' number and a second one.
+
+    Its orbits have no exponents, of which one is zero.
     """
 
     kind: str
@@ -42,20 +98,8 @@ class Border(Measured):
     source: Annotated[tuple[int, int], Array(("branch_and_point",), dtype=int)]
     """the branch, and its special point, from which it was followed; for a peak -1 less the number of the branch's
     orbit next to it"""
-    periods: int
-    """of the excitation that its orbits take"""
-    parameter: Annotated[np.ndarray, Array(("point",), "parameter")]
-    """(m,) the branches' number"""
     second: Annotated[np.ndarray, Array(("point",), "second")]
     """(m,) the second one"""
-    state: Annotated[np.ndarray, Array(("point", "coordinate"))]
-    """(m, k) at the start of a period"""
-    multipliers: Annotated[
-        np.ndarray, Array(("point", "multiplier"), dtype=complex, name="multiplier", imaginary="_imag")
-    ]
-    """(m, k) complex, the largest first"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
-    """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
     orbits: Annotated[np.ndarray, Array(("point", "side"), dtype=int)]
     """(m, 2) orbits that meet there, at a smaller and at a larger parameter: of a doubling, those of twice the period
     too; of a grazing border, those without the impact only; of a Neimark-Sacker border, the orbit without its torus"""

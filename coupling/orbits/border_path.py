@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import Passage, change
 from vanedamp.coupling.orbits.border import BorderPoint
-from vanedamp.coupling.orbits.conditions import Condition
+from vanedamp.coupling.orbits.conditions import Condition, Counts
 from vanedamp.coupling.orbits.curve import Path, Point, beginning, located, near, regular
+from vanedamp.coupling.orbits.multipliers import multipliers
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: largest derivative of the map, scaled: it goes as one over the speed of an impact that comes to graze
@@ -29,6 +31,15 @@ class BorderPath(Path):
     def __init__(self, table: Table, head: Point, most: int, own: float) -> None:
         super().__init__(table, head, most)
         self.own, self.visits = own, list[np.ndarray]()
+
+    def _kept(self, point: Point) -> dict[str, Any]:
+        problem, counts, found = self.problem, _counts(point), multipliers(self.problem.derivative(point.passage))[0]
+        parameter, second = problem.numbers(point.exact)
+        return {
+            "parameter": parameter, "second": second, "state": problem.state(point.exact),
+            "multipliers": found**2 if problem.mirrored else found, "orbits": counts.orbits,
+            "stable_orbits": counts.stable, "quantities": problem.at(point.y).quantities(problem.state(point.y)),
+        }  # fmt: skip
 
     @staticmethod
     def _tests(point: Point) -> Mapping[str, float]:
@@ -82,7 +93,7 @@ class BorderPath(Path):
             if point is not None and point.passage.sequence != head.passage.sequence:
                 self._change(head, passage)
                 self.head = point
-                self.points.append(point)
+                self.points.append(self._kept(point))
                 self.step = max(self.table.step / 8, self.table.min_step)
                 return
         self.end = f"{self._change(head, after)}; no such orbit found beyond"
@@ -122,3 +133,13 @@ def _condition(point: Point) -> Condition:
     """Return the condition that a border's point has."""
     assert point.condition is not None
     return point.condition
+
+
+def _counts(point: Point) -> Counts:
+    """Return the orbits on both sides of a point, at smaller and larger values of the first number."""
+    problem = point.problem
+    way = np.sign(problem.span[0])
+    along = point.columns[:, 0] * way
+    state = np.linalg.lstsq(problem.by_state(point.passage), -along, rcond=None)[0]
+    rate = float(point.gradient @ np.concatenate([state, [way, 0.0]]))
+    return _condition(point).counts(point.passage, point.y, rate, along)

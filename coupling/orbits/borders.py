@@ -11,14 +11,13 @@ import numpy as np
 
 from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.border_path import BorderPath
-from vanedamp.coupling.orbits.branch import Branch, SpecialPoint, stacked
-from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
+from vanedamp.coupling.orbits.conditions import Clearance, Condition, Pair, Peak, Singular
 from vanedamp.coupling.orbits.curve import Point, beginning, near, regular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.scene.orbit import Orbit as Table
-from vanedamp.files.store import frozen
 
 #: scaled distance of special points that lie on one border, and of a border's point from the special point it begins at
 _SAME, _NEAR = 1e-5, 1e-3
@@ -189,30 +188,10 @@ def _border(kind: str, periods: int, source: tuple[int, int], paths: Sequence[Bo
     """Return the record of a border that was followed one way or both."""
     back, ahead = paths if len(paths) > 1 else (None, paths[0])
     before = [] if back is None else back.points[:0:-1]
-    points: list[Point] = [*before, *ahead.points]
     special = [replace(named, index=len(before) + named.index) for named in ahead.special]
     special += [] if back is None else [replace(named, index=len(before) - 1 - named.index) for named in back.special]
-    problem, counts = ahead.problem, [_counts(point) for point in points]
-    found = [multipliers(problem.derivative(point.passage))[0] for point in points]
-    numbers = np.array([problem.numbers(point.exact) for point in points])
-    return Border(
-        kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
-        state=frozen([problem.state(point.exact) for point in points]),
-        multipliers=frozen([values**2 if problem.mirrored else values for values in found], complex),
-        quantities=stacked([problem.at(point.y).quantities(problem.state(point.y)) for point in points]),
-        orbits=frozen([each.orbits for each in counts], int),
-        stable_orbits=frozen([each.stable for each in counts], int),
+    return Border.of(
+        [*before, *ahead.points], kind=kind, source=source, periods=periods,
         special=tuple(sorted(special, key=lambda named: named.index)),
         ends=("closed" if back is None else back.end, ahead.end),
     )  # fmt: skip
-
-
-def _counts(point: Point) -> Counts:
-    """Return the orbits on both sides of a point, at smaller and larger values of the first number."""
-    problem, condition = point.problem, point.condition
-    assert condition is not None
-    way = np.sign(problem.span[0])
-    along = point.columns[:, 0] * way
-    state = np.linalg.lstsq(problem.by_state(point.passage), -along, rcond=None)[0]
-    rate = float(point.gradient @ np.concatenate([state, [way, 0.0]]))
-    return condition.counts(point.passage, point.y, rate, along)

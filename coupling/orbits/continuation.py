@@ -7,12 +7,13 @@ Where the sequence changes a branch may have a kink, turn back or end: an orbit 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import change
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
-from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.curve import Path, Point, beginning
 from vanedamp.coupling.orbits.newton import Orbit, with_symmetry
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
@@ -39,21 +40,25 @@ class Continuation(Path):
         cls, problem: Problem, table: Table, branch: Branch, tangent: np.ndarray, step: float
     ) -> Continuation | None:
         """Return a branch that was interrupted, from its last point and the tangent there; None if that is no orbit."""
-        first, last = (problem.pack(point.state, point.parameter) for point in (branch.points[0], branch.points[-1]))
+        first, last = (problem.pack(branch.state[at], float(branch.parameter[at])) for at in (0, -1))
         if (head := beginning(problem, last, tangent)) is None:
             return None
         resumed = cls(table, head, branch.source)
-        resumed.points, resumed.special, resumed.first = branch.points, list(branch.special), first
+        resumed.points, resumed.special, resumed.first = branch.rows, list(branch.special), first
         resumed.step, resumed.end = step, branch.end
         return resumed
 
     @property
     def branch(self) -> Branch:
         """The record of the branch, whole or not."""
-        return Branch.of(self.points, self.problem.map.periods, self.special, self.end, self.source)
+        branch, special = self.source or (-1, -1)
+        return Branch.of(
+            self.points, periods=self.problem.map.periods, special=tuple(self.special), end=self.end,
+            source_branch=branch, source_special=special,
+        )  # fmt: skip
 
-    def _kept(self, point: Point) -> BranchPoint:
-        return BranchPoint.of(with_symmetry(point.orbit))
+    def _kept(self, point: Point) -> dict[str, Any]:
+        return kept(with_symmetry(point.orbit))
 
     def _end(self, why: str, point: Point) -> None:
         self._note(point, "end", why)
@@ -76,7 +81,7 @@ class Continuation(Path):
 
     def _joined(self, orbit: Orbit) -> str:
         """Say on which branch of more symmetric orbits this one ends; "" if it does not."""
-        if not self.points[-1].symmetric and with_symmetry(orbit).symmetric:
+        if not self.points[-1]["symmetric"] and with_symmetry(orbit).symmetric:
             return "joins a branch of symmetric orbits"
         periods = self.problem.map.periods
         if periods % 2 == 0 and not _repeats(self.head.orbit) and _repeats(orbit):
@@ -115,6 +120,12 @@ class Continuation(Path):
         except InputError as error:
             return str(error)
         return ""
+
+
+def kept(orbit: Orbit) -> dict[str, Any]:
+    """Return what a branch keeps of an orbit."""
+    names = ("parameter", "state", "multipliers", "neutral", "stable", "symmetric", "undetermined", "quantities")
+    return {name: getattr(orbit, name) for name in names} | {"sequence": "; ".join(orbit.passage.sequence)}
 
 
 def _repeats(orbit: Orbit) -> bool:

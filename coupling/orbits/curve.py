@@ -200,8 +200,8 @@ def _root(before: Point, after: Point, function: Callable[[Point], float], size:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
     Points are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
-    whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, the
-    zero is the chord's.
+    whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, a
+    branch's zero is the chord's.
     """
     length = float((after.y - before.y) @ before.tangent)
     points: dict[float, Point] = {0.0: before, length: after}
@@ -220,7 +220,7 @@ def _root(before: Point, after: Point, function: Callable[[Point], float], size:
         root = brentq(value, 0.0, length, xtol=before.problem.close(before.y, _CLOSE), maxiter=100)
         value(root)
     except _Lost:
-        if (chord := _on_chord(points, function)) is None:
+        if before.given is not None or (chord := _on_chord(points, function)) is None:
             return None
         root = chord
     except (ValueError, RuntimeError):
@@ -238,7 +238,7 @@ def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) ->
     near, far = points[one], points[other]
     share = function(near) / (function(near) - function(far))
     root, y = one + share * (other - one), near.y + share * (far.y - near.y)
-    if (passage := near.problem.passage(y)) is None or passage.sequence != near.passage.sequence:
+    if (passage := near.problem.passage(y)) is None:
         return None
     points[root] = replace(near, zero=near.zero._replace(y=y, passage=passage))
     return root
@@ -339,7 +339,7 @@ class Path:
     def _note(self, point: Point, kind: str, note: str) -> None:
         y = point.exact
         numbers, state = self.problem.numbers(y).tolist(), self.problem.state(y)
-        self.special.append(self.named(len(self.points) - 1, *numbers, kind, note, state))
+        self.special.append(self.named(len(self.points) - 1, kind, note, state, *numbers))
 
     # -- what kinds of curves say
 

@@ -25,19 +25,20 @@ CLOSE, NAMED = 1e-10, 1e-7
 TABLE = Table(**{"from": 0.0, "to": 1.0, "step": 0.01, "max_step": 0.05})
 
 
-def followed(function, size, start, numbers, kind, low, high):
-    """The path of a border of a map through a state and two numbers, both of which range from low to high."""
+def begun(function, size, start, numbers, kind, low, high):
+    """The first point of a border of a map near a state and two numbers, both of which range from low to high."""
     problem = Problem(maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, high - low))
     y = problem.pack(np.array(start, float), *numbers)
     passage = problem.passage(y)
     pair = np.linalg.eigvals(passage.derivative)
-    condition = Pair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage)
-    first = first_point(condition, y)
-    return end_of(BorderPath(TABLE, first, 500, float(y[-1])))
+    return first_point(
+        Pair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage), y
+    )
 
 
-def end_of(path):
-    """The path, followed to its end."""
+def followed(first, way=1.0):
+    """The path of a border from a point on in the direction of larger second numbers, or the other."""
+    path = BorderPath(TABLE, replace(first, row=way * first.tangent), 500, float(first.y[-1]))
     while not path.end:
         path.advance()
     return path
@@ -50,8 +51,8 @@ def named(path):
 
 def points(path):
     """States and numbers along a path."""
-    y = [point.exact for point in path.points]
-    return np.array([path.problem.state(at) for at in y]), np.array([path.problem.numbers(at) for at in y])
+    states, *numbers = (np.array([row[name] for row in path.points]) for name in ("state", "parameter", "second"))
+    return states, np.transpose(numbers)
 
 
 def test_a_fold_passes_its_cusp():
@@ -61,10 +62,9 @@ def test_a_fold_passes_its_cusp():
         a, b = ab
         return [x[0] + a + b * x[0] - x[0] ** 3, 0.5 * x[1] + 0.1 * x[0]], [[1 + b - 3 * x[0] ** 2, 0], [0.1, 0.5]]
 
-    path = followed(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
+    first = begun(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
     # towards larger b the border ends at b = 1; the other way it passes the cusp
-    first = path.points[0]
-    back = end_of(BorderPath(TABLE, replace(first, row=-first.tangent), 500, 0.875))
+    path, back = followed(first), followed(first, -1.0)
     x, numbers = points(back)
     assert numbers[:, 1] == pytest.approx(3 * x[:, 0] ** 2, abs=CLOSE)
     assert numbers[:, 0] == pytest.approx(-2 * x[:, 0] ** 3, abs=CLOSE)
@@ -81,7 +81,7 @@ def test_a_doubling_turns_from_soft_to_hard():
         a, b = ab
         return [-(1 + a) * x[0] + b * x[0] ** 3 + x[0] ** 5], [[-(1 + a) + 3 * b * x[0] ** 2 + 5 * x[0] ** 4]]
 
-    path = followed(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0)
+    path = followed(begun(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0))
     assert np.abs(points(path)[1][:, 0]).max() < CLOSE
     assert named(path).keys() == {"generalised doubling"}
     assert named(path)["generalised doubling"] == pytest.approx([0.0, 0.0], abs=NAMED)
@@ -95,7 +95,7 @@ def test_a_fold_meets_a_doubling_and_a_double_multiplier():
         derivative = [[1, 1, 0], [2 * x[0], 1 + b, 0], [0, 0, -(0.5 + b)]]
         return [x[0] + x[1], x[1] + a + b * x[1] + x[0] ** 2, -(0.5 + b) * x[2]], derivative
 
-    path = followed(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0)
+    path = followed(begun(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0))
     found = named(path)
     assert found["1:1 resonance"] == pytest.approx([0.0, 0.0], abs=NAMED)
     assert found["fold-flip"] == pytest.approx([0.0, 0.5], abs=NAMED)
@@ -111,7 +111,7 @@ def test_a_pair_on_the_unit_circle_passes_strong_resonances():
         turn = (1 + a) * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
         return turn @ x * (1 - r2), turn @ ((1 - r2) * np.eye(2) - 2 * np.outer(x, x))
 
-    path = followed(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6)
+    path = followed(begun(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6))
     found = named(path)
     assert found["1:4 resonance"] == pytest.approx([0.0, 0.25], abs=NAMED)
     assert found["1:3 resonance"] == pytest.approx([0.0, 1 / 3], abs=NAMED)
