@@ -79,8 +79,7 @@ class BorderPath(Path):
             return None
         return f"{slowest.name} nearly grazes: motions part by {parts:.0e} per passage"
 
-    def _cross(self, step: float) -> None:
-        last, _ = self._last(self.head, step)
+    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
         if last is not self.head and regular(last) is not None:
             self._add(self.head, self._passed(self.head, last))
             if self.end:

@@ -37,14 +37,14 @@ class Continuation(Path):
 
     @classmethod
     def resume(
-        cls, problem: Problem, table: Table, branch: Branch, tangent: np.ndarray, step: float
+        cls, problem: Problem, table: Table, branch: Branch, head: np.ndarray, step: float
     ) -> Continuation | None:
-        """Return a branch that was interrupted, from its last point and the tangent there; None if that is no orbit."""
-        first, last = (problem.pack(branch.state[at], float(branch.parameter[at])) for at in (0, -1))
-        if (head := beginning(problem, last, tangent)) is None:
+        """Return a branch that was interrupted, from its last y and row (2, k + 1); None if that is no orbit."""
+        if (last := beginning(problem, *head)) is None:
             return None
-        resumed = cls(table, head, branch.source)
-        resumed.points, resumed.special, resumed.first = branch.rows, list(branch.special), first
+        resumed = cls(table, last, branch.source)
+        resumed.points, resumed.special = branch.rows, list(branch.special)
+        resumed.first = problem.pack(branch.state[0], float(branch.parameter[0]))
         resumed.step, resumed.end = step, branch.end
         return resumed
 
@@ -90,11 +90,10 @@ class Continuation(Path):
 
     # -- changes of the event sequence
 
-    def _cross(self, step: float) -> None:
-        head = self.head
-        last, point = self._last(head, step)
-        if last is not head and self._passed(head, last) is None:
+    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+        if last is not self.head and self._passed(self.head, last) is None:
             return
+        point = beyond
         how, passed = "", None
         if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED

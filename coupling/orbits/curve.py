@@ -283,7 +283,7 @@ class Path:
                     self._add(head, last)
                 return
             step /= 2
-        self._cross(failed)
+        self._cross(failed, *self._last(head, failed))
 
     def _longest(self, point: Point) -> float:
         """Return the longest step: with a condition states may change fast, and it is the numbers' that is bounded."""
@@ -351,8 +351,11 @@ class Path:
         """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
         raise NotImplementedError
 
-    def _cross(self, step: float) -> None:
-        """Continue with the next sequence of events where the present one ends, within a step; or end the path."""
+    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+        """Continue with another sequence of events, or end the path.
+
+        step: that leads from the head beyond the end of the sequence; last, beyond: points on both sides of it (_last).
+        """
         raise NotImplementedError
 
     def _end(self, why: str, point: Point) -> None:

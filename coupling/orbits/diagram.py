@@ -63,16 +63,17 @@ class Diagram:
 
     @property
     def place(self) -> tuple[np.ndarray, float]:
-        """Tangent (k + 1,) and step with which the last branch continues."""
+        """Last y and row (2, k + 1), and step, with which the last branch continues."""
         if self.current is None:
-            return np.zeros(len(self.map.scale) + 1), 0.0
-        return self.current.head.tangent, self.current.step
+            return np.zeros((2, len(self.map.scale) + 1)), 0.0
+        head = self.current.head
+        return np.stack([head.y, head.row]), self.current.step
 
-    def resume(self, branches: Sequence[Branch], tangent: np.ndarray, step: float, iterations: int) -> None:
+    def resume(self, branches: Sequence[Branch], head: np.ndarray, step: float, iterations: int) -> None:
         """Take up what an interrupted search has found."""
         *self.finished, last = branches
         self._before = iterations
-        self.current = Continuation.resume(self._problem(last.periods), self.table, last, tangent, step)
+        self.current = Continuation.resume(self._problem(last.periods), self.table, last, head, step)
         if self.current is None:
             raise InputError("the last orbit of the checkpoint is none any more; delete the checkpoint to start again")
 
