@@ -109,7 +109,7 @@ class Continuation(Path):
         if point is None:
             self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last)
         elif passed is None or not self._ends_on(passed[1]):
-            self._add(last, point)
+            self._add(last if passed is None else point, point)  # at the start of the period the state jumps
             self.step = max(self.table.step / 8, self.table.min_step)
 
     def _refusal(self, last: Point, step: float) -> str:

@@ -21,6 +21,7 @@ from vanedamp.coupling.derivatives.passage import Passage, forecast
 from vanedamp.coupling.orbits.conditions import Condition
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Zero, least_squares, solve
 from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.waves import whole
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: corrections of a point before its step is shortened, which is better than many; how often one is halved; up to how
@@ -70,7 +71,8 @@ class Point:
     @cached_property
     def orbit(self) -> Orbit:
         """The record of its orbit."""
-        return self.zero.orbit(self.problem)
+        orbit = self.zero.orbit(self.problem)
+        return whole(orbit) if self.problem.map.wave else orbit
 
     @cached_property
     def columns(self) -> np.ndarray:
@@ -345,7 +347,7 @@ class Path:
 
     def _kept(self, point: Point) -> Any:
         """Return what is kept of a point."""
-        return point
+        raise NotImplementedError
 
     def _passed(self, before: Point, point: Point) -> Point | None:
         """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""

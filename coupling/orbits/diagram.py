@@ -15,7 +15,7 @@ from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import WAVE, OrbitStatus, Zero, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.orbits.problem import Problem
-from vanedamp.coupling.orbits.waves import find_wave
+from vanedamp.coupling.orbits.waves import find_wave, of_waves
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -138,7 +138,7 @@ class Diagram:
         for start in starts.candidates:
             problem = self._problem(start.periods)
             row = problem.row()
-            if self.table.wave:
+            if self.table.wave and self.to is None:
                 zero = Zero.of(problem, find_wave(problem.map, start.state), self.low)
             else:
                 zero = solve(problem, problem.pack(start.state, self.low), row)
@@ -156,7 +156,11 @@ class Diagram:
         return 1.0 if self.to is None else self.to - self.low
 
     def _problem(self, periods: int) -> Problem:
-        return self.problems.setdefault(periods, Problem.along(self.map.over(periods), self.low, self._span))
+        if periods not in self.problems:
+            along = self.map.over(periods)
+            along = of_waves(along) if self.table.wave and self.to is not None else along
+            self.problems[periods] = Problem.along(along, self.low, self._span)
+        return self.problems[periods]
 
     def _known(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> bool:
         """Say whether a bifurcation's other branch was followed already, from here or to here."""

@@ -59,15 +59,14 @@ class OtherSide:
         The branch is followed from where no event is near, to the end of the range at most. None where no event passes
         the start.
         """
-        periods = self.problem.map.periods
+        length = self.problem.map.length
         times = self.problem.at(last.y).times(last.passage)
-        if not times or min(times[0], periods - times[-1]) > _AT_START:
+        if not times or min(times[0], length - times[-1]) > _AT_START:
             return None
-        apart = np.diff([*times, times[0] + periods])
-        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % periods
-        there = replace(
-            self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]), _maps={}, _passages={}
-        )
+        apart = np.diff([*times, times[0] + length])
+        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % length
+        begin = (self.problem.map.begin + later) % min(length, 1.0)
+        there = replace(self.problem, map=replace(self.problem.map, begin=begin, _earlier=[]), _maps={}, _passages={})
         head = _moved(last, there, later)
         if head is None:
             return None
@@ -78,15 +77,15 @@ class OtherSide:
                 step /= 4
                 continue
             for each in bifurcations(head, point):
-                y = _later(there, each.point.y, periods - later)
+                y = _later(there, each.point.y, length - later)
                 if y is not None:
                     own = replace(each.point, problem=self.problem, zero=each.point.zero._replace(y=y))
                     found.append(each._replace(point=own))
-            before = (bisect(there.at(each.y).times(each.passage), periods - later) for each in (head, point))
+            before = (bisect(there.at(each.y).times(each.passage), length - later) for each in (head, point))
             passed = len(set(before)) > 1
             head = point
             if passed or not 0.0 < point.y[-1] < 1.0:
-                back = _moved(point, self.problem, periods - later)
+                back = _moved(point, self.problem, length - later)
                 return None if back is None else (back, found)
         return None
 

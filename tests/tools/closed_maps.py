@@ -31,6 +31,7 @@ class ClosedMap:
     lowest: float = -math.inf
     numbers: tuple[str, ...] = ()
     parameter: str = "value"
+    wave: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -157,6 +158,7 @@ class ImpactOscillator:
     restitution: float = 0.8
     numbers: tuple[str, ...] = ()
     parameter: str = "value"
+    wave: bool = False
     names = ("x", "x rate")
     scale = np.ones(2)
 
