@@ -26,7 +26,7 @@ from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: corrections of a point before its step is shortened, which is better than many; how often one is halved; up to how
 #: many a step grows: without a condition, and with one, whose slopes are learnt on the way
-_EFFORT = ((8, 3, 3), (16, 6, 9))
+_EFFORT = ((8, 3, 3), (16, 10, 9))
 #: cosines of the angle between tangents from which steps grow, and are good enough
 _STRAIGHT, _BENT = 0.985, 0.9
 #: share of the numbers in a tangent below which it is at a turn of both

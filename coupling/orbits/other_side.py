@@ -59,9 +59,8 @@ class OtherSide:
         The branch is followed from where no event is near, to the end of the range at most. None where no event passes
         the start.
         """
-        length = self.problem.map.length
         times = self.problem.at(last.y).times(last.passage)
-        if not times or min(times[0], length - times[-1]) > _AT_START:
+        if not times or min(times[0], (length := self.problem.map.length) - times[-1]) > _AT_START:
             return None
         apart = np.diff([*times, times[0] + length])
         later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % length

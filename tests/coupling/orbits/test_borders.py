@@ -14,7 +14,7 @@ from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.orbits.border_path import BorderPath
 from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.branch import Branches
-from vanedamp.coupling.orbits.conditions import Pair, Singular
+from vanedamp.coupling.orbits.conditions import Clearance, Pair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -117,6 +117,24 @@ def test_a_pair_on_the_unit_circle_passes_strong_resonances():
     assert found["1:3 resonance"] == pytest.approx([0.0, 1 / 3], abs=NAMED)
 
 
+def test_the_sequence_of_events_changes_along_its_closed_form():
+    """x/2 + a - b^2 has the orbit 2 (a - b^2), and a body sticks for x > 0: from the side where none does."""
+
+    def step(x, ab):
+        ab = np.atleast_1d(ab)
+        crossings = () if x[0] < 0 else (maps.Crossing(0.5, "sticks 0", float(x[0]), 0.0),)
+        clearance = (float(-x[0]), "sticks 0") if x[0] < 0 else (math.inf, "")
+        return 0.5 * x + ab[0] - ab[1] ** 2, np.array([[0.5]]), crossings, clearance
+
+    problem = Problem(maps.ClosedMap(step, np.ones(1)), ("a", "b"), np.full(2, -1.0), np.full(2, 2.0))
+    first = first_point(Clearance(problem, 0), problem.pack(np.array([-0.02]), 0.24, 0.5))
+    for way, end in ((1.0, 1.0), (-1.0, -1.0)):
+        path = followed(first, way)
+        x, numbers = points(path)
+        assert np.abs(x).max() < CLOSE and numbers[:, 0] == pytest.approx(numbers[:, 1] ** 2, abs=CLOSE)
+        assert numbers[-1] == pytest.approx([1.0, end], abs=1e-6) and path.end == "the end of a number's range"
+
+
 def stopped(force, frequency=1.2, **orbit):
     """x'' + 0.1 x' + x = force sin(frequency t) below a stop at 1 with restitution 1/2."""
     return scene(
@@ -164,6 +182,33 @@ def test_impact_oscillator_grazes_where_its_linear_response_reaches_the_stop(sec
     # the orbit is followed at a clearance of 1e-7, with the round-off of that
     assert border.parameter == pytest.approx(reached * (border.second if "gap" in second else 1.0), rel=1e-8)
     assert sorted(border.second[[0, -1]]) == pytest.approx([0.9 * own, 1.1 * own])
+    assert (border.orbits == [1, 0]).all() and (border.stable_orbits == [1, 0]).all()
+
+
+@pytest.mark.slow
+def test_a_body_leaves_its_floor_where_that_falls_as_fast_as_the_body():
+    """It rests below gravity g and moves with the mass, whose acceleration reaches g there; then it bounces."""
+    g, mass, unit = 1.0, 0.1, 1 / (2 * math.pi)
+    data = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+        excitation={"frequency": 1.2 * unit, "force": 0.3}, gravity={"acceleration": g, "orientation_deg": 90.0},
+        cavity=[{"name": "c", "gap": 20.0}], damper=[
+            {"cavity": "c", "mass": mass, "restitution": 0.5, "position": -10.0}
+        ],
+        time={"periods": 300, "transient": 200},
+        orbit={
+            "parameter": "excitation.force", "to": 0.6, "step": 0.05, "max_step": 1.0, "min_step": 0.01,
+            "max_points": 6,
+            "track": {
+                "parameter": "excitation.frequency", "from": 1.1 * unit, "to": 1.3 * unit, "within": (0.1, 0.9),
+                "kinds": ["grazing"],
+            },
+        },
+    )  # fmt: skip
+    (border,) = orbits(data).borders
+    w = 2 * math.pi * border.second
+    assert sorted(w[[0, -1]]) == pytest.approx([1.1, 1.3])
+    assert border.parameter == pytest.approx(np.abs(1 - (1 + mass) * w**2 + 0.1j * w) * g / w**2, rel=1e-9)
     assert (border.orbits == [1, 0]).all() and (border.stable_orbits == [1, 0]).all()
 
 
