@@ -45,7 +45,7 @@ _ZERO = 1e-3
 class Point:
     """A point of a curve: a zero of a problem, and of the condition that a curve over two numbers has.
 
-    row: (k + m,) direction in which the curve is followed.
+    zero: the orbit; row: (k + m,) direction in which the curve is followed; given: the condition, of the point before.
     """
 
     problem: Problem
