@@ -58,7 +58,7 @@ class Life(Band):
     """what counts of a run: "amplitude_mean", mean of the peaks of its periods, or "amplitude_max", largest, without
     static deflection; with `limit` any quantity of results, such as "stress_von_mises", of several the largest"""
     limit: Positive | None = None
-    """value of the measure above which the damper is lost, in its unit in results; reductions are relative to it"""
+    """value of the measure above which the damper is lost; reductions are relative to it [its unit in results]"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     tolerance: _Ratio = 0.02
