@@ -1,45 +1,37 @@
-"""The record of a border: special points of branches over a second number of the scene."""
+"""The records of curves of orbits, and of a border: special points of branches over a second number of the scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Measured, table
-from vanedamp.files.record import Array, Columns, Rows, Unit
+from vanedamp.files.record import Array, Columns, Rows, Unit, declared, joined
+from vanedamp.files.store import frozen
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialPoint:
-    """A bifurcation, a change of the event sequence or the end of a branch."""
+class NamedPoint:
+    """A point of a curve of orbits at which something happens."""
 
     index: int
-    """of the branch's or border's point before it"""
-    parameter: Annotated[float, Unit("parameter")]
-    """there"""
+    """of the curve's point before it"""
     kind: str
-    """what it is: of a branch "fold", "period doubling", "neimark-sacker", "pitchfork", "grazing", "sequence" or "end"
-    (docs)"""
+    """what it is, a name of docs/orbits.md"""
     note: str
-    """what happens there"""
+    """more on that"""
     state: Annotated[np.ndarray, Array(("coordinate",))]
     """(k,) at the start of the period"""
+    parameter: Annotated[float, Unit("parameter")]
+    """the branches' number"""
 
 
 @dataclass(frozen=True, eq=False)
-class BorderPoint(SpecialPoint):
-    """A named point of a border: of codimension two, a change of the event sequence, an extremum."""
-
-    second: Annotated[float, Unit("second")]
-    """the second number"""
-
-
-@dataclass(frozen=True, eq=False)
-class Points(Measured):
-    """Orbits in the order in which they were followed: m states of k coordinates."""
+class Curve(Measured):
+    """A curve of m orbits with states of k coordinates, in order. All their quantities (results.md) are attributes."""
 
     periods: int
     """of the excitation that its orbits take"""
@@ -54,12 +46,51 @@ class Points(Measured):
     quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
     """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
 
+    @classmethod
+    def arrays(cls) -> dict[str, Array]:
+        """Return the layouts of its arrays over points."""
+        layouts = {name: layout for name, (_, layout) in declared(cls).items() if isinstance(layout, Array)}
+        return {name: layout for name, layout in layouts.items() if layout.dims[0] == "point"}
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, Any]], **others: Any) -> Self:
+        """Return the curve of some points, rows of values by the names of arrays, and of their quantities."""
+        arrays: dict[str, Any] = {
+            name: frozen([row[name] for row in rows], layout.dtype) for name, layout in cls.arrays().items()
+        }
+        return cls(quantities=stacked([row["quantities"] for row in rows]), **arrays, **others)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Its points one by one."""
+        return [
+            {name: getattr(self, name)[at] for name in self.arrays()}
+            | {"quantities": {name: values[at] for name, values in self.quantities.items()}}
+            for at in range(len(self.parameter))
+        ]
+
+
+def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+    """Return the quantities of points as arrays over them."""
+    rows: list[dict[str, np.ndarray]] = [
+        {name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points
+    ]  # fmt: skip
+    return {name: frozen(values, values.dtype) for name, values in joined(rows, [1] * len(rows)).items()}
+
 
 @dataclass(frozen=True, eq=False)
-class Border(Points):
-    """A border of m points, in order, over the branches' number and a second one.
+class BorderPoint(NamedPoint):
+    """A named point of a border: of codimension two, a change of the event sequence, an extremum."""
 
-    All quantities of its orbits (docs/reference/results.md) are attributes, but for exponents, of which one is zero.
+    second: Annotated[float, Unit("second")]
+    """the second one"""
+
+
+@dataclass(frozen=True, eq=False)
+class Border(Curve):
+    """A border: special points of branches over the branches' number and a second one.
+
+    Its orbits have no exponents, of which one is zero.
     """
 
     kind: str

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border, BorderPoint, SpecialPoint
-from vanedamp.coupling.orbits.border_newton import Place, place_of, solved
-from vanedamp.coupling.orbits.border_path import BorderPath, Named
-from vanedamp.coupling.orbits.branch import Branch, stacked
-from vanedamp.coupling.orbits.conditions import Clearance, Condition, Counts, Pair, Peak, Singular
+from vanedamp.coupling.orbits.border import Border
+from vanedamp.coupling.orbits.border_path import BorderPath
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
+from vanedamp.coupling.orbits.conditions import Clearance, Condition, Pair, Peak, Singular
+from vanedamp.coupling.orbits.curve import Point, beginning, near, regular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
-from vanedamp.coupling.orbits.surface import Surface
+from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.scene.orbit import Orbit as Table
-from vanedamp.files.store import frozen
 
 #: scaled distance of special points that lie on one border, and of a border's point from the special point it begins at
 _SAME, _NEAR = 1e-5, 1e-3
@@ -36,7 +36,7 @@ class _Candidate(NamedTuple):
     kind: str
     point: int
     parameter: float
-    begin: Callable[[], tuple[Surface, Place | None]]
+    begin: Callable[[], Point | None]
 
 
 class Borders:
@@ -66,19 +66,18 @@ class Borders:
         self.finished = list(borders)
 
     def follow(self, branches: Sequence[Branch], changed: Callable[[int, int], None]) -> None:
-        """Find all borders; changed: called with the number of places found and of those that there may be."""
+        """Find all borders; changed: called with the number of points found and of those that there may be."""
         for number, branch in enumerate(branches):
             for kind, at, parameter, begin in self._candidates(branch):
                 source = (number, at)
                 if any(border.source == source for border in self.finished):
                     continue  # of a checkpoint
-                surface, place = begin()
-                if place is None:
+                if (first := begin()) is None:
                     why = _UNCLEAR if kind in _CLEAR else ""
                     where = f"branch {number} at {self.table.parameter} = {parameter:.9g}"
                     self.notes.append(f"the {kind} of {where} cannot be followed{why}")
-                elif not self._known(kind, branch.periods, place.border):
-                    self._follow(kind, branch.periods, source, surface, place, changed)
+                elif not self._known(kind, branch.periods, first.exact):
+                    self._follow(kind, branch.periods, source, first, changed)
         if not self.finished and not self.notes:
             self.notes.append(f"orbit.track: the branches have none of {', '.join(self.track.kinds)}")
 
@@ -87,25 +86,25 @@ class Borders:
         return any((kind, periods) == (other, of) and np.abs(y - at).max() < _SAME for other, of, at in self._visited)
 
     def _follow(
-        self, kind: str, periods: int, source: tuple[int, int], surface: Surface, place: Place,
-        changed: Callable[[int, int], None],
-    ) -> None:  # fmt: skip
-        """Follow a border both ways from a place, as far as the ranges of the numbers allow."""
+        self, kind: str, periods: int, source: tuple[int, int], first: Point, changed: Callable[[int, int], None]
+    ) -> None:
+        """Follow a border both ways from a point, as far as the ranges of the numbers allow."""
         paths: list[BorderPath] = []
         before = sum(len(border.parameter) for border in self.finished)
         for way in (-1.0, 1.0):
-            path = BorderPath(surface, self.table, place._replace(tangent=way * place.tangent), self.own)
+            head = replace(first, row=way * first.tangent)
+            path = BorderPath(self.table, head, self.track.max_points, self.own)
             paths.append(path)
-            if not 0.0 <= self.own + _AHEAD * np.sign(path.head.tangent[-1]) <= 1.0:
-                path.end = "the end of a number's range"
+            if not 0.0 <= self.own + _AHEAD * np.sign(head.tangent[-1]) <= 1.0:
+                path.end = path.edge
             while not path.end:
-                path.advance(self.track.max_points)
-                done = before + sum(len(each.places) for each in paths)
+                path.advance()
+                done = before + sum(len(each.points) for each in paths)
                 changed(done, done + self.track.max_points)
-            if path.end.startswith("closed"):
+            if path.end == path.closed:
                 break
-        self._visited += [(kind, periods, y) for y in (place.border, *(y for path in paths for y in path.visits))]
-        self.finished.append(_border(kind, periods, source, surface, paths))
+        self._visited += [(kind, periods, y) for y in (first.exact, *(y for path in paths for y in path.visits))]
+        self.finished.append(_border(kind, periods, source, paths))
 
     # -- where borders begin
 
@@ -122,36 +121,35 @@ class Borders:
                 if a[i - 1] < a[i] >= a[i + 1] and sequence[i - 1] == sequence[i] == sequence[i + 1]:
                     yield _Candidate("peak", -1 - i, float(branch.parameter[i]), partial(self._peak, branch, i))
 
-    def _surface(self, branch: Branch, index: int, mirrored: bool = False) -> Surface:
-        """Return the surface of orbits around a regular one of a branch."""
-        nothing = np.zeros((len(self.map.scale), 0))
+    def _problem(self, branch: Branch, index: int, mirrored: bool = False) -> Problem:
+        """Return the problem of orbits around a regular one of a branch."""
         paths = (self.table.parameter, self.track.parameter)
-        surface = Surface(self.map.over(branch.periods), paths, self.origin, self.span, mirrored, nothing, nothing)
-        passage = surface.passage(self._at(surface, branch.state[index], float(branch.parameter[index])))
-        return surface if passage is None or mirrored else surface.neutral(surface.derivative(passage))
+        problem = Problem(self.map.over(branch.periods), paths, self.origin, self.span, mirrored)
+        passage = problem.passage(self._orbit(problem, branch, index))
+        return problem if passage is None or mirrored else problem.anchored(passage)
 
-    def _at(self, surface: Surface, state: np.ndarray, parameter: float) -> np.ndarray:
-        return surface.pack(state, np.array([parameter, self.second]))
+    def _orbit(self, problem: Problem, branch: Branch, index: int) -> np.ndarray:
+        return problem.pack(branch.state[index], float(branch.parameter[index]), self.second)
 
-    def _smooth(self, branch: Branch, point: SpecialPoint) -> tuple[Surface, Place | None]:
-        """Return the first place of a fold, pitchfork, doubling or Neimark-Sacker border."""
+    def _smooth(self, branch: Branch, point: SpecialPoint) -> Point | None:
+        """Return the first point of a fold, pitchfork, doubling or Neimark-Sacker border."""
         mirrored = point.kind == "pitchfork" or (point.kind == "fold" and bool(branch.symmetric[point.index]))
-        surface, neutral = self._surface(branch, point.index, mirrored), int(branch.neutral[point.index])
-        y = self._at(surface, point.state, point.parameter)
-        passage = surface.passage(y)
+        problem, neutral = self._problem(branch, point.index, mirrored), int(branch.neutral[point.index])
+        y = problem.pack(point.state, point.parameter, self.second)
+        passage = problem.passage(y)
         if passage is None or (mirrored and neutral):
-            return surface, None
+            return None
         condition: Condition
         if point.kind == "neimark-sacker":
-            values = decided(multipliers(surface.derivative(passage))[0], neutral)
+            values = decided(multipliers(problem.derivative(passage))[0], neutral)
             turning = values[np.abs(values.imag) > 0.0]
-            condition = Pair(surface, neutral, 2 * float(turning[np.argmin(np.abs(np.abs(turning) - 1.0))].real))
+            condition = Pair(problem, neutral, 2 * float(turning[np.argmin(np.abs(np.abs(turning) - 1.0))].real))
         else:
-            condition = Singular.of(surface, point.kind, neutral, passage)
-        return surface, self._first(surface, condition, y)
+            condition = Singular.of(problem, point.kind, neutral, passage)
+        return first_point(condition, y)
 
-    def _clear(self, branch: Branch, point: SpecialPoint) -> tuple[Surface, Place | None]:
-        """Return the first place of a border where an event grazes, from orbits without it.
+    def _clear(self, branch: Branch, point: SpecialPoint) -> Point | None:
+        """Return the first point of a border where an event grazes, from orbits without it.
 
         None if they may be moved: where a body may rest anywhere, that decides how near it comes.
         """
@@ -159,69 +157,41 @@ class Borders:
         near = [index for index in near if not branch.neutral[index]]
         events = [len(str(branch.sequence[index]).split("; ")) - (not branch.sequence[index]) for index in near]
         for _, index in sorted(zip(events, near, strict=True)):
-            surface = self._surface(branch, index)
-            here = self._at(surface, point.state, point.parameter)
-            away = self._at(surface, branch.state[index], float(branch.parameter[index])) - here
+            problem = self._problem(branch, index)
+            here = problem.pack(point.state, point.parameter, self.second)
+            away = self._orbit(problem, branch, index) - here
             for way in _WAYS:
                 y = here + way * away
-                passage = surface.passage(y)
+                passage = problem.passage(y)
                 if passage is None or "; ".join(passage.sequence) != branch.sequence[index]:
                     continue
-                place = self._first(surface, Clearance(surface, 0), y)
-                if place is not None and np.abs(place.border - here)[-2:].max() < _NEAR:
-                    return surface, place
-        return self._surface(branch, point.index), None
+                first = first_point(Clearance(problem, 0), y)
+                if first is not None and np.abs(first.exact - here)[-2:].max() < _NEAR:
+                    return first
+        return None
 
-    def _peak(self, branch: Branch, index: int) -> tuple[Surface, Place | None]:
-        """Return the first place of a peak next to the largest of a branch's orbits."""
-        surface = self._surface(branch, index)
-        y, before, after = (
-            self._at(surface, branch.state[i], float(branch.parameter[i])) for i in (index, index - 1, index + 1)
-        )
-        return surface, self._first(surface, Peak(surface, int(branch.neutral[index]), (after - before)[:-1]), y)
-
-    def _first(self, surface: Surface, condition: Condition, y: np.ndarray) -> Place | None:
-        """Return the place of a border near y at the branches' second number; None if there is none."""
-        row = np.eye(len(y))[-1]
-        passage = surface.passage(y)
-        near = None if passage is None else place_of(surface, condition, y, passage, row)
-        return None if near is None else solved(surface, near, y, row, 1.0)
+    def _peak(self, branch: Branch, index: int) -> Point | None:
+        """Return the first point of a peak next to the largest of a branch's orbits."""
+        problem = self._problem(branch, index)
+        y, before, after = (self._orbit(problem, branch, i) for i in (index, index - 1, index + 1))
+        return first_point(Peak(problem, int(branch.neutral[index]), (after - before)[:-1]), y)
 
 
-def _border(kind: str, periods: int, source: tuple[int, int], surface: Surface, paths: Sequence[BorderPath]) -> Border:
+def first_point(condition: Condition, y: np.ndarray) -> Point | None:
+    """Return the point of a border near y (k + 2,) at its second number; None if there is none."""
+    row = condition.problem.row()
+    beside = regular(beginning(condition.problem, y, row, condition))
+    return beside and regular(near(beside, y, row, 1.0))
+
+
+def _border(kind: str, periods: int, source: tuple[int, int], paths: Sequence[BorderPath]) -> Border:
     """Return the record of a border that was followed one way or both."""
     back, ahead = paths if len(paths) > 1 else (None, paths[0])
-    before = [] if back is None else back.places[:0:-1]
-    places = [*before, *ahead.places]
-    numbers = np.array([surface.numbers(place.border) for place in places])
-    special = [(len(before) + index, named) for index, named in ahead.named]
-    special += [] if back is None else [(len(before) - 1 - index, named) for index, named in back.named]
-    found = [multipliers(surface.derivative(place.passage))[0] for place in places]
-    counts = [_counts(place) for place in places]
-    return Border(
-        kind=kind, source=source, periods=periods, parameter=frozen(numbers[:, 0]), second=frozen(numbers[:, 1]),
-        state=frozen([surface.state(place.border) for place in places]),
-        multipliers=frozen([values**2 if surface.mirrored else values for values in found], complex),
-        quantities=stacked([_quantities(surface, place.y) for place in places]),
-        orbits=frozen([each.orbits for each in counts], int),
-        stable_orbits=frozen([each.stable for each in counts], int),
-        special=tuple(_point(surface, index, named) for index, named in sorted(special, key=lambda entry: entry[0])),
+    before = [] if back is None else back.points[:0:-1]
+    special = [replace(named, index=len(before) + named.index) for named in ahead.special]
+    special += [] if back is None else [replace(named, index=len(before) - 1 - named.index) for named in back.special]
+    return Border.of(
+        [*before, *ahead.points], kind=kind, source=source, periods=periods,
+        special=tuple(sorted(special, key=lambda named: named.index)),
         ends=("closed" if back is None else back.end, ahead.end),
     )  # fmt: skip
-
-
-def _quantities(surface: Surface, y: np.ndarray) -> dict[str, Any]:
-    return surface.at(*surface.numbers(y).tolist()).quantities(surface.state(y))
-
-
-def _point(surface: Surface, index: int, named: Named) -> BorderPoint:
-    parameter, second = surface.numbers(named.y).tolist()
-    return BorderPoint(index, parameter, named.kind, named.note, frozen(surface.state(named.y)), second)
-
-
-def _counts(place: Place) -> Counts:
-    """Return the orbits on both sides of a place, at smaller and larger values of the first number."""
-    surface, along = place.condition.surface, place.columns[:, 0] * np.sign(place.condition.surface.span[0])
-    state = np.linalg.lstsq(surface.deflated(place.passage), -along, rcond=None)[0]
-    rate = float(place.gradient @ np.concatenate([state, [np.sign(surface.span[0]), 0.0]]))
-    return place.condition.counts(place.passage, place.y, rate, along)

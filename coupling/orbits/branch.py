@@ -5,50 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border, Points, SpecialPoint
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.border import Border, Curve, NamedPoint
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES
 from vanedamp.coupling.quantities import stress as of_stress
 from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Ragged, Record, Rows, declared, joined
-from vanedamp.files.store import frozen
+from vanedamp.files.record import Array, Ragged, Record, Rows, joined
 
 
-class BranchPoint(NamedTuple):
-    """An orbit of a branch, as a branch keeps it: see Branch and Orbit."""
-
-    parameter: float
-    state: np.ndarray
-    multipliers: np.ndarray
-    neutral: int
-    stable: bool
-    sequence: str
-    symmetric: bool
-    undetermined: bool
-    quantities: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, orbit: Orbit) -> BranchPoint:
-        """Return an orbit as a branch keeps it."""
-        return cls(
-            orbit.parameter, orbit.state, orbit.multipliers, orbit.neutral, orbit.stable,
-            "; ".join(orbit.passage.sequence), orbit.symmetric, orbit.undetermined, orbit.quantities,
-        )  # fmt: skip
+class SpecialPoint(NamedPoint):
+    """A bifurcation, a change of the event sequence or the end of a branch."""
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Points):
-    """A branch of m orbits.
-
-    All quantities of its orbits (results.md) are attributes, arrays over the points, and so are their families.
-    """
+class Branch(Curve):
+    """A branch of orbits, in the order in which it was followed."""
 
     neutral: Annotated[np.ndarray, Array(("point",), dtype=int)]
     """(m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight"""
@@ -69,35 +46,10 @@ class Branch(Points):
     source_special: int = -1
     """number of its special point there"""
 
-    @classmethod
-    def of(
-        cls, points: Sequence[BranchPoint], periods: int, special: Sequence[SpecialPoint], end: str,
-        source: tuple[int, int] | None,
-    ) -> Branch:  # fmt: skip
-        """Return the branch of some points."""
-        columns = dict(zip(BranchPoint._fields, zip(*points, strict=True), strict=True))
-        quantities = stacked(columns.pop("quantities"))
-        layouts = {name: layout for name, (_, layout) in declared(cls).items() if isinstance(layout, Array)}
-        arrays: dict[str, Any] = {name: frozen(column, layouts[name].dtype) for name, column in columns.items()}
-        of_branch, of_special = source or (-1, -1)
-        return cls(
-            periods=periods, special=tuple(special), end=end, quantities=quantities, source_branch=of_branch,
-            source_special=of_special, **arrays,
-        )  # fmt: skip
-
     @property
     def source(self) -> tuple[int, int] | None:
         """The branch, and its special point, from which this one bifurcates; None for the first."""
         return None if self.source_branch < 0 else (self.source_branch, self.source_special)
-
-    @property
-    def points(self) -> list[BranchPoint]:
-        """Its orbits one by one."""
-        columns = (getattr(self, name) for name in BranchPoint._fields[:-1])
-        quantities = (
-            {name: values[at] for name, values in self.quantities.items()} for at in range(len(self.parameter))
-        )
-        return [BranchPoint(*entry) for entry in zip(*columns, quantities, strict=True)]
 
     def to_json(self) -> dict[str, Any]:
         """Return a summary as plain data."""
@@ -114,14 +66,6 @@ def unknown(branch: Branch) -> str:
     numbers = [values.reshape(len(values), -1) for name, values in branch.quantities.items() if not table()[name].text]
     count = int(np.isnan(np.hstack(numbers)).all(axis=1).sum()) if numbers else 0
     return f"{count} of {len(branch.parameter)} orbits have no quantities: {LEAVES}" if count else ""
-
-
-def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return the quantities of points as arrays over them."""
-    rows: list[dict[str, np.ndarray]] = [
-        {name: np.array([value], table()[name].dtype) for name, value in each.items()} for each in points
-    ]  # fmt: skip
-    return {name: frozen(values, values.dtype) for name, values in joined(rows, [1] * len(rows)).items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -204,7 +148,7 @@ class Branches(Measured, Record, Plotted):
         }  # fmt: skip
 
     @staticmethod
-    def _ends(parts: Sequence[Branch | Border], name: str) -> list[dict[str, Any]]:
+    def _ends(parts: Sequence[Curve], name: str) -> list[dict[str, Any]]:
         """Return the least and largest value of a quantity of each branch or border, of bodies and spots one each."""
         known = [part.quantities[name] for part in parts if name in part.quantities]
         ends = [{"min": np.fmin.reduce(values), "max": np.fmax.reduce(values)} for values in known]

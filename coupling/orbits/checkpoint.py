@@ -17,8 +17,8 @@ from vanedamp.files.store import Variable
 class Checkpoint(SceneCheckpoint):
     """What was found so far, in a file (path None: nowhere).
 
-    found: branches, whose last one is unfinished if its end is ""; tangent, step: where that one continues; current:
-    returns all three as they are now.
+    found: branches, whose last one is unfinished if its end is ""; head, step: where it continues (Diagram.place);
+    current: returns all three as they are now.
     """
 
     def __init__(
@@ -29,16 +29,16 @@ class Checkpoint(SceneCheckpoint):
         super().__init__(path, "orbits-checkpoint", scene, provenance)
         self._current = current
         self.found: Branches | None = None
-        self.tangent, self.step = np.zeros(0), 0.0
+        self.head, self.step = np.zeros(0), 0.0
         if (read := self.read()) is not None:
             variables, attributes = read
             self.found = Branches.of(variables, attributes, str(path))
-            self.tangent, self.step = variables["tangent"], float(attributes["step"])
+            self.head, self.step = variables["head"], float(attributes["step"])
 
     def content(self) -> tuple[Mapping[str, Variable], dict[str, Any], str]:
         """Return variables and attributes of the file, and how many points are found, in words."""
-        found, tangent, step = self._current()
+        found, head, step = self._current()
         points = sum(len(branch.parameter) for branch in found.branches)
-        variables = found.variables() | {"tangent": Variable(tangent, ("tangent_entry",))}
+        variables = found.variables() | {"head": Variable(head, ("head_row", "head_entry"))}
         attributes = found.attributes() | {"step": step}
         return variables, attributes, f"{points} points are found"

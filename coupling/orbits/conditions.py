@@ -8,7 +8,7 @@ Normal forms are those of maps (Kuznetsov 2004, Elements of Applied Bifurcation 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -17,13 +17,15 @@ from scipy.linalg import eigvals, solve, svd
 
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import decided, indicators
-from vanedamp.coupling.orbits.surface import Surface, difference
+from vanedamp.coupling.orbits.problem import Problem
 
 #: clearance, relative to its scale, up to which an orbit is followed that does not graze yet: the border itself is
 #: extrapolated, which leaves its square
 _LEVEL = 1e-7
 #: scaled steps of differences: of first derivatives for a normal form, of amplitudes, and of conditions
 _NORMAL_FORM, _AMPLITUDE, _STEP, _SMALL_STEP = 1e-4, 1e-5, 1e-7, 1e-2 * _LEVEL
+#: by which they are shortened where another motion lies within them
+_SHRINKS = (1.0, 1e-2, 1e-4)
 
 
 class Counts(NamedTuple):
@@ -35,12 +37,12 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """A condition on y of a surface, with as many neutral multipliers as its orbits have.
+    """A condition on orbits over two numbers, with as many neutral multipliers as its orbits have.
 
     step: of its differences; level: by which its zero is away from the border.
     """
 
-    surface: Surface
+    problem: Problem
     neutral: int
     kind: ClassVar[str]
     step: ClassVar[float] = _STEP
@@ -50,13 +52,17 @@ class Condition:
         """Return the function that vanishes; nan where it is none."""
         raise NotImplementedError
 
+    def slope(self, y: np.ndarray, passage: Passage, direction: np.ndarray) -> float:
+        """Return its derivative along a direction (k + 2,), by differences; nan where it is unknown."""
+        return difference(self.problem, self.value, y, passage, direction, self.step)
+
     def renewed(self, y: np.ndarray, passage: Passage) -> Condition:
         """Return the condition with what it refers to taken from a point of the border."""
         return self
 
     def multipliers(self, passage: Passage) -> np.ndarray:
         """Return the multipliers that are not known to have modulus 1."""
-        return decided(eigvals(self.surface.derivative(passage)), self.neutral)
+        return decided(eigvals(self.problem.derivative(passage)), self.neutral)
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
         """Return functions that vanish at points of codimension two, by their names: here of other multipliers."""
@@ -78,17 +84,17 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Singular(Condition):
-    """A multiplier of 1 or -1 of the surface's map, by kind; b, c: (k,) borders of the singular matrix."""
+    """A multiplier of 1 or -1 of the map, by kind; b, c: (k,) borders of the singular matrix."""
 
     kind: str  # type: ignore[misc]
     b: np.ndarray
     c: np.ndarray
 
     @classmethod
-    def of(cls, surface: Surface, kind: str, neutral: int, passage: Passage) -> Singular:
+    def of(cls, problem: Problem, kind: str, neutral: int, passage: Passage) -> Singular:
         """Return the condition by the singular vectors at a passage."""
-        nothing = np.zeros(surface.size)
-        found = cls(surface, neutral, kind, nothing, nothing)
+        nothing = np.zeros(problem.size)
+        found = cls(problem, neutral, kind, nothing, nothing)
         left, _, right = svd(found._matrix(passage))
         return replace(found, b=left[:, -1], c=right[-1])
 
@@ -99,12 +105,12 @@ class Singular(Condition):
 
     def _matrix(self, passage: Passage) -> np.ndarray:
         if self.unit > 0:
-            return self.surface.deflated(passage)
-        return self.surface.derivative(passage) + np.eye(self.surface.size)
+            return self.problem.by_state(passage)
+        return self.problem.derivative(passage) + np.eye(self.problem.size)
 
     def _solved(self, passage: Passage) -> tuple[np.ndarray, np.ndarray, float]:
         """Return right and left null vectors (k,) and what is left of them."""
-        size = self.surface.size
+        size = self.problem.size
         matrix = np.zeros((size + 1, size + 1))
         matrix[:-1, :-1], matrix[:-1, -1], matrix[-1, :-1] = self._matrix(passage), self.b, self.c
         right = solve(matrix, np.eye(size + 1)[-1])
@@ -128,10 +134,10 @@ class Singular(Condition):
         """
         right, left, _ = self._solved(passage)
         step = _NORMAL_FORM * np.append(right, (0.0, 0.0))
-        above, below = (self.surface.passage(y + way * step) for way in (1, -1))
+        above, below = (self.problem.passage(y + way * step) for way in (1, -1))
         if above is None or below is None or not above.sequence == below.sequence == passage.sequence:
             return np.nan
-        M, up, down = (self.surface.derivative(each) for each in (passage, above, below))
+        M, up, down = (self.problem.derivative(each) for each in (passage, above, below))
         second = (up - down) / (2 * _NORMAL_FORM)
         if self.unit > 0:
             return float(left @ second @ right / 2)
@@ -150,9 +156,9 @@ class Singular(Condition):
         rest = indicators(self.multipliers(passage), 0)
         product, form = float(left @ right), self._normal_form(y, passage)
         if self.unit > 0:
-            flip = "fold-pitchfork" if self.surface.mirrored else "fold-flip"
+            flip = "fold-pitchfork" if self.problem.mirrored else "fold-flip"
             found = {"cusp": form, "1:1 resonance": product, flip: rest.doubling}
-        elif self.surface.mirrored:
+        elif self.problem.mirrored:
             found = {"generalised pitchfork": form / product, "1:1 resonance": product, "fold-pitchfork": rest.unity}
         else:
             found = {"generalised doubling": form / product, "1:2 resonance": product, "fold-flip": rest.unity}
@@ -167,7 +173,7 @@ class Singular(Condition):
             larger = form * float(left @ along) < 0.0
             return Counts((0, 2), (0, inside)) if larger else Counts((2, 0), (inside, 0))
         inward, supercritical = -rate / product > 0.0, form / product > 0.0  # multiplier, by the first number
-        new = 2 if self.surface.mirrored else 1
+        new = 2 if self.problem.mirrored else 1
         own = (0, 1) if inward else (1, 0)
         # they are on the side where the others are unstable, if stable ones go out
         beside = own[::-1] if supercritical else own
@@ -244,26 +250,47 @@ class Peak(Condition):
 
     def _tangent(self, y: np.ndarray, passage: Passage) -> np.ndarray | None:
         """Return the unit tangent (k + 1,) of the branch; None where it is unknown."""
-        column = self.surface.columns(y, 1)
-        if column is None:
+        column = self.problem.by_numbers(y, 1)
+        if not np.isfinite(column).all():
             return None
-        tangent = svd(np.hstack([self.surface.deflated(passage), column]))[2][-1]
+        tangent = svd(np.hstack([self.problem.by_state(passage), column]))[2][-1]
         return np.asarray(tangent if tangent @ self.way > 0.0 else -tangent)
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the slope of the logarithm of the amplitude along the branch."""
-
-        def amplitude(at: np.ndarray) -> float | None:
-            other = self.surface.passage(at, False)
-            return float(other.peaks.mean()) if other is not None and other.sequence == passage.sequence else None
-
         mean, tangent = float(passage.peaks.mean()), self._tangent(y, passage)
-        if tangent is None:
+        if tangent is None or mean == 0.0:
             return np.nan
-        slope = difference(amplitude, y, np.append(tangent, 0.0), _AMPLITUDE, mean)
-        return np.nan if slope is None or mean == 0.0 else slope / mean
+        way = np.append(tangent, 0.0)
+        return difference(self.problem, _amplitude, y, passage, way, _AMPLITUDE, False) / mean
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
         """Return the condition with the branch at a passage."""
         way = self._tangent(y, passage)
         return self if way is None else replace(self, way=way)
+
+
+def _amplitude(y: np.ndarray, passage: Passage) -> float:
+    return float(passage.peaks.mean())
+
+
+def difference(
+    problem: Problem, function: Callable[[np.ndarray, Passage], float], y: np.ndarray, passage: Passage,
+    direction: np.ndarray, step: float, derivative: bool = True,
+) -> float:  # fmt: skip
+    """Return the derivative of a function of y and its passage along a direction (k + 2,), by central differences.
+
+    Steps shrink as long as the sequence of events is another one, or the function unknown, on a side; then one side
+    serves. nan where none does. derivative: whether the function needs that of passages.
+    """
+
+    def value(at: np.ndarray) -> float:
+        other = problem.passage(at, derivative)
+        return np.nan if other is None or other.sequence != passage.sequence else function(at, other)
+
+    for shrink in _SHRINKS:
+        h = shrink * step
+        sides = np.array([value(y + way * h * direction) for way in (1, -1)])
+        if np.isfinite(sides).all():
+            return float(sides[0] - sides[1]) / (2 * h)
+    return float(np.fmax.reduce((sides - function(y, passage)) / [h, -h]))

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
-from vanedamp.coupling.orbits.border import SpecialPoint
-from vanedamp.coupling.orbits.branch import Branch
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.continuation import Continuation
+from vanedamp.coupling.orbits.curve import Point, beginning
 from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space
-from vanedamp.coupling.orbits.newton import WAVE, OrbitStatus, Problem, solve
+from vanedamp.coupling.orbits.newton import WAVE, OrbitStatus, Zero, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
-from vanedamp.coupling.orbits.waves import find_wave
+from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.waves import find_wave, of_waves
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -63,16 +63,17 @@ class Diagram:
 
     @property
     def place(self) -> tuple[np.ndarray, float]:
-        """Tangent (k + 1,) and step with which the last branch continues."""
+        """Last y and row (2, k + 1), and step, with which the last branch continues."""
         if self.current is None:
-            return np.zeros(len(self.map.scale) + 1), 0.0
-        return self.current.head.tangent, self.current.step
+            return np.zeros((2, len(self.map.scale) + 1)), 0.0
+        head = self.current.head
+        return np.stack([head.y, head.row]), self.current.step
 
-    def resume(self, branches: Sequence[Branch], tangent: np.ndarray, step: float, iterations: int) -> None:
+    def resume(self, branches: Sequence[Branch], head: np.ndarray, step: float, iterations: int) -> None:
         """Take up what an interrupted search has found."""
         *self.finished, last = branches
         self._before = iterations
-        self.current = Continuation.resume(self._problem(last.periods), self.table, last, tangent, step)
+        self.current = Continuation.resume(self._problem(last.periods), self.table, last, head, step)
         if self.current is None:
             raise InputError("the last orbit of the checkpoint is none any more; delete the checkpoint to start again")
 
@@ -136,16 +137,16 @@ class Diagram:
         failed = dict[str, None]()
         for start in starts.candidates:
             problem = self._problem(start.periods)
-            row = problem.along_parameter
-            if self.table.wave:
-                orbit = replace(find_wave(problem.map, start.state), parameter=self.low)
+            row = problem.row()
+            if self.table.wave and self.to is None:
+                zero = Zero.of(problem, find_wave(problem.map, start.state), self.low)
             else:
-                orbit = solve(problem, problem.pack(start.state, self.low), row, np.zeros(problem.size))
-            problem.count["iterations"] += orbit.iterations
-            if orbit.status is OrbitStatus.OK:
-                return Continuation.begin(problem, self.table, orbit, row), list(failed)
-            failed[_MEANING[orbit.status]] = None
-            if orbit.status is OrbitStatus.UNDETERMINED and problem.map.travelling is not None:
+                zero = solve(problem, problem.pack(start.state, self.low), row)
+            problem.count["iterations"] += zero.iterations
+            if zero.status is OrbitStatus.OK:
+                return Continuation(self.table, Point(problem, zero, row)), list(failed)
+            failed[_MEANING[zero.status]] = None
+            if zero.status is OrbitStatus.UNDETERMINED and problem.map.travelling is not None:
                 failed[WAVE] = None
         return None, list(failed)
 
@@ -155,7 +156,11 @@ class Diagram:
         return 1.0 if self.to is None else self.to - self.low
 
     def _problem(self, periods: int) -> Problem:
-        return self.problems.setdefault(periods, Problem(self.map.over(periods), self.low, self._span))
+        if periods not in self.problems:
+            along = self.map.over(periods)
+            along = of_waves(along) if self.table.wave and self.to is not None else along
+            self.problems[periods] = Problem.along(along, self.low, self._span)
+        return self.problems[periods]
 
     def _known(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> bool:
         """Say whether a bifurcation's other branch was followed already, from here or to here."""
@@ -190,16 +195,14 @@ class Diagram:
         for quarters in range(_QUARTERS):
             step = self.table.step / 4.0**quarters
             start = y + step * row
-            if problem.passage(start) is None:
+            if (beside := beginning(problem, start, row)) is None:
                 continue
             # the slope at the bifurcation itself says nothing of the other branch
-            orbit = solve(problem, start, row, problem.slope(start))
-            problem.count["iterations"] += orbit.iterations
-            if orbit.status is OrbitStatus.OK:
-                onward = problem.pack(orbit.state, orbit.parameter) - y
-                if np.linalg.norm(onward) < 3 * step:
-                    row = onward / np.linalg.norm(onward)
-                    return Continuation.begin(problem, self.table, orbit, row, (number, place))
+            zero = solve(problem, start, row, beside.slopes)
+            problem.count["iterations"] += zero.iterations
+            onward = zero.y - y
+            if zero.status is OrbitStatus.OK and np.linalg.norm(onward) < 3 * step:
+                return Continuation(self.table, Point(problem, zero, onward / np.linalg.norm(onward)), (number, place))
         self.notes.append(
             f"no orbit found on the other branch at the {point.kind} at {self.table.parameter} = {point.parameter:.9g}"
         )

@@ -103,7 +103,7 @@ def orbits(
 
     with Checkpoint(checkpoint, scene, data, lambda: (found(), *diagram.place)) as kept:
         if kept.found is not None:
-            diagram.resume(kept.found.branches, kept.tangent, kept.step, kept.found.iterations)
+            diagram.resume(kept.found.branches, kept.head, kept.step, kept.found.iterations)
             if borders is not None:
                 borders.resume(kept.found.borders)
 

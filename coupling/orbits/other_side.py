@@ -17,19 +17,10 @@ from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
+from vanedamp.coupling.orbits.curve import Point, beginning, corrected, near, reached
 from vanedamp.coupling.orbits.multipliers import null_space
-from vanedamp.coupling.orbits.newton import (
-    Orbit,
-    Point,
-    Problem,
-    at_parameter,
-    bordered,
-    corrected,
-    least_squares,
-    near,
-    point_of,
-    reached,
-)
+from vanedamp.coupling.orbits.newton import least_squares
+from vanedamp.coupling.orbits.problem import Problem
 
 #: note on a body that reaches a wall and has free travel on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
@@ -49,21 +40,17 @@ class OtherSide:
 
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
-        sequence = last.orbit.passage.sequence
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)
-            if passage is None:
-                continue
-            if passage.sequence != sequence:
-                orbit = self._beside(last, y, passage)
-                if orbit is not None:
-                    away = self.problem.pack(orbit.state, orbit.parameter) - last.y
-                    return point_of(self.problem, orbit, away / np.linalg.norm(away)), ""
+            if passage is not None and passage.sequence != last.passage.sequence:
+                point = self._beside(last, y, passage)
+                if point is not None:
+                    return replace(point, row=(point.y - last.y) / np.linalg.norm(point.y - last.y)), ""
         for factor in (1.0, 2.0, 4.0):
-            orbit = corrected(self.problem, last, factor * step)
-            if orbit is not None:
-                return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
+            point = corrected(last, factor * step)
+            if point is not None:
+                return point, f", stepped over by {factor * step:.2g}"
         return None, ""
 
     def past_the_start(self, last: Point) -> tuple[Point, list[Located]] | None:
@@ -72,65 +59,40 @@ class OtherSide:
         The branch is followed from where no event is near, to the end of the range at most. None where no event passes
         the start.
         """
-        periods = last.orbit.periods
-        times = self.problem.at(last.orbit.parameter).times(last.orbit.passage)
-        if not times or min(times[0], periods - times[-1]) > _AT_START:
+        times = self.problem.at(last.y).times(last.passage)
+        if not times or min(times[0], (length := self.problem.map.length) - times[-1]) > _AT_START:
             return None
-        apart = np.diff([*times, times[0] + periods])
-        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % periods
-        there = replace(self.problem, map=replace(self.problem.map, begin=later % 1.0, _earlier=[]))
-        head = self._moved(self.problem, last, there, later)
+        apart = np.diff([*times, times[0] + length])
+        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % length
+        begin = (self.problem.map.begin + later) % min(length, 1.0)
+        there = replace(self.problem, map=replace(self.problem.map, begin=begin, _earlier=[]), _maps={}, _passages={})
+        head = _moved(last, there, later)
         if head is None:
             return None
         found, step = list[Located](), self.step
         for _ in range(_STEPS):
-            point = reached(there, head, step)
+            point = reached(head, step)
             if point is None:
                 step /= 4
                 continue
-            for each in bifurcations(there, head, point):
-                moved = self._state(there, each.orbit.state, each.orbit.parameter, periods - later)
-                if moved is not None:
-                    own = self.problem.at(each.orbit.parameter)
-                    found.append(each._replace(orbit=replace(each.orbit, state=moved, map=own)))
-            before = (
-                bisect(there.at(each.orbit.parameter).times(each.orbit.passage), periods - later)
-                for each in (head, point)
-            )
+            for each in bifurcations(head, point):
+                y = _later(there, each.point.y, length - later)
+                if y is not None:
+                    own = replace(each.point, problem=self.problem, zero=each.point.zero._replace(y=y))
+                    found.append(each._replace(point=own))
+            before = (bisect(there.at(each.y).times(each.passage), length - later) for each in (head, point))
             passed = len(set(before)) > 1
             head = point
             if passed or not 0.0 < point.y[-1] < 1.0:
-                back = self._moved(there, point, self.problem, periods - later)
+                back = _moved(point, self.problem, length - later)
                 return None if back is None else (back, found)
         return None
-
-    def _moved(self, problem: Problem, point: Point, other: Problem, later: float) -> Point | None:
-        """Return a point of a problem as one of another, whose section is some periods later; None if it is lost."""
-        parameter = point.orbit.parameter
-        behind = point.y - _BEHIND * point.tangent
-        states = [
-            self._state(problem, problem.state(y), problem.parameter(y), later) for y in (point.y, behind)
-        ]  # fmt: skip
-        if states[0] is None or states[1] is None:
-            return None
-        y, before = other.pack(states[0], parameter), other.pack(states[1], problem.parameter(behind))
-        passage, row = other.passage(y), (y - before) / np.linalg.norm(y - before)
-        if passage is None:
-            return None
-        orbit = replace(point.orbit, state=states[0], passage=passage, map=other.at(parameter))
-        return point_of(other, orbit, row)
-
-    @staticmethod
-    def _state(problem: Problem, state: np.ndarray, parameter: float, later: float) -> np.ndarray | None:
-        """Return where a motion from a state (k,) is some periods later."""
-        found = problem.at(parameter).later(state, later)
-        return None if found is None else found[1]
 
     def passage(self, last: Point) -> Passage | None:
         """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
         for size in self.step * 10.0 ** np.arange(-6.0, 0.0):
             passage = self.problem.passage(last.y + size * last.tangent)
-            if passage is not None and passage.sequence != last.orbit.passage.sequence:
+            if passage is not None and passage.sequence != last.passage.sequence:
                 return passage
         return None
 
@@ -143,22 +105,22 @@ class OtherSide:
         y = self._amid(last.y, last)
         if y is None or np.linalg.norm(y - last.y) < self.min_step:
             return None
-        orbit = self._at_parameter(y, last)
-        if orbit is None:
+        point = self._at_parameter(y, last)
+        if point is None:
             return None
         tangent = last.tangent
         for ahead in (0.1 * self.step, 1e-3 * self.step):
             other = self._at_parameter(y + ahead * last.tangent, last)
-            moved = None if other is None else self._amid(self.problem.pack(other.state, other.parameter), last)
+            moved = None if other is None else self._amid(other.y, last)
             if moved is not None:
                 tangent = (moved - y) / np.linalg.norm(moved - y)
                 break
-        return point_of(self.problem, orbit, tangent)
+        return replace(point, row=tangent)
 
-    def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
-        """Return the orbit of the same sequence at the parameter of y; None if there is none."""
-        orbit = at_parameter(self.problem, y, last.slope)
-        return orbit if orbit is not None and orbit.passage.sequence == last.orbit.passage.sequence else None
+    def _at_parameter(self, y: np.ndarray, last: Point) -> Point | None:
+        """Return the point of the same sequence at the parameter of y; None if there is none."""
+        point = near(last, y, self.problem.row())
+        return point if point is not None and point.passage.sequence == last.passage.sequence else None
 
     def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
         """Return y with its neutral coordinates centred in its sequence's range; None for an orbit without any."""
@@ -168,28 +130,27 @@ class OtherSide:
 
             def stays(at: float, base: np.ndarray = base, direction: np.ndarray = direction) -> bool:
                 passage = self.problem.passage(base + at * direction)
-                return passage is not None and passage.sequence == last.orbit.passage.sequence
+                return passage is not None and passage.sequence == last.passage.sequence
 
             reaches = [_reach(stays, sign) for sign in (-1.0, 1.0)]
             if max(map(abs, reaches)) < _FARTHEST:
                 y = y + sum(reaches) / 2 * direction
         return y if len(neutral) else None
 
-    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Orbit | None:
-        """Return an orbit of another sequence that begins where the present one ends; None if none is found.
+    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Point | None:
+        """Return a point of another sequence that begins where the present one ends; None if none is found.
 
         y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
         measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
         orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). Terms of second order, as
         that distance, are a root along the tangent.
         """
-        problem, sequence = self.problem, last.orbit.passage.sequence
+        problem, sequence = self.problem, last.passage.sequence
         residual = problem.residual(y, passage)
         kick = float(np.linalg.norm(residual))
         if kick == 0.0:
             return None
-        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
-        alpha = least_squares(here, np.append(-residual / kick, 0.0))
+        alpha = least_squares(np.vstack([last.slopes, last.tangent]), np.append(-residual / kick, 0.0))
         length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
         for share in (1e-3, 1e-2, 1e-1, 1.0):
             measure = share * self.step / length
@@ -197,13 +158,10 @@ class OtherSide:
             distance = self._root(last, base, away * min(measure / kick, (measure / kick) ** 2), residual)
             if distance is None:
                 continue
-            start = base + distance * last.tangent
-            found = problem.passage(start)
-            if found is None:
-                continue
-            orbit = near(problem, start, alpha / length, problem.slope(start), 2 * length * measure)
-            if orbit is not None and orbit.passage.sequence != sequence:
-                return orbit
+            beside = beginning(problem, base + distance * last.tangent, alpha / length)
+            point = beside and near(beside, beside.y, beside.row, 2 * length * measure)
+            if point is not None and point.passage.sequence != sequence:
+                return point
         return None
 
     def _root(self, last: Point, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
@@ -222,6 +180,20 @@ class OtherSide:
                     return None
             distance *= 10
         return None
+
+
+def _moved(point: Point, other: Problem, later: float) -> Point | None:
+    """Return a point as one of another problem, whose section is some periods later; None if it is lost."""
+    y, before = (_later(point.problem, at, later) for at in (point.y, point.y - _BEHIND * point.tangent))
+    if y is None or before is None:
+        return None
+    return beginning(other, y, (y - before) / np.linalg.norm(y - before))
+
+
+def _later(problem: Problem, y: np.ndarray, later: float) -> np.ndarray | None:
+    """Return state and number (k + 1,) some periods later on the motion from y (k + 1,)."""
+    found = problem.at(y).later(problem.state(y), later)
+    return None if found is None else problem.pack(found[1], *problem.numbers(y))
 
 
 def _reach(stays: Callable[[float], bool], sign: float) -> float:

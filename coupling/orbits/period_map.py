@@ -35,6 +35,9 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
 
+#: periods before the end of a part that are at its end
+_AT_END = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class PeriodMap:
@@ -130,16 +133,27 @@ class PeriodMap:
         """Return the map of the same scene over another number of periods."""
         return replace(self, periods=periods)
 
+    @property
+    def length(self) -> float:
+        """Periods that a passage takes."""
+        return self.travelling.part if self.wave and self.travelling is not None else self.periods
+
     def times(self, passage: Passage) -> list[float]:
         """Return the times of a passage's events, in periods."""
         return [crossing.time * self.scene.frequency for crossing in passage.crossings]
 
     def later(self, state: np.ndarray, periods: float) -> tuple[PeriodMap, np.ndarray] | None:
-        """Return the map that begins some periods later, and where a motion from a state (k,) is then; or None."""
+        """Return the map that begins some periods later, and where a motion from a state (k,) is then; or None.
+
+        Waves begin within the first part of a period again, with their sectors shifted.
+        """
         _, reached = self._walk(state, math.ceil(periods), False, periods, True)
         if reached is None:
             return None
-        return replace(self, begin=(self.begin + periods) % 1.0, _earlier=[]), reached[0]
+        begin, there, symmetry = self.begin + periods, reached[0], self.travelling if self.wave else None
+        if symmetry is not None and begin > symmetry.part - _AT_END:
+            begin, there = begin - symmetry.part, symmetry.image @ there
+        return replace(self, begin=begin % 1.0, _earlier=[]), there
 
     def run(self, state: np.ndarray, events: bool = False, samples_per_period: int = 0) -> Response:
         """Return the run over the map's periods from a state (k,), arguments as in coupling.simulation.simulate."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Problem, least_squares, solve
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, least_squares, zero_of_map
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.files.toml_input import InputError
 
@@ -19,37 +19,50 @@ _CLOSED, _TOGETHER = 1e-6, 1e-9
 _BESIDE, _RESIDUAL, _STEPS = (1e-6, 1e-6, 1e-5, 1e-4), 1e-10, 40
 
 
-def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
-    """Return the travelling wave that Newton's method finds from a state (k,), or the last iterate and why it failed.
+def of_waves(period_map: PeriodMap) -> PeriodMap:
+    """Return the map of the part of a period in which a wave comes to the next sector.
 
-    Its steps take the part of a period in which the wave comes to the next sector; the result is an orbit over the
-    whole period, whose derivative is the product of the parts'. Raises InputError for a scene without that symmetry.
+    Raises InputError for a scene without that symmetry.
     """
-    symmetry = period_map.travelling
-    if symmetry is None or period_map.periods != 1:
+    if period_map.travelling is None or period_map.periods != 1:
         raise InputError(
             "orbit.wave: a wave travels over equal sectors with bodies in equal steps (cavities such as c@0, c@1), "
             "without mistuning or scatter, under one engine order that is no multiple of their number; over one period"
         )
-    problem = Problem(replace(period_map, wave=True, _earlier=[]))
-    begin = problem.pack(np.asarray(start, float), math.nan)
-    found = solve(problem, begin, problem.along_parameter, np.zeros(problem.size))
+    return replace(period_map, wave=True, _earlier=[])
+
+
+def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+    """Return the travelling wave that Newton's method finds from a state (k,), or the last iterate and why it failed.
+
+    Raises InputError for a scene without that symmetry.
+    """
+    wave = of_waves(period_map)
+    found = zero_of_map(wave, start)
     if found.status is not OrbitStatus.OK:
-        found = _from_beside(problem.map, np.asarray(start, float)) or found
+        found = _from_beside(wave, np.asarray(start, float)) or found
     if found.status is not OrbitStatus.OK:
         return found
-    passage, own = period_map(found.state, derivative=False), found.passage
-    missed = float(np.abs((passage.state - found.state) / found.scale).max(initial=0.0))
-    if not missed < _CLOSED * (1.0 + float(np.abs(found.state / found.scale).max(initial=0.0))):
-        return replace(found, status=OrbitStatus.NOT_CONVERGED, residual=missed, map=period_map)
+    orbit = whole(found)
+    if not orbit.residual < _CLOSED * (1.0 + float(np.abs(found.state / found.scale).max(initial=0.0))):
+        return replace(found, status=OrbitStatus.NOT_CONVERGED, residual=orbit.residual, map=orbit.map)
+    return orbit
+
+
+def whole(wave: Orbit) -> Orbit:
+    """Return an orbit of a map of waves as one over the whole period, whose derivative is the product of the parts'."""
+    assert wave.map is not None and wave.map.travelling is not None
+    symmetry, period_map = wave.map.travelling, replace(wave.map, wave=False, _earlier=[])
+    passage, own = period_map(wave.state, derivative=False), wave.passage
+    missed = float(np.abs((passage.state - wave.state) / wave.scale).max(initial=0.0))
     # (image part)^times is the whole period, with the sectors shifted all the way round or by a period of the loads
     back, step = np.linalg.inv(symmetry.image), own.derivative
     derivative = np.linalg.matrix_power(back, symmetry.times) @ np.linalg.matrix_power(step, symmetry.times)
     status, times = own.status, [crossing.time for crossing in passage.crossings]
-    if status is PassageStatus.OK and np.any(np.diff(times) < _TOGETHER * times[-1]):
+    if status is PassageStatus.OK and np.any(np.diff(times) < _TOGETHER * max(times, default=0.0)):
         status = PassageStatus.COINCIDENT
-    whole = passage._replace(derivative=derivative, status=status, clearance=own.clearance)
-    return replace(found, passage=whole, residual=max(missed, found.residual), map=period_map)
+    together = passage._replace(derivative=derivative, status=status, clearance=own.clearance)
+    return replace(wave, passage=together, residual=max(missed, wave.residual), map=period_map)
 
 
 def _from_beside(wave: PeriodMap, start: np.ndarray) -> Orbit | None:

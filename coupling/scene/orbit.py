@@ -41,7 +41,7 @@ class Orbit:
     start: Literal["run", "linear"] = "run"
     """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
     wave: bool = False
-    """find the travelling wave of a tuned ring, in which each sector does the same one phase later: a single orbit"""
+    """find the travelling wave of a tuned ring, in which each sector does the same one phase later"""
     parameter: str = "excitation.frequency"
     """dotted path of the number that changes along the branch"""
     from_: Annotated[Real | None, Field(alias="from")] = None
@@ -70,8 +70,8 @@ class Orbit:
             raise ValueError("to: say where the branch that begins at `from` ends, or leave `from` out")
         if self.to is not None and self.to == self.from_:
             raise ValueError(f"to ({self.to:g}) must differ from `from`")
-        if self.wave and (self.to is not None or (self.periods or 1) != 1):
-            raise ValueError("wave: is found over one period, and not followed; leave `to` and `periods` out")
+        if self.wave and (self.switch or self.track is not None or (self.periods or 1) != 1):
+            raise ValueError("wave: one takes a period, and is followed alone; leave `periods`, `switch`, `track` out")
         if self.track is not None and self.to is None:
             raise ValueError("track: special points are those of a branch; give `to`")
         within = None if self.track is None else self.track.within

@@ -31,6 +31,7 @@ class ClosedMap:
     lowest: float = -math.inf
     numbers: tuple[str, ...] = ()
     parameter: str = "value"
+    wave: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,14 +65,14 @@ class ClosedMap:
         return np.array(columns).T
 
     def at(self, value: float) -> ClosedMap:
-        if value < self.lowest:
-            raise InputError(f"scene: value: {self.lowest:g} is the least")
-        return replace(self, value=value)
+        return self.with_numbers({self.parameter: value})
 
     def with_numbers(self, values: dict[str, float]) -> ClosedMap:
-        """Return the map at a value, or at two values, a tuple of them."""
-        first, *others = values.values()
-        return replace(self, value=(first, *others)) if others else self.at(first)
+        """Return the map at a value, or at a tuple of two."""
+        first, *more = values.values()
+        if first < self.lowest:
+            raise InputError(f"scene: value: {self.lowest:g} is the least")
+        return replace(self, value=(first, *more) if more else first)
 
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
@@ -157,6 +158,7 @@ class ImpactOscillator:
     restitution: float = 0.8
     numbers: tuple[str, ...] = ()
     parameter: str = "value"
+    wave: bool = False
     names = ("x", "x rate")
     scale = np.ones(2)
 
@@ -164,7 +166,7 @@ class ImpactOscillator:
         return replace(self, value=value)
 
     def with_numbers(self, values: dict[str, float]) -> ImpactOscillator:
-        return self.at(*values.values())
+        return replace(self, value=values[self.parameter])
 
     def over(self, periods: int) -> ImpactOscillator:
         return replace(self, periods=periods)

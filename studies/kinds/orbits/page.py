@@ -13,8 +13,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.coupling.orbits.border import Border, SpecialPoint
-from vanedamp.coupling.orbits.branch import Branch, Branches
+from vanedamp.coupling.orbits.border import Border
+from vanedamp.coupling.orbits.branch import Branch, Branches, SpecialPoint
 from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.scene.units import unit_of

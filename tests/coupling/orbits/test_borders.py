@@ -11,12 +11,12 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools import closed_maps as maps
 from tests.tools.closed_form_scenes import scene
-from vanedamp.coupling.orbits.border_newton import place_of, solved
 from vanedamp.coupling.orbits.border_path import BorderPath
+from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.branch import Branches
-from vanedamp.coupling.orbits.conditions import Pair, Singular
+from vanedamp.coupling.orbits.conditions import Clearance, Pair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
-from vanedamp.coupling.orbits.surface import Surface
+from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -25,34 +25,34 @@ CLOSE, NAMED = 1e-10, 1e-7
 TABLE = Table(**{"from": 0.0, "to": 1.0, "step": 0.01, "max_step": 0.05})
 
 
-def followed(function, size, start, numbers, kind, low, high):
-    """The path of a border of a map through a state and two numbers, both of which range from low to high."""
-    span = high - low
-    surface = Surface(
-        maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, span),
-        left=np.zeros((size, 0)), right=np.zeros((size, 0)),
-    )  # fmt: skip
-    y = surface.pack(np.array(start, float), np.array(numbers, float))
-    passage = surface.passage(y)
+def begun(function, size, start, numbers, kind, low, high):
+    """The first point of a border of a map near a state and two numbers, both of which range from low to high."""
+    problem = Problem(maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, high - low))
+    y = problem.pack(np.array(start, float), *numbers)
+    passage = problem.passage(y)
     pair = np.linalg.eigvals(passage.derivative)
-    condition = Pair(surface, 0, pair.sum().real) if kind == "pair" else Singular.of(surface, kind, 0, passage)
-    row = np.eye(len(y))[-1]
-    first = solved(surface, place_of(surface, condition, y, passage, row), y, row, 1.0)
-    path = BorderPath(surface, TABLE, first, float(y[-1]))
+    return first_point(
+        Pair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage), y
+    )
+
+
+def followed(first, way=1.0):
+    """The path of a border from a point on in the direction of larger second numbers, or the other."""
+    path = BorderPath(TABLE, replace(first, row=way * first.tangent), 500, float(first.y[-1]))
     while not path.end:
-        path.advance(500)
-    return surface, path
+        path.advance()
+    return path
 
 
-def named(surface, path):
+def named(path):
     """The named points by their kinds: numbers (2,) of each."""
-    return {point.kind: surface.numbers(point.y) for _, point in path.named}
+    return {point.kind: np.array([point.parameter, point.second]) for point in path.special}
 
 
-def points(surface, path):
+def points(path):
     """States and numbers along a path."""
-    y = [place.border for place in path.places]
-    return np.array([surface.state(at) for at in y]), np.array([surface.numbers(at) for at in y])
+    states, *numbers = (np.array([row[name] for row in path.points]) for name in ("state", "parameter", "second"))
+    return states, np.transpose(numbers)
 
 
 def test_a_fold_passes_its_cusp():
@@ -62,16 +62,14 @@ def test_a_fold_passes_its_cusp():
         a, b = ab
         return [x[0] + a + b * x[0] - x[0] ** 3, 0.5 * x[1] + 0.1 * x[0]], [[1 + b - 3 * x[0] ** 2, 0], [0.1, 0.5]]
 
-    surface, path = followed(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
+    first = begun(cusp, 2, [-0.5, -0.1], [0.25, 0.75], "fold", -1.0, 1.0)
     # towards larger b the border ends at b = 1; the other way it passes the cusp
-    back = BorderPath(surface, TABLE, path.places[0]._replace(tangent=-path.places[0].tangent), 0.875)
-    while not back.end:
-        back.advance(500)
-    x, numbers = points(surface, back)
+    path, back = followed(first), followed(first, -1.0)
+    x, numbers = points(back)
     assert numbers[:, 1] == pytest.approx(3 * x[:, 0] ** 2, abs=CLOSE)
     assert numbers[:, 0] == pytest.approx(-2 * x[:, 0] ** 3, abs=CLOSE)
-    assert named(surface, back).keys() == {"cusp"}
-    assert named(surface, back)["cusp"] == pytest.approx([0.0, 0.0], abs=NAMED)
+    assert named(back).keys() == {"cusp"}
+    assert named(back)["cusp"] == pytest.approx([0.0, 0.0], abs=NAMED)
     assert back.end == path.end == "the end of a number's range"
     assert len(back.visits) == 1  # the other fold at b = 3/4
 
@@ -83,10 +81,10 @@ def test_a_doubling_turns_from_soft_to_hard():
         a, b = ab
         return [-(1 + a) * x[0] + b * x[0] ** 3 + x[0] ** 5], [[-(1 + a) + 3 * b * x[0] ** 2 + 5 * x[0] ** 4]]
 
-    surface, path = followed(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0)
-    assert np.abs(points(surface, path)[1][:, 0]).max() < CLOSE
-    assert named(surface, path).keys() == {"generalised doubling"}
-    assert named(surface, path)["generalised doubling"] == pytest.approx([0.0, 0.0], abs=NAMED)
+    path = followed(begun(flip, 1, [0.0], [0.0, -0.9], "period doubling", -1.0, 1.0))
+    assert np.abs(points(path)[1][:, 0]).max() < CLOSE
+    assert named(path).keys() == {"generalised doubling"}
+    assert named(path)["generalised doubling"] == pytest.approx([0.0, 0.0], abs=NAMED)
 
 
 def test_a_fold_meets_a_doubling_and_a_double_multiplier():
@@ -97,8 +95,8 @@ def test_a_fold_meets_a_doubling_and_a_double_multiplier():
         derivative = [[1, 1, 0], [2 * x[0], 1 + b, 0], [0, 0, -(0.5 + b)]]
         return [x[0] + x[1], x[1] + a + b * x[1] + x[0] ** 2, -(0.5 + b) * x[2]], derivative
 
-    surface, path = followed(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0)
-    found = named(surface, path)
+    path = followed(begun(map_, 3, [0.0] * 3, [0.0, -0.7], "fold", -1.0, 1.0))
+    found = named(path)
     assert found["1:1 resonance"] == pytest.approx([0.0, 0.0], abs=NAMED)
     assert found["fold-flip"] == pytest.approx([0.0, 0.5], abs=NAMED)
     assert path.end == "the end of a number's range"
@@ -113,10 +111,28 @@ def test_a_pair_on_the_unit_circle_passes_strong_resonances():
         turn = (1 + a) * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
         return turn @ x * (1 - r2), turn @ ((1 - r2) * np.eye(2) - 2 * np.outer(x, x))
 
-    surface, path = followed(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6)
-    found = named(surface, path)
+    path = followed(begun(turned, 2, [0.0, 0.0], [0.0, 0.2], "pair", -0.6, 0.6))
+    found = named(path)
     assert found["1:4 resonance"] == pytest.approx([0.0, 0.25], abs=NAMED)
     assert found["1:3 resonance"] == pytest.approx([0.0, 1 / 3], abs=NAMED)
+
+
+def test_the_sequence_of_events_changes_along_its_closed_form():
+    """x/2 + a - b^2 has the orbit 2 (a - b^2), and a body sticks for x > 0: from the side where none does."""
+
+    def step(x, ab):
+        ab = np.atleast_1d(ab)
+        crossings = () if x[0] < 0 else (maps.Crossing(0.5, "sticks 0", float(x[0]), 0.0),)
+        clearance = (float(-x[0]), "sticks 0") if x[0] < 0 else (math.inf, "")
+        return 0.5 * x + ab[0] - ab[1] ** 2, np.array([[0.5]]), crossings, clearance
+
+    problem = Problem(maps.ClosedMap(step, np.ones(1)), ("a", "b"), np.full(2, -1.0), np.full(2, 2.0))
+    first = first_point(Clearance(problem, 0), problem.pack(np.array([-0.02]), 0.24, 0.5))
+    for way, end in ((1.0, 1.0), (-1.0, -1.0)):
+        path = followed(first, way)
+        x, numbers = points(path)
+        assert np.abs(x).max() < CLOSE and numbers[:, 0] == pytest.approx(numbers[:, 1] ** 2, abs=CLOSE)
+        assert numbers[-1] == pytest.approx([1.0, end], abs=1e-6) and path.end == "the end of a number's range"
 
 
 def stopped(force, frequency=1.2, **orbit):
@@ -166,6 +182,33 @@ def test_impact_oscillator_grazes_where_its_linear_response_reaches_the_stop(sec
     # the orbit is followed at a clearance of 1e-7, with the round-off of that
     assert border.parameter == pytest.approx(reached * (border.second if "gap" in second else 1.0), rel=1e-8)
     assert sorted(border.second[[0, -1]]) == pytest.approx([0.9 * own, 1.1 * own])
+    assert (border.orbits == [1, 0]).all() and (border.stable_orbits == [1, 0]).all()
+
+
+@pytest.mark.slow
+def test_a_body_leaves_its_floor_where_that_falls_as_fast_as_the_body():
+    """It rests below gravity g and moves with the mass, whose acceleration reaches g there; then it bounces."""
+    g, mass, unit = 1.0, 0.1, 1 / (2 * math.pi)
+    data = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+        excitation={"frequency": 1.2 * unit, "force": 0.3}, gravity={"acceleration": g, "orientation_deg": 90.0},
+        cavity=[{"name": "c", "gap": 20.0}], damper=[
+            {"cavity": "c", "mass": mass, "restitution": 0.5, "position": -10.0}
+        ],
+        time={"periods": 300, "transient": 200},
+        orbit={
+            "parameter": "excitation.force", "to": 0.6, "step": 0.05, "max_step": 1.0, "min_step": 0.01,
+            "max_points": 6,
+            "track": {
+                "parameter": "excitation.frequency", "from": 1.1 * unit, "to": 1.3 * unit, "within": (0.1, 0.9),
+                "kinds": ["grazing"],
+            },
+        },
+    )  # fmt: skip
+    (border,) = orbits(data).borders
+    w = 2 * math.pi * border.second
+    assert sorted(w[[0, -1]]) == pytest.approx([1.1, 1.3])
+    assert border.parameter == pytest.approx(np.abs(1 - (1 + mass) * w**2 + 0.1j * w) * g / w**2, rel=1e-9)
     assert (border.orbits == [1, 0]).all() and (border.stable_orbits == [1, 0]).all()
 
 

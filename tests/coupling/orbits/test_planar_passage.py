@@ -15,7 +15,8 @@ from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.engine.plane.planar_run import PlanarRun
-from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
+from vanedamp.coupling.orbits.branch import Branch, Branches
+from vanedamp.coupling.orbits.continuation import kept
 from vanedamp.coupling.orbits.multipliers import decided
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.period_map import period_map
@@ -353,10 +354,8 @@ def test_an_orbit_without_derivative_is_not_called_stable():
     tilted[found.names.index("body 0 tilt")] += 1e-9
     assert np.abs(found(tilted).state - orbit.state).max() > 1e-3
     assert orbit.undetermined and not orbit.stable
-    point = BranchPoint.of(orbit)
-    branches = Branches(
-        replace(found.scene, orbit=Orbit()), found.names, found.scale, (Branch.of([point], 1, (), "", None),), 0
-    )  # fmt: skip
+    branch = Branch.of([kept(orbit)], periods=1, special=(), end="")
+    branches = Branches(replace(found.scene, orbit=Orbit()), found.names, found.scale, (branch,), 0)
     told = branches.to_json()["branches"][0]
     assert (told["stable_points"], told["undetermined_points"]) == (0, 1)
     names = {trace.name for trace in branches_figure(branches, {}).data if trace.name}

@@ -12,7 +12,8 @@ from tests.tools.closed_form_scenes import ball, scene
 from tests.tools.rings import Chain
 from vanedamp.coupling.exponents.lyapunov import lyapunov
 from vanedamp.coupling.orbits import newton
-from vanedamp.coupling.orbits.branch import Branches, stacked, unknown
+from vanedamp.coupling.orbits.border import stacked
+from vanedamp.coupling.orbits.branch import Branches, unknown
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES, NOT_IN_ORBITS
 from vanedamp.coupling.orbits.orbits import find_orbit, orbit_at, orbits
 from vanedamp.coupling.orbits.period_map import period_map
@@ -140,13 +141,13 @@ def test_a_branch_keeps_the_quantities_of_its_orbits_and_files_keep_them(data, f
     (branch,) = found.branches
     assert len(branch.parameter) == 3 and branch.wear_work_rate.shape == (3,) and branch.energy_share.shape == (3, 4)
     assert branch.wear.keys() == {name for name, one in table().items() if one.family == "wear"}
-    (last,) = branch.points[2:]
+    (last,) = branch.rows[2:]
     single = find_orbit(
-        data.replace({"excitation.frequency": float(last.parameter), "orbit.from": float(last.parameter)})
+        data.replace({"excitation.frequency": float(last["parameter"]), "orbit.from": float(last["parameter"])})
     )
     for name, value in single.quantities.items():
         if name != "energy_residual" and not table()[name].text:
-            assert last.quantities[name] == pytest.approx(value, rel=1e-6, nan_ok=True), name
+            assert last["quantities"][name] == pytest.approx(value, rel=1e-6, nan_ok=True), name
     found.save(tmp_path / "orbits.h5")
     read = Branches.load(tmp_path / "orbits.h5")
     for name, values in found.quantities.items():
@@ -187,7 +188,7 @@ def test_quantities_of_an_orbit_that_no_run_stays_on_are_unknown():
         assert longer["amplitude_rms"] == pytest.approx(orbit.amplitude_rms, rel=1e-6)
     assert 1e6 < growth ** given[-1] < 1e12
     assert all(np.isnan(value).all() for name, value in longer.items() if not table()[name].text)
-    lost = stacked([*(point.quantities for point in branch.points[:-1]), longer])
+    lost = stacked([*(row["quantities"] for row in branch.rows[:-1]), longer])
     assert unknown(branch) == ""
     assert unknown(replace(branch, quantities=lost)) == f"1 of 8 orbits have no quantities: {LEAVES}"
 

@@ -7,9 +7,15 @@ import pytest
 
 import vanedamp as vd
 from tests.tools.rings import Chain
+from vanedamp.coupling.orbits.continuation import Continuation
+from vanedamp.coupling.orbits.curve import Point
 from vanedamp.coupling.orbits.newton import find_orbit as newton_orbit
+from vanedamp.coupling.orbits.newton import solve
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.waves import of_waves
+from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.in_memory import file_of
 
@@ -141,8 +147,53 @@ def test_mistuned_rings_and_loads_in_phase_have_no_wave():
     assert period_map(ring(5, 1)).travelling is not None
 
 
-def test_a_wave_is_one_orbit_of_one_period():
-    with pytest.raises(InputError, match="wave: is found over one period"):
-        ring(5, 1, to=400.0)
+def test_a_wave_takes_one_period_and_is_followed_alone():
+    with pytest.raises(InputError, match="wave: one takes a period, and is followed alone"):
+        ring(5, 1, switch=True)
     branches = orbits(ring(5, 1, periods=1500))
     assert len(branches.branches) == 1 and len(branches.branches[0].parameter) == 1
+
+
+def test_a_branch_of_waves_is_that_of_the_long_run_and_of_orbits_of_whole_periods(tmp_path):
+    scene = ring_scene(tmp_path / "ring.h5", 5, 2, 600)
+    table = {"parameter": "excitation.force", "to": 24.0, "step": 0.5, "max_step": 1.0, "max_points": 3}
+    (branch,) = orbits(scene.replace({f"orbit.{name}": value for name, value in table.items()})).branches
+    assert branch.stable.all() and not branch.undetermined.any() and branch.end == "max_points (3) reached"
+    force = float(branch.parameter[-1])
+    response = vd.simulate(scene.replace({"excitation.force": force}))
+    assert branch.amplitude_mean[-1] == pytest.approx(response.amplitude_mean, rel=1e-7)
+    assert branch.impacts_per_period[-1] == response.impacts_per_period
+    whole = newton_orbit(period_map(scene, "excitation.force").at(force), branch.state[-1])
+    assert np.abs(whole.state - branch.state[-1]).max() < 1e-10 * np.abs(whole.state).max()
+    assert np.abs(branch.multipliers[-1]) == pytest.approx(np.abs(whole.multipliers), abs=1e-6)
+    # over a section amid a part it comes home: to the next sector
+    section, state = of_waves(whole.map).later(whole.state, 0.13)
+    home, state = section.later(state, section.length - 0.13)
+    assert home.begin == 0.0 and np.abs(state - whole.state).max() < 1e-12 * np.abs(state).max()
+
+
+@pytest.mark.slow
+def test_an_impact_passes_the_start_of_a_part_and_one_of_another_sector_its_end(tmp_path):
+    """The branch goes on, to orbits of whole periods."""
+    scene = ring_scene(tmp_path / "ring.h5", 5, 2, 600)
+    along, begin = period_map(scene, "excitation.force"), 0.0524171
+    section, state = of_waves(along).later(find_orbit(scene).state, begin)
+    problem, table = Problem.along(replace(section, _earlier=[]), 24.951, -0.005), {"from": 24.951, "to": 24.946}
+    found = solve(problem, problem.pack(state, 24.951), problem.row())
+    path = Continuation(
+        Table(**table, step=0.3, min_step=0.1, max_step=1.0, max_points=9), Point(problem, found, problem.row())
+    )
+    while not path.end:
+        path.advance()
+    branch = path.branch
+    (passes,) = [point for point in branch.special if "at the start of the period" in point.note]
+    assert "c@1.right.1, turns 1 left begins, impact c@4.right.4, turns 4 left ceases" in passes.note
+    force = float(branch.parameter[-1])
+    home = section.at(force).later(branch.state[-1], section.length - begin)[1]
+    whole = newton_orbit(along.at(force), home)
+    assert force < passes.parameter < 24.951 and np.abs(whole.state - home).max() < 1e-10 * np.abs(home).max()
+
+
+def test_a_wave_without_contact_is_an_orbit(tmp_path):
+    wave = find_orbit(ring_scene(tmp_path / "ring.h5", 5, 2, 50).replace({"excitation.force": 1e-3}))
+    assert wave.status == "ok" and wave.passage.sequence == ()

@@ -1,0 +1,365 @@
+"""Pseudo-arclength continuation of a curve: orbits over one number, or over two with a condition on them.
+
+A point is predicted along the tangent and corrected in the plane normal to it (Keller 1977). Events on the way are
+zeros of test functions, seen by their signs and located by their roots. Between events of the motion the period map is
+smooth, and so is a curve as long as the sequence of events along its orbits stays; where it ends is located from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.interpolate import barycentric_interpolate
+from scipy.linalg import svd
+from scipy.optimize import brentq
+
+from vanedamp.coupling.derivatives.passage import Passage, forecast
+from vanedamp.coupling.orbits.conditions import Condition
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Zero, least_squares, solve
+from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.waves import whole
+from vanedamp.coupling.scene.orbit import Orbit as Table
+
+#: corrections of a point before its step is shortened, which is better than many; how often one is halved; up to how
+#: many a step grows: without a condition, and with one, whose slopes are learnt on the way
+_EFFORT = ((8, 3, 3), (16, 10, 9))
+#: cosines of the angle between tangents from which steps grow, and are good enough
+_STRAIGHT, _BENT = 0.985, 0.9
+#: share of the numbers in a tangent below which it is at a turn of both
+_FLAT = 0.05
+#: distances by which a prediction is moved to where the sequence of events is still that of the condition
+_LIFTS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+#: relative error of numbers where an event is, or the sequence changes; and scaled one of a range's end
+_CLOSE, _EDGE = 1e-10, 1e-9
+#: attempts at the place of a change of sequence, at least every third one a bisection
+_ATTEMPTS = 120
+#: a test function that is larger than this fraction of its ends' at its root has jumped there, and has no zero
+_ZERO = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a curve: a zero of a problem, and of the condition that a curve over two numbers has.
+
+    zero: the orbit; row: (k + m,) direction in which the curve is followed; given: the condition, of the point before.
+    """
+
+    problem: Problem
+    zero: Zero
+    row: np.ndarray
+    given: Condition | None = None
+
+    @property
+    def y(self) -> np.ndarray:
+        """State and numbers (k + m,), scaled."""
+        return self.zero.y
+
+    @property
+    def passage(self) -> Passage:
+        """Of its orbit."""
+        return self.zero.passage
+
+    @cached_property
+    def condition(self) -> Condition | None:
+        """The condition with what it refers to taken from here."""
+        return None if self.given is None else self.given.renewed(self.y, self.passage)
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The record of its orbit."""
+        orbit = self.zero.orbit(self.problem)
+        return whole(orbit) if self.problem.map.wave else orbit
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Derivative (k, m) of the residual by the numbers; nan where it is unknown."""
+        return self.problem.by_numbers(self.y)
+
+    @cached_property
+    def gradient(self) -> np.ndarray:
+        """Gradient (k + m,) of the condition among orbits, by differences; nan where it is unknown."""
+        condition = self.condition
+        assert condition is not None
+        derivative = np.hstack([self.problem.by_state(self.passage), self.columns])
+        if not np.isfinite(derivative).all():
+            return np.full(len(self.y), np.nan)
+        plane = svd(derivative)[2][-2:]
+        found = plane.T @ [condition.slope(self.y, self.passage, direction) for direction in plane]
+        return found if found.any() else np.full(len(found), np.nan)
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Derivative (k, k + m) of the residual by y, and below it the unit gradient of the condition."""
+        columns = self.columns
+        if self.given is None and not np.isfinite(columns).all():
+            columns = np.zeros(columns.shape)
+        orbit = np.hstack([self.problem.by_state(self.passage), columns])
+        return orbit if self.given is None else np.vstack([orbit, self.gradient / np.linalg.norm(self.gradient)])
+
+    @cached_property
+    def tangent(self) -> np.ndarray:
+        """Unit tangent (k + m,) on the side of the row, without neutral coordinates; nan where it is unknown."""
+        if not np.isfinite(self.slopes).all():
+            return np.full(len(self.y), np.nan)
+        tangent = least_squares(np.vstack([self.slopes, self.row]), np.eye(len(self.y))[-1])
+        length = float(np.linalg.norm(tangent))
+        return tangent / length if length > 0.0 else self.row
+
+    @property
+    def exact(self) -> np.ndarray:
+        """State and numbers where the condition is exact, from which its zero may be away by its level."""
+        if self.condition is None or not self.condition.level:
+            return self.y
+        return np.asarray(self.y - self.condition.level * self.gradient / (self.gradient @ self.gradient))
+
+
+def near(head: Point, predicted: np.ndarray, row: np.ndarray, distance: float = np.inf) -> Point | None:
+    """Return the point of a head's curve in the plane through `predicted` (k + m,) normal to `row` (k + m,).
+
+    None if there is none within a distance. Without a condition it may have another sequence of events.
+    """
+    problem, condition, slopes = head.problem, head.condition, head.slopes
+    start, function = predicted, None
+    iterations, halvings, _ = _EFFORT[condition is not None]
+    if condition is not None:
+        size = float(np.linalg.norm(head.gradient))
+        for lift in _LIFTS:
+            start = predicted + lift * head.gradient / size
+            passage = problem.passage(start)
+            if passage is not None and passage.sequence == head.passage.sequence:
+                break
+        else:
+            return None
+
+        def function(y: np.ndarray, passage: Passage) -> float:
+            return condition.value(y, passage) / size
+
+    for _ in range(2):
+        zero = solve(problem, start, row, slopes, iterations, halvings, float(row @ predicted), function)
+        problem.count["iterations"] += zero.iterations
+        if zero.status is OrbitStatus.OK:
+            return Point(problem, zero, row, condition) if np.linalg.norm(zero.y - predicted) <= distance else None
+        # the slopes there, if the head's do not serve
+        if condition is not None or (beside := beginning(problem, predicted, row)) is None:
+            return None
+        if np.array_equal(beside.columns, head.columns):
+            return None
+        slopes = beside.slopes
+    return None
+
+
+def beginning(problem: Problem, y: np.ndarray, row: np.ndarray, condition: Condition | None = None) -> Point | None:
+    """Return a point from whose slopes a zero near it may be found; None if y has no passage."""
+    passage = problem.passage(y)
+    return None if passage is None else Point(problem, Zero(OrbitStatus.OK, y, passage, np.nan, 0), row, condition)
+
+
+def corrected(head: Point, step: float) -> Point | None:
+    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near."""
+    return near(head, head.y + step * head.tangent, head.tangent, abs(step))
+
+
+def reached(head: Point, step: float) -> Point | None:
+    """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none."""
+    point = corrected(head, step)
+    if point is None:
+        return None
+    for number in range(head.problem.size, len(head.y)):
+        y, edge = point.y, float(np.clip(point.y[number], 0.0, 1.0))
+        if y[number] != edge and 0.0 <= head.y[number] <= 1.0 and abs(head.y[number] - edge) > _EDGE:
+            ahead = y[number] - head.y[number]
+            start = head.y + (edge - head.y[number]) / ahead * (y - head.y)
+            start[number] = edge
+            point = near(head, start, np.copysign(1.0, ahead) * head.problem.row(number), step) or point
+    return regular(point)
+
+
+def regular(point: Point | None) -> Point | None:
+    """Return a point if its tangent is known, else None."""
+    return point if point is not None and np.isfinite(point.tangent).all() else None
+
+
+def located(
+    before: Point, after: Point, tests: Callable[[Point], Mapping[str, float]]
+) -> list[tuple[float, str, Point]]:
+    """Return arclengths, names and points of zeros of test functions between two points, in order."""
+    low, high, found = tests(before), tests(after), list[tuple[float, str, Point]]()
+    for name in [name for name in low if low[name] * high[name] < 0.0]:
+
+        def function(point: Point, name: str = name) -> float:
+            return tests(point)[name]
+
+        if (zero := _root(before, after, function, max(abs(low[name]), abs(high[name])))) is not None:
+            found.append((zero[0], name, zero[1]))
+    return sorted(found, key=lambda entry: entry[0])
+
+
+def _root(before: Point, after: Point, function: Callable[[Point], float], size: float) -> tuple[float, Point] | None:
+    """Return arclength and point of a test function's zero between two points; None if it jumps.
+
+    Points are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
+    whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, a
+    branch's zero is the chord's.
+    """
+    length = float((after.y - before.y) @ before.tangent)
+    points: dict[float, Point] = {0.0: before, length: after}
+
+    def value(at: float) -> float:
+        if at not in points:
+            known = sorted(points, key=lambda other: abs(other - at))[:3]
+            predicted = barycentric_interpolate(known, [points[other].y for other in known], at)
+            point = near(before, predicted, before.tangent, abs(length))
+            if point is None or point.passage.sequence != before.passage.sequence:
+                raise _Lost
+            points[at] = point
+        return function(points[at])
+
+    try:
+        root = brentq(value, 0.0, length, xtol=before.problem.close(before.y, _CLOSE), maxiter=100)
+        value(root)
+    except _Lost:
+        if before.given is not None or (chord := _on_chord(points, function)) is None:
+            return None
+        root = chord
+    except (ValueError, RuntimeError):
+        return None
+    return (root, points[root]) if abs(function(points[root])) <= _ZERO * size else None
+
+
+class _Lost(Exception):
+    """No point was found where one was sought."""
+
+
+def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) -> float | None:
+    """Add a test function's zero on the chord of the two points next to it. Returns its arclength, None without one."""
+    one, other = sorted(points, key=lambda at: abs(function(points[at])))[:2]
+    near, far = points[one], points[other]
+    share = function(near) / (function(near) - function(far))
+    root, y = one + share * (other - one), near.y + share * (far.y - near.y)
+    if (passage := near.problem.passage(y)) is None:
+        return None
+    points[root] = replace(near, zero=near.zero._replace(y=y, passage=passage))
+    return root
+
+
+class Path:
+    """A curve while it is followed from a point one way, within the ranges of its numbers.
+
+    head: the last point; points: what is kept of all; special: its named points; step: the next one; end: why it is not
+    followed further, "" while it is. What a curve watches, keeps and does where its sequence ends is said by its kind.
+    """
+
+    #: record of a named point; why a path ends at the end of a range, and where it began
+    named: ClassVar[Callable[..., Any]]
+    edge: ClassVar[str]
+    closed: ClassVar[str]
+
+    def __init__(self, table: Table, head: Point, most: int) -> None:
+        self.table, self.head, self.most, self.problem = table, head, most, head.problem
+        self.first, self.step, self.end = head.y, table.step, ""
+        self.points, self.special = [self._kept(head)], list[Any]()
+
+    def advance(self) -> None:
+        """Add the next point, with the named points before it, or end the path."""
+        if len(self.points) >= self.most:
+            self._end(f"max_points ({self.most}) reached", self.head)
+            return
+        head, step, failed, least = self.head, self.step, self.step, self.table.min_step
+        while step >= least:
+            point = reached(head, step)
+            if point is None:
+                failed, step = step, step / 4
+                continue
+            if point.passage.sequence != head.passage.sequence:
+                failed = step
+                break
+            cosine = float(point.tangent @ head.tangent)
+            if cosine > _BENT or step <= 2 * least:
+                quick = point.zero.iterations <= _EFFORT[point.given is not None][2] and cosine > _STRAIGHT
+                self.step = min(1.5 * step, self._longest(point)) if quick else max(step, least)
+                if (last := self._passed(head, point)) is not None:
+                    self._add(head, last)
+                return
+            step /= 2
+        self._cross(failed, *self._last(head, failed))
+
+    def _longest(self, point: Point) -> float:
+        """Return the longest step: with a condition states may change fast, and it is the numbers' that is bounded."""
+        numbers = point.tangent[self.problem.size :]
+        return self.table.max_step / (1.0 if point.given is None else max(float(np.linalg.norm(numbers)), _FLAT))
+
+    def _add(self, before: Point, point: Point) -> None:
+        """Add a point, and the end if it is one."""
+        self.head = point
+        self.points.append(self._kept(point))
+        if not self.end and (why := self._ending(before, point)):
+            self._end(why, point)
+
+    def _ending(self, before: Point, point: Point) -> str:
+        """Say why the path ends at a point that was added; "" if it does not."""
+        numbers = point.y[self.problem.size :]
+        if np.any((numbers <= _EDGE) | (numbers >= 1.0 - _EDGE)):
+            return self.edge
+        return self.closed if len(self.points) > 3 and self._returned(before, point) else ""
+
+    def _returned(self, before: Point, point: Point) -> bool:
+        """Say whether the path passes its first point between two."""
+        piece, first = point.y - before.y, self.first - before.y
+        share = first @ piece / max(float(piece @ piece), np.finfo(float).tiny)
+        return bool(0.0 <= share < 1.0 and np.linalg.norm(first - share * piece) < 0.05 * np.linalg.norm(piece))
+
+    def _last(self, head: Point, step: float) -> tuple[Point, Point | None]:
+        """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
+
+        Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
+        where to look; bisection makes it sure.
+        """
+        low, high, seen = 0.0, step, [(0.0, head)]
+        beyond: Point | None = None
+        close = self.problem.close(head.y, _CLOSE)
+        for attempt in range(_ATTEMPTS):
+            if high - low <= close:
+                break
+            at = forecast([(where, point.passage) for where, point in seen[-2:]])
+            middle, margin = (low + high) / 2, max(1e-3 * (high - low), close / 4)
+            if at is None or not low <= at <= high or attempt % 3 == 2:
+                at = middle
+            else:
+                at = float(np.clip(at + (margin if attempt % 3 else -margin), low + margin / 2, high - margin / 2))
+            point = corrected(head, at)
+            if point is not None and point.passage.sequence == head.passage.sequence:
+                low = at
+                seen.append((at, point))
+            else:
+                high, beyond = at, point
+        return seen[-1][1], beyond
+
+    def _note(self, point: Point, kind: str, note: str) -> None:
+        y = point.exact
+        numbers, state = self.problem.numbers(y).tolist(), self.problem.state(y)
+        self.special.append(self.named(len(self.points) - 1, kind, note, state, *numbers))
+
+    # -- what kinds of curves say
+
+    def _kept(self, point: Point) -> Any:
+        """Return what is kept of a point."""
+        raise NotImplementedError
+
+    def _passed(self, before: Point, point: Point) -> Point | None:
+        """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
+        raise NotImplementedError
+
+    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+        """Continue with another sequence of events, or end the path.
+
+        step: that leads from the head beyond the end of the sequence; last, beyond: points on both sides of it (_last).
+        """
+        raise NotImplementedError
+
+    def _end(self, why: str, point: Point) -> None:
+        """End the path at a point."""
+        self.end = why
