@@ -23,7 +23,7 @@ NOT_IN_ORBITS = {
 NOT_IN_BORDERS = NOT_IN_ORBITS | {"lyapunov": "one multiplier of a border is critical"}
 #: scaled distance of a run's end from its start from which on it has left an unstable orbit: round-off grows by the
 #: largest multiplier, and quantities are wrong by as much
-_LEFT = 1e-6
+_LEFT = 1e-4
 #: why all quantities are nan
 LEAVES = "a run over their periods ends early or leaves them, so unstable are they"
 
