@@ -8,11 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.quantities.amplitude import (
+    amplitude_max,
+    amplitude_max_dynamic,
+    amplitude_mean,
+    amplitude_mean_dynamic,
+)
 from vanedamp.coupling.quantities.quantity import Quantity, labels, labels_along, table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.files.toml_input import InputError
+
+#: amplitudes that studies compare with those without bodies, by the quantity that each is
+AMPLITUDES = {amplitude_mean.name: amplitude_mean_dynamic.name, amplitude_max.name: amplitude_max_dynamic.name}
 
 
 class Measure(NamedTuple):

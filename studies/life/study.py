@@ -13,12 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.choices import leaves_open
-from vanedamp.coupling.quantities.amplitude import (
-    amplitude_max,
-    amplitude_max_dynamic,
-    amplitude_mean,
-    amplitude_mean_dynamic,
-)
+from vanedamp.coupling.quantities.amplitude import amplitude_mean
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, opening
 from vanedamp.coupling.scene.paths import Range
@@ -30,15 +25,13 @@ from vanedamp.files.key_tables import documented
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplitude, scene_in
-from vanedamp.studies.measure import Measure
+from vanedamp.studies.measure import AMPLITUDES, Measure
 from vanedamp.studies.worst_start import STARTS
 
 #: about how often a life is evaluated over its band
 _EVALUATIONS = 20
 #: how often the spacing of a band is halved about its worst point
 HALVINGS = 3
-#: what counts of a run without a limit, by the quantity that it is
-_AMPLITUDES = {amplitude_mean.name: amplitude_mean_dynamic.name, amplitude_max.name: amplitude_max_dynamic.name}
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
 
@@ -70,8 +63,8 @@ class Life(Band):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.limit is None and self.measure not in _AMPLITUDES:
-            raise ValueError(f"limit: missing; {self.measure} needs one, {' and '.join(_AMPLITUDES)} do not")
+        if self.limit is None and self.measure not in AMPLITUDES:
+            raise ValueError(f"limit: missing; {self.measure} needs one, {' and '.join(AMPLITUDES)} do not")
         if not isinstance(self.dwell, str):
             if len(self.dwell) != self.count:
                 raise ValueError(f"dwell: {len(self.dwell)} weights for {self.count} points of the band; give as many")
@@ -129,7 +122,7 @@ class LifeStudy(NamedTuple):
             _check(scene)
             assemble(scene)
             reference = file.life.limit or reference_amplitude(scene, band, file.life.over_band)
-            named = file.life.measure if file.life.limit else _AMPLITUDES[file.life.measure]
+            named = file.life.measure if file.life.limit else AMPLITUDES[file.life.measure]
             measure = Measure.of_runs(scene, named, "life.measure")
         except InputError as error:
             raise InputError(f"{path}: {error}") from None

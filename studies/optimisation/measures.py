@@ -16,10 +16,10 @@ from vanedamp.coupling.strength.linear_stress import linear_stresses
 from vanedamp.coupling.strength.spots import Spots, spots_of
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import STRICT, InputError, Positive
+from vanedamp.studies.measure import AMPLITUDES, Measure
 
 #: what may count of a run, and be limited, by the quantity that it is
-MEASURES = {
-    "amplitude_mean": amplitude.amplitude_mean_dynamic.name, "amplitude_max": amplitude.amplitude_max_dynamic.name,
+MEASURES = AMPLITUDES | {
     "stress": stress.von_mises.name, "life": stress.damage_per_hour.name, "wear": wear.wear_depth_rate.name,
 }  # fmt: skip
 _LIMITS = MEASURES | {"amplitude": MEASURES["amplitude_mean"], "utilisation": stress.utilisation.name}
@@ -61,9 +61,7 @@ def check_measured(scene: Scene, measure: str, limits: Limits) -> None:
         if name not in table():
             known = ", ".join([*MEASURES, *(one for one in table() if one in own)])
             raise InputError(f"optimise.{key}: unknown quantity {name!r}; there are {known}")
-        if name not in own:
-            about = table()[name].about
-            raise InputError(f"optimise.{key}: runs of this scene have no {name}, which is {about}")
+        Measure.of_runs(scene, name, f"optimise.{key}")
         if name not in limits.quantities:
             raise InputError(f"optimise.{key}: what counts is relative to its limit; give limits.quantities.{name}")
     for name, key in [
@@ -120,10 +118,8 @@ def counted(measure: str, limits: Limits, found: Mapping[str, np.ndarray], runs:
         return largest(_LIMITS.get(name, name))
 
     of = MEASURES.get(measure, measure)
-    without = {
-        MEASURES["amplitude_mean"]: amplitude.amplitude_undamped.name,
-        MEASURES["amplitude_max"]: amplitude.amplitude_undamped.name, MEASURES["stress"]: f"{of}_undamped",
-    }  # fmt: skip
+    undamped = amplitude.amplitude_undamped.name
+    without = dict.fromkeys(AMPLITUDES.values(), undamped) | {MEASURES["stress"]: f"{of}_undamped"}
     pair = largest(of), largest(without[of]) if of in without else none
     excess = [value(name) * limit if name == "life" else value(name) / limit for name, limit in limits.given.items()]
     over = np.max(excess, axis=0, initial=1.0) - 1.0 if excess else np.zeros(runs)

@@ -25,6 +25,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 from vanedamp.studies.band import Band, drive, ends, file_in, placed, reference_amplitude, scene_in
 from vanedamp.studies.machining import fine_gap
+from vanedamp.studies.measure import AMPLITUDES
 from vanedamp.studies.optimisation.measures import SERVICE, Limits, check_measured, reference_stress
 
 #: longest transient that is proposed, in periods
@@ -128,7 +129,7 @@ class Optimise(Band):
     @property
     def by_amplitude(self) -> bool:
         """Whether an amplitude counts, which has derivatives and a resonance curve."""
-        return self.measure in ("amplitude_mean", "amplitude_max")
+        return self.measure in AMPLITUDES
 
     @property
     def linear(self) -> bool:
