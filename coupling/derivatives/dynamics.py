@@ -27,6 +27,8 @@ from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.minima import least_minimum
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Segment
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.dual import values, zeros
 
 #: singular values below this are zero: rows that depend on each other
 DEPENDENT = 1e-9
@@ -42,6 +44,19 @@ def presses(state: np.ndarray) -> np.ndarray:
 def ways(state: np.ndarray) -> np.ndarray:
     """Return the directions (u,) in which units in states (u,) slip, or 0."""
     return np.asarray((state == codes.SLIP_RIGHT).astype(float) - (state == codes.SLIP_LEFT))
+
+
+def _rates(system: System) -> np.ndarray:
+    """Return a typical frequency (N,) of each coordinate, rad/s."""
+    yields = np.isfinite(system.spring)
+    stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
+    stiff = stiff + (system.spring[yields, None] * system.J[: len(yields)][yields] ** 2).sum(axis=0)
+    return np.maximum(np.sqrt(np.maximum(stiff, 0.0) / system.mass), system.omega)
+
+
+def _size_of_loads(system: System, rate: np.ndarray) -> float:
+    loads = np.vstack([system.weight, np.abs(system.load)]) / np.sqrt(system.mass)
+    return float(np.abs(loads).max(initial=0.0) / rate.max(initial=0.0)) or 1.0
 
 
 class Dynamics:
@@ -60,26 +75,20 @@ class Dynamics:
         system = self.system
         size, u, e = len(system.mass), len(system.rest), len(system.frequency)
         self.root = np.sqrt(system.mass)
-        yields = np.isfinite(system.spring)
-        stiff = np.diag(system.stiffness) + system.tangential @ system.elongation**2
-        stiff = stiff + (system.spring[yields, None] * system.J[:u][yields] ** 2).sum(axis=0)
-        own = np.maximum(np.sqrt(np.maximum(stiff, 0.0)) / self.root, system.omega)
-        self.rate: np.ndarray = own if like is None else like.rate
-        self.unit = np.r_[self.root * self.rate, self.root]  # of u in terms of (q, q')
+        self.rate: np.ndarray = _rates(system) if like is None else like.rate
+        self.unit = np.concatenate([self.root * self.rate, self.root])  # of u in terms of (q, q')
         self.rows = system.J / self.root
         self.places, self.rates, self.one = slice(0, size), slice(size, 2 * size), 2 * size
         cosine = slice(self.one + 1, self.one + 1 + e)
         sine = slice(cosine.stop, cosine.stop + e)
-        loads = np.vstack([system.weight, np.abs(system.load)]) / self.root
-        size_of_loads = float(np.abs(loads).max(initial=0.0) / self.rate.max(initial=0.0)) or 1.0
-        self.size: float = size_of_loads if like is None else like.size
-        self.turn = np.zeros((sine.stop, sine.stop))
+        self.size: float = _size_of_loads(system, self.rate) if like is None else like.size
+        self.turn = zeros((sine.stop, sine.stop))
         self.turn[self.places, self.rates] = np.diag(self.rate)
         self.turn[cosine, sine], self.turn[sine, cosine] = -np.diag(system.frequency), np.diag(system.frequency)
-        self.gap, self.speed = np.zeros((u, sine.stop)), np.zeros((2 * u, sine.stop))
+        self.gap, self.speed = zeros((u, sine.stop)), zeros((2 * u, sine.stop))
         self.gap[:, self.places], self.gap[:, self.one] = self.rows[:u] / self.rate, system.rest / self.size
         self.speed[:, self.rates] = self.rows
-        self.load = np.zeros((size, sine.stop))
+        self.load = zeros((size, sine.stop))
         self.load[:, self.places] = -system.stiffness / self.root / self.root[:, None] / self.rate
         self.load[:, self.rates] = -system.damping / self.root / self.root[:, None]
         self.load[:, self.one] = system.weight / self.root / self.size
@@ -87,7 +96,7 @@ class Dynamics:
         self.load[:, sine] = -system.load.imag.T / self.root[:, None] / self.size
         self.scale, self.to_state = scale, frame.to_state / self.unit
         self.from_state = self.unit[:, None] * frame.from_state
-        self.typical = np.r_[np.abs(self.from_state) @ scale, np.full(1 + 2 * e, self.size)]
+        self.typical = np.r_[np.abs(values(self.from_state)) @ scale, np.full(1 + 2 * e, self.size)]
         #: units that are Jenkins elements, and coordinates (j,) of their sliders
         self.jenkins = slice(u - len(system.tangential), None)
         self.sliders = np.arange(size - len(system.tangential), size)
@@ -98,14 +107,14 @@ class Dynamics:
         )
         self.bound = own_unit[0] * system.limit[self.jenkins] / system.tangential
         self.pulled = system.elongation / self.root
-        self.response = np.zeros(sine.stop)
+        self.response = zeros(sine.stop)
         self.response[self.places] = system.response / self.unit[:size]
         self.response[cosine], self.response[sine] = system.table.real / self.size, -system.table.imag / self.size
         outputs, n = len(system.outputs), system.modes
-        self.outputs = np.zeros((outputs, sine.stop))
+        self.outputs = zeros((outputs, sine.stop))
         self.outputs[:, :n] = system.outputs.reshape(outputs, n) / self.unit[:n]
         extended = np.flatnonzero(system.tilt >= 0)
-        self.tilts = np.zeros((len(extended), sine.stop))
+        self.tilts = zeros((len(extended), sine.stop))
         self.tilts[:, self.places] = (np.eye(size)[system.tilt[extended]] - system.turn[extended]) / self.unit[:size]
         self._flows: dict[bytes, Flow] = {}
 

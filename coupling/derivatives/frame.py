@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from vanedamp.coupling.derivatives.symmetry import Symmetry, mirror_of, wave_of
 from vanedamp.coupling.response.restart import at_speed_of
@@ -14,8 +14,9 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.modal_basis import modal_transfer
+from vanedamp.coupling.system.modal_basis import transfer_of
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.dual import inverse, zeros
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -25,41 +26,45 @@ class Frame:
 
     speed: of rotation at which the states' modes were taken, rad/s; None: the scene's own. A reduced model's modes turn
     with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
-    like: of a neighbouring scene, whose modes have the signs that these take, and whose begin it takes.
     begin: periods of the excitation from its start to time zero of the system and of the states.
     to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders of Jenkins elements have no rates
     of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
     state; longest: (j,) m, elongations at their bounds.
     """
 
-    def __init__(self, scene: Scene, speed: float | None = None, like: Frame | None = None, begin: float = 0.0) -> None:
-        self.begin: float = begin if like is None else like.begin
-        self.scene, self.system = scene, _later(assemble(scene), self.begin)
-        self._sign = np.ones(self.system.modes) if like is None else _signs(self.system, like.system)
-        self.system = _turned(self.system, self._sign)
-        self._turn = self._back = np.diag(self._sign)  # from modes of the states to the scene's own, and back
+    def __init__(self, scene: Scene, speed: float | None = None, begin: float = 0.0) -> None:
+        self.speed, self.begin = speed, begin
+        self.scene, self.system = scene, _later(assemble(scene), begin)
+        self._turn: Any = np.eye(self.system.modes)  # from modes of the states to the scene's own, and back
+        self._back: Any = self._turn
         if speed is not None and isinstance(scene.structure, Rom):
-            self._turn = modal_transfer(scene.structure, speed, scene.speed)
-            self._back = np.linalg.inv(self._turn)
+            self._turn = transfer_of(scene, speed)
+            self._back = inverse(self._turn)
         self.extended = np.flatnonzero(self.system.tilt >= 0)
         size, sliders = len(self.system.mass), len(self.system.tangential)
         self.drawn = self.system.body[len(self.system.body) - sliders :]
         self.longest = self.system.limit[len(self.system.limit) - sliders :] / self.system.tangential
         self.to_state = self._to_state()
         moves = slice(0, 2 * size - sliders)
-        self.from_state = np.zeros((2 * size, len(self.to_state)))
-        self.from_state[moves] = np.linalg.inv(self.to_state[:, moves])
+        self.from_state = zeros((2 * size, len(self.to_state)))
+        self.from_state[moves] = inverse(self.to_state[:, moves])
 
     def _to_state(self) -> np.ndarray:
         """Return the map (k, 2N) of (q, q') to states."""
         system, unit, more = self.system, np.eye(len(self.system.mass)), self.extended
         x = system.along[more]
         parts = (
-            self._back * self._sign @ (system.scale * unit[: system.modes]), unit[system.along] - system.floor,
+            self._back @ (system.scale * unit[: system.modes]), unit[system.along] - system.floor,
             unit[x + 1] - system.rise[more], unit[x + 2] - system.turn[more],
         )  # fmt: skip
-        elongation = np.pad(system.elongation, ((0, 0), (0, len(unit))))
-        return np.vstack([*(block_diag(part, part) for part in parts), elongation])
+        size, first = len(unit), 0
+        found = zeros((2 * size - len(system.elongation), 2 * size))
+        for part in parts:
+            middle, last = first + len(part), first + 2 * len(part)
+            found[first:middle, :size], found[middle:last, size:] = part, part
+            first = last
+        found[first:, :size] = system.elongation
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -172,23 +177,3 @@ def _later(system: System, begin: float) -> System:
     return system._replace(load=system.load * turned[:, None], table=system.table * turned)
 
 
-def _signs(system: System, like: System) -> np.ndarray:
-    """Return the signs (n,) that modes take to move places as those of a neighbouring system do."""
-    if system.J.shape != like.J.shape:
-        return np.ones(system.modes)  # another motion: numbers_of says so
-    along = ((system.J * like.J).sum(axis=0) + system.response * like.response)[: system.modes]
-    return np.where(along < 0.0, -1.0, 1.0)
-
-
-def _turned(system: System, sign: np.ndarray) -> System:
-    """Return a system whose modes have other signs (n,)."""
-    if np.all(sign > 0.0):
-        return system
-    own, n = np.ones(len(system.mass)), system.modes
-    own[:n] = sign
-    rows = ("load", "weight", "response", "J", "elongation", "floor", "turn", "rise", "casing")
-    both = {name: getattr(system, name) * own * own[:, None] for name in ("stiffness", "damping")}
-    return system._replace(
-        viscous=system.viscous * sign * sign[:, None], **both, **{name: getattr(system, name) * own for name in rows},
-        outputs=system.outputs.reshape(len(system.outputs), n) * sign,
-    )  # fmt: skip

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine
-from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.response.segment import Event

@@ -1,34 +1,33 @@
 """What the numbers of a scene do to its equations: derivatives of all that flows, events and impacts are made of.
 
-They are differences of whole assemblies (derivatives.differences), so that every number has them that a sweep axis can
-name; what follows from them along a motion is exact.
+They are exact: the scene is assembled once with numbers that have derivatives (tangents.dual). Contact laws, shapes and
+reduced models whose modes change have differences of their own (tangents.opaque).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
+from vanedamp.coupling.scene.paths import with_numbers
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.scene.units import unit_of
-from vanedamp.coupling.system.restitution import restitutions_at
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.differences import NotSmooth
+from vanedamp.coupling.tangents.dual import Dual, numbers, zeros
+from vanedamp.coupling.tangents.opaque import changed, opaque
 from vanedamp.files.toml_input import InputError
 
 #: tables whose numbers do not enter the equations of motion
 _NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down")
 
-#: speeds at which laws of restitution are compared, m/s
-_SPEEDS = (1e-4, 1e-2, 1.0)
 #: state (k,) with which the motion of a scene with the numbers begins, in a frame
 StartOf = Callable[[Scene, Frame], np.ndarray]
 
@@ -70,20 +69,9 @@ class Parts(NamedTuple):
     def of(cls, dynamics: Dynamics, start: np.ndarray) -> Parts:
         """Return the parts of a scene's dynamics."""
         system = dynamics.system
-        own = {"spring": np.where(np.isfinite(system.spring), system.spring, 0.0), "period": np.array(system.period)}
+        own = {"spring": np.where(np.isfinite(system.spring), system.spring, 0.0), "period": system.period}
         known = system._asdict() | vars(dynamics) | own | {"start": start}
         return cls(*(known[name] for name in cls._fields))
-
-    def flat(self) -> np.ndarray:
-        """Return all in one array."""
-        return np.concatenate([np.ravel(part) for part in self])
-
-    def like(self, flat: np.ndarray) -> Parts:
-        """Return parts of the same shapes from arrays (P, n) that `flat` has made."""
-        sizes = np.cumsum([part.size for part in self])[:-1]
-        pieces = np.split(flat, sizes, axis=-1)
-        shaped = (piece.reshape(*flat.shape[:-1], *part.shape) for piece, part in zip(pieces, self, strict=True))
-        return Parts(*shaped)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,15 +79,14 @@ class Numbers:
     """Numbers of a scene, P of them: their derivatives are by `size` (P,) of each.
 
     parts: derivatives of the parts of the equations, times the sizes; paths (P,); frequency: (e,) of the harmonics,
-    rad/s; scenes: (P,) how the scene that moves follows from each number; values: (P,) of these.
+    rad/s; scene: the one that moves, with numbers that have derivatives.
     """
 
     paths: tuple[str, ...]
     size: np.ndarray
     parts: Parts
     frequency: np.ndarray
-    scenes: Sequence[Callable[[float], Scene]]
-    values: Sequence[float]
+    scene: Scene
     #: derivatives of the flows that a motion has met (derivatives.flow_derivative)
     flows: dict[Any, Any] = field(default_factory=dict, repr=False)
 
@@ -108,15 +95,9 @@ class Numbers:
 
     def of_scene(self, read: Callable[[Scene], np.ndarray], here: np.ndarray) -> np.ndarray:
         """Return the derivatives (n, P) of what the scene says besides its equations: `here` (n,); nan at kinks."""
-        scale, found = np.where(here == 0.0, 1.0, np.abs(here)), np.full((len(self), len(here)), np.nan)
-        for row, scene, value, size in zip(found, self.scenes, self.values, self.size.tolist(), strict=True):
-
-            def scaled(number: float, scene: Callable[[float], Scene] = scene) -> np.ndarray:
-                return read(scene(number)) / scale
-
-            with suppress(NotSmooth):
-                row[:] = derivative(scaled, value, size, here / scale)
-        return (found * scale * self.size[:, None]).T
+        with numbers(len(self)):
+            found = opaque(read, self.scene, unknown=True)
+        return found.turns if isinstance(found, Dual) else np.zeros((len(here), len(self)))
 
     def harmonics(self, dynamics: Dynamics, time: float) -> np.ndarray:
         """Return the derivatives (P, K) of constants and harmonics in z at a time since the passage's start, s."""
@@ -129,54 +110,69 @@ class Numbers:
 
 
 def numbers_of(
-    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics, speed: float | None,
+    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics,
     begins: StartOf | None = None, derived: Callable[[Scene], Scene] = lambda scene: scene,
 ) -> Numbers:  # fmt: skip
     """Return the derivatives of a scene's equations by the numbers at some paths.
 
-    speed: of rotation whose modes those of states are (Frame); begins: the start of the motion, if numbers change it;
-    derived: the scene that moves, from the one that has the numbers. Raises InputError for a path that names no number
-    of the equations, and NotSmooth where the equations have a kink.
+    begins: the start of the motion, if numbers change it; derived: the scene that moves, from the one that has the
+    numbers. Raises InputError for a path that names no number of the equations, and NotSmooth where the equations
+    have a kink.
     """
-    start = begins or (lambda _, frame: np.zeros(len(frame.to_state)))
-    parts = Parts.of(dynamics, start(scene, dynamics.frame))
-    here, sizes, found = parts.flat(), [], []
-    values, scenes = list[float](), list[Callable[[float], Scene]]()
-    scale = _scales(parts, dynamics)
-    for path in paths:
-        if isinstance(path, MatrixDirection):
-            name, value, size = path.name, 0.0, path.size(scene)
-        else:
-            name, value = path, number_of_motion(scene, path, "numbers")
-            size = abs(value) or _size(path, dynamics)
-
-        def at(number: float, path: str | MatrixDirection = path) -> Scene:
-            return path.at(scene, number) if isinstance(path, MatrixDirection) else scene.replace({path: number})
-
-        def moving(number: float, at: Callable[[float], Scene] = at) -> Scene:
-            return derived(at(number))
-
-        def moved(number: float, at: Callable[[float], Scene] = at) -> np.ndarray:
-            other = at(number)
-            frame = Frame(derived(other), speed, dynamics.frame)
-            made = Dynamics(frame, dynamics.scale, dynamics)
-            flat = Parts.of(made, start(other, frame)).flat()
-            if len(flat) != len(here) or made.system.J.shape != dynamics.system.J.shape:
-                raise NotSmooth
-            if not _same_law(made.system, dynamics.system):
-                raise NotSmooth
-            return flat / scale
-
-        sizes.append(size)
-        values.append(value)
-        scenes.append(moving)
+    turned, moves, sizes = _turned(scene, paths, dynamics, derived)
+    same = derived(scene) is scene
+    with numbers(len(paths)):
         try:
-            found.append(derivative(moved, value, size, here / scale) * scale * size)
+            moving = turned if same else opaque(derived, turned)
+            if moves:
+                moving = changed(moving, structure=changed(moving.structure, moves=tuple(moves)))
+            frame = Frame(moving, dynamics.frame.speed, dynamics.frame.begin)
+            start = zeros(len(frame.to_state)) if begins is None else begins(turned, frame)
+            made = Parts.of(Dynamics(frame, dynamics.scale, dynamics), start)
         except NotSmooth:
-            raise NotSmooth(f"{name} = {value:g}: the equations of motion have a kink there") from None
-    stacked = np.reshape(found, (len(paths), len(here)))
-    names = tuple(path if isinstance(path, str) else path.name for path in paths)
-    return Numbers(names, np.array(sizes), parts.like(stacked), dynamics.system.frequency, scenes, values)
+            names = ", ".join(f"{name} = {value:g}" for name, value in _named(scene, paths))
+            raise NotSmooth(f"{names}: the equations of motion have a kink there") from None
+    parts = Parts(*(_turns(part, len(paths)) for part in made))
+    if not all(np.all(np.isfinite(part)) for part in parts):
+        raise NotSmooth("the equations of motion have a kink there")
+    return Numbers(tuple(name for name, _ in _named(scene, paths)), sizes, parts, dynamics.system.frequency, moving)
+
+
+def _named(scene: Scene, paths: Sequence[str | MatrixDirection]) -> list[tuple[str, float]]:
+    return [(path.name, 0.0) if isinstance(path, MatrixDirection) else (path, scene.number(path)) for path in paths]
+
+
+def _turns(part: Any, count: int) -> np.ndarray:
+    """Return the derivatives (P, ...) of a part of the equations."""
+    return np.moveaxis(part.turns, -1, 0) if isinstance(part, Dual) else np.zeros((count, *np.shape(part)))
+
+
+def _turned(
+    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics, derived: Callable[[Scene], Scene]
+) -> tuple[Scene, list[Any], np.ndarray]:
+    """Return a scene whose numbers at some paths turn by their sizes, and these (P,).
+
+    Beside it, what moves its reduced model: structures of the scene that moves, and by how much (modal_basis.moved).
+    """
+    sizes, moves, given = np.zeros(len(paths)), list[Any](), dict[str, Dual]()
+    for place, path in enumerate(paths):
+        own = np.eye(len(paths))[place]
+        if isinstance(path, MatrixDirection):
+            sizes[place] = path.size(scene)
+            moves.append((lambda amount, path=path: derived(path.at(scene, amount)).structure, Dual(0.0, sizes[place] * own)))
+            continue
+        value = number_of_motion(scene, path, "numbers")
+        sizes[place] = abs(value) or _size(path, dynamics)
+        if path.startswith("structure.") and isinstance(scene.structure, Rom):
+            moves.append((
+                lambda amount, path=path, value=value: derived(scene.replace({path: value + amount})).structure,
+                Dual(0.0, sizes[place] * own),
+            ))  # fmt: skip
+        elif path in given:
+            given[path].turns[:] += sizes[place] * own
+        else:
+            given[path] = Dual(value, sizes[place] * own)
+    return with_numbers(scene, scene.to_dict(), given), moves, sizes
 
 
 def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = ()) -> float:
@@ -190,22 +186,6 @@ def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = 
         return scene.number(path)
     except InputError as error:
         raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
-
-
-def _same_law(one: System, other: System) -> bool:
-    """Return whether two systems take restitutions from coefficients alike: what else changes a law is not followed."""
-    if not (one.restitution_at or other.restitution_at):
-        return True
-    units = np.flatnonzero(np.isinf(other.spring))[:1]
-    alike = one._replace(restitution=other.restitution)
-    own, others = ([restitutions_at(each, units, np.full(len(units), v)) for v in _SPEEDS] for each in (alike, other))
-    return bool(np.array_equal(own, others))
-
-
-def _scales(parts: Parts, dynamics: Dynamics) -> np.ndarray:
-    """Return the size of each entry (n,): the largest of its array, by which its round-off is judged."""
-    sizes = [np.full(np.size(part), float(np.abs(part).max(initial=0.0)) or 1.0) for part in parts]
-    return np.concatenate([*sizes[:-1], np.maximum(np.abs(parts.start), dynamics.scale)])
 
 
 def _size(path: str, dynamics: Dynamics) -> float:

@@ -81,7 +81,7 @@ class PeriodMap:
     def _numbers(self) -> Numbers | None:
         if not self.numbers:
             return None
-        return numbers_of(self.given, self.numbers, self._dynamics, self.speed, derived=self.made)
+        return numbers_of(self.given, self.numbers, self._dynamics, derived=self.made)
 
     @cached_property
     def _event_names(self) -> EventNames:

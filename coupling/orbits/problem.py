@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import svd
 
-from vanedamp.coupling.derivatives.differences import NotSmooth
+from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.period_map import PeriodMap

@@ -10,9 +10,10 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import Motion, place_sliders
-from vanedamp.coupling.system.modal_basis import modal_transfer
+from vanedamp.coupling.system.modal_basis import transfer_of
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
 from vanedamp.coupling.system.system import SURFACES, System
+from vanedamp.coupling.tangents.dual import active, array
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -28,7 +29,8 @@ def start_of(scene: Scene, system: System, state: RestartState | None = None) ->
     for a state of a scene of another size.
     """
     if state is None:
-        return _checked(system, _of_scene(scene, system))
+        asked = _of_scene(scene, system)
+        return _checked(system, asked) if active() is None else asked
     return fitted(system, at_speed_of(scene, state))
 
 
@@ -86,19 +88,20 @@ def state_at(system: System, motion: Motion) -> RestartState:
 def _of_scene(scene: Scene, system: System) -> RestartState:
     """Return the state that a scene asks for."""
     n, bodies = system.modes, scene.damper
-    rise = [damper.form.rise(damper, damper.tilt) for damper in bodies]  # on its lower corner
+    rise = [damper.shaped("rise", damper.tilt) for damper in bodies]  # on its lower corner
     parts = (
         # an initial state belongs to a rigid structure: others have none
-        np.full(n, scene.initial.displacement), np.full(n, scene.initial.velocity),
+        [scene.initial.displacement] * n, [scene.initial.velocity] * n,
         scene.positions, [damper.velocity for damper in bodies],
-        np.zeros(system.dampers), system.travels,
+        [0.0] * system.dampers, system.travels,
     )  # fmt: skip
     across = (
         [damper.lift + up for damper, up in zip(bodies, rise, strict=True)],
         [damper.lift_velocity for damper in bodies],
         [damper.tilt for damper in bodies], [damper.tilt_rate for damper in bodies],
     )  # fmt: skip
-    return RestartState(*map(frozen, (*parts, *(across if system.in_plane else ()))))
+    kept = frozen if active() is None else array
+    return RestartState(*map(kept, (*parts, *(across if system.in_plane else ()))))
 
 
 def _checked(system: System, state: RestartState) -> RestartState:
@@ -194,15 +197,17 @@ def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
     model does not have.
     """
     structure = scene.structure
-    if not (start.speed.size and isinstance(structure, Rom)) or start.speed[0] == scene.speed:
+    if not (start.speed.size and isinstance(structure, Rom)) or (
+        active() is None and start.speed[0] == scene.speed
+    ):
         return start
-    transfer = modal_transfer(structure, float(start.speed[0]), scene.speed)
+    transfer = transfer_of(scene, float(start.speed[0]))
     if transfer.shape[1] != len(start.displacement):
         return start
-    return replace(
-        start, displacement=frozen(transfer @ start.displacement), velocity=frozen(transfer @ start.velocity),
-        speed=frozen([scene.speed]),
-    )  # fmt: skip
+    moved = {name: transfer @ getattr(start, name) for name in ("displacement", "velocity")}
+    if active() is not None:
+        return replace(start, **moved)
+    return replace(start, **{name: frozen(part) for name, part in moved.items()}, speed=frozen([scene.speed]))
 
 
 def _drawn(system: System) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, GetJsonSchemaHandler
 from pydantic.dataclasses import dataclass
@@ -14,6 +14,8 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from vanedamp.coupling.scene.registration import SHAPES
 from vanedamp.coupling.scene.repetition import Scatter, Sectors
 from vanedamp.coupling.scene.shapes.shape import Shape
+from vanedamp.coupling.tangents.dual import active, values
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.reference import unit_in
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real
@@ -87,6 +89,17 @@ def _known_shape(name: str) -> str:
         expected = {"expected": f"{', '.join(names)} or {last}"}
         raise PydanticCustomError("literal_error", "Input should be {expected}", expected)
     return name
+
+
+class _Measures(NamedTuple):
+    """What a shape asks of its body (shapes.shape.Measured)."""
+
+    mass: float
+    lengths: Mapping[str, float | None]
+
+    def measure(self, key: str) -> float | None:
+        """Return a measure by its key."""
+        return self.lengths.get(key)
 
 
 class _Shapes:
@@ -201,12 +214,21 @@ class Damper(OpenRecord):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the length and half the height, m; 0 where a slider has none."""
-        return self.form.half_extent(self)
+        found: tuple[float, float] = self.shaped("half_extent")
+        return found
 
     @property
     def moment_of_inertia(self) -> float:
         """Moment of inertia about the centre, kg m^2."""
-        return self.form.inertia(self) if self.inertia is None else self.inertia
+        return self.shaped("inertia") if self.inertia is None else self.inertia
+
+    def shaped(self, question: str, *given: Any) -> Any:
+        """Return what its shape answers (shapes.shape.Shape)."""
+        if active() is None:
+            return getattr(self.form, question)(self, *given)
+        lengths = {key: self.measure(key) for key in ("length", "height", "radius", *(self.added or {}))}
+        mass = self.mass if question == "inertia" else values(self.mass)
+        return opaque(getattr(self.form, question), _Measures(mass, lengths), *given)
 
 
 def spread(given: Sequence[Any], gap: Any) -> list[Any]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
-import math
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +11,8 @@ from pydantic.dataclasses import dataclass
 from vanedamp.coupling.scene.load_pattern import Load, pattern_loads, repeated
 from vanedamp.coupling.scene.registration import AnyWaveform
 from vanedamp.coupling.scene.waveform import Waveform
+from vanedamp.coupling.tangents.dual import cos, radians, rect, scalar, sin, values
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
 
@@ -31,7 +31,8 @@ class Harmonic:
     @property
     def share(self) -> complex:
         """Complex amplitude relative to a sine of amplitude 1 and phase 0."""
-        return cmath.rect(self.amplitude, math.radians(self.phase))
+        share: complex = rect(self.amplitude, radians(self.phase))
+        return share
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -135,7 +136,7 @@ class Excitation:
         """Amplitude of the force, N, or factor of the loads, as far as they are given."""
         if self.distributed:
             return 1.0 if self.load_factor is None else self.load_factor
-        return self.force or 0.0
+        return 0.0 if self.force is None else self.force
 
     @property
     def loads(self) -> dict[str, Load]:
@@ -152,7 +153,8 @@ class Excitation:
         For a `signal`, its Fourier series, which drive no run (Waveform.harmonics).
         """
         if self.waveform is not None:
-            return self.waveform.harmonics()
+            shares: dict[int, complex] = opaque(lambda signal: signal.harmonics(), self.waveform)
+            return shares
         if self.distributed:
             orders = {load.order for load in self.loads.values() if load.force}
             return dict.fromkeys(sorted({1} | orders), 0.0j)
@@ -168,7 +170,7 @@ class Excitation:
 def pulled(field: np.ndarray, cavity: np.ndarray, normal: np.ndarray | None) -> tuple[float, float]:
     """Return the parts of a field (3,) along a cavity and across it, as of Gravity.components."""
     across = np.linalg.norm(np.cross(field, cavity)) if normal is None else -field @ normal
-    return float(field @ cavity), float(across)
+    return scalar(field @ cavity), scalar(across)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -195,11 +197,11 @@ class Gravity:
         on its floor, whichever side that is unless the normal tells.
         """
         if self.direction is None:
-            angle = math.radians(self.orientation_deg)
-            along, across = -math.sin(angle), math.cos(angle)
+            angle = radians(self.orientation_deg)
+            along, across = -sin(angle), cos(angle)
         else:
             down = np.array(self.direction) / np.linalg.norm(self.direction)
             along, across = pulled(down, cavity, normal)
         if abs(across) < 1e-15:  # upright is upright
-            across = 0.0
+            across = across - values(across)
         return self.acceleration * along, self.acceleration * across

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
-import math
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Annotated
@@ -11,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.tangents.dual import radians, rect
 from vanedamp.files.csv_input import read_csv
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Real, Whole, validate
 
@@ -33,7 +32,8 @@ class Load:
     @property
     def amplitude(self) -> complex:
         """Complex amplitude, N, relative to a sine of phase 0."""
-        return cmath.rect(self.force, math.radians(self.phase))
+        amplitude: complex = rect(self.force, radians(self.phase))
+        return amplitude
 
 
 def repeated(loads: Mapping[str, Load]) -> str | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.tangents.opaque import with_number
 from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
 
 
@@ -38,6 +39,14 @@ def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
         for step in place[:-1]:
             table = table[step]
         table[place[-1]] = value
+
+
+def with_numbers(scene: Any, data: Any, numbers: Mapping[str, Any]) -> Any:
+    """Return a scene with numbers that have derivatives in place of its own, by their paths. data: its plain data."""
+    for path, number in numbers.items():
+        for place in _places(data, path.split("."), path):
+            scene = with_number(scene, place, number)
+    return scene
 
 
 def namesake(data: Any, path: str, others: Iterable[str]) -> str | None:

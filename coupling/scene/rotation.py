@@ -52,4 +52,6 @@ class Rotation:
     @property
     def omega(self) -> float:
         """Speed, rad/s."""
-        return SPEEDS["rotation.rpm"] * self.rpm if self.rpm is not None else (self.speed or 0.0)
+        if self.rpm is not None:
+            return SPEEDS["rotation.rpm"] * self.rpm
+        return 0.0 if self.speed is None else self.speed

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.mistuning import Mistuning
+from vanedamp.coupling.tangents.dual import sqrt
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
 
 
@@ -60,7 +60,9 @@ class Rigid:
         """Return the viscous damping, N s/m, at a speed of rotation, rad/s."""
         if self.damping is not None:
             return self.damping
-        return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness_at(speed))
+        ratio = 0.0 if self.damping_ratio is None else self.damping_ratio
+        viscous: float = 2 * ratio * sqrt(self.mass * self.stiffness_at(speed))
+        return viscous
 
 
 #: models of a scene by the types of those in memory

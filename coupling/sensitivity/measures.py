@@ -15,7 +15,7 @@ from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import EventRun, Segment
 from vanedamp.coupling.response.static_deflection import deflects
-from vanedamp.coupling.sensitivity.dual import Dual, zeros
+from vanedamp.coupling.tangents.dual import Dual, zeros
 from vanedamp.coupling.sensitivity.integrands import (
     POWERS,
     Functionals,

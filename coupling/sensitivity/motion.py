@@ -66,7 +66,7 @@ class Motion:
             scale = self._sizes(None if begins is None else begins(scene, self.frame))
         self.dynamics = Dynamics(self.frame, scale)
         self.completed = False
-        self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, speed, begins, derived)
+        self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, begins, derived)
 
     def _sizes(self, start: np.ndarray | None) -> np.ndarray:
         """Return sizes (k,) of the coordinates: modes move at least as far as from the start, if that is given."""

@@ -23,6 +23,7 @@ from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -51,7 +52,9 @@ def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Se
         state, turns = _steady(run_of(scene), paths)
 
     def begins(other: Scene, frame: Frame) -> np.ndarray:
-        return frame.state_of(blown_or_pulled(run_of(other), table)) if state is None else state
+        if state is not None:
+            return state
+        return frame.state_of(opaque(lambda one: blown_or_pulled(run_of(one), table), other))
 
     motion = Motion(scene, paths, lambda other: free_scene(run_of(other), table=table), begins)
     numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode

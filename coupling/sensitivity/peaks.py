@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from vanedamp.coupling.derivatives.series import Course, Series
-from vanedamp.coupling.sensitivity.dual import Dual
+from vanedamp.coupling.tangents.dual import Dual
 from vanedamp.coupling.sensitivity.integrands import Functionals
 
 #: nodes within this fraction of the largest are followed to their summits: more than a summit may be from its node;

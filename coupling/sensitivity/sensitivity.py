@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vanedamp.coupling.derivatives.differences import NotSmooth
+from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.restart_state import RestartState

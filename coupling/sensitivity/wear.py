@@ -12,7 +12,7 @@ from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.wear import patches
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sensitivity.dual import Dual, zeros
+from vanedamp.coupling.tangents.dual import Dual, zeros
 
 _HOUR = 3600.0
 

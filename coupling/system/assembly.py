@@ -32,6 +32,7 @@ from vanedamp.coupling.system.units import (
     friction_elements,
     layered,
 )
+from vanedamp.coupling.tangents.dual import active, array, scalar, values, vanishes, zeros
 
 #: the moment after which contacts are checked again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
@@ -60,9 +61,9 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     bodies = _bodies(scene, n)
     surfaces = [_surfaces(scene, basis, index, bodies) for index in range(len(scene.cavity))]
     loads = body_loads(scene, basis)
-    table = np.zeros(len(shares), complex)
+    table = zeros(len(shares), dtype=complex)
     if isinstance(scene.structure, Prescribed):
-        table = np.array(list(shares.values())) * -1j * scene.structure.displacement_amplitude
+        table = array(list(shares.values()), complex) * -1j * scene.structure.displacement_amplitude
     casing = _casing(scene, basis, bodies[-1].coordinates.stop if bodies else n)
     size = casing["elongation"].shape[1]
     excited = _excitation(scene, basis, bodies, loads, forced, table, size)
@@ -75,23 +76,23 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     sliders = len(casing["tangential"])
     massive = slice(size - sliders)
     # rows of sliders are not to be small compared with others
-    pulled = (casing["elongation"][:, :n] ** 2).sum(axis=1)
-    mobility = (units["J"][:, massive] ** 2 / mass[massive]).sum(axis=1)
+    pulled = (values(casing["elongation"])[:, :n] ** 2).sum(axis=1)
+    mobility = (values(units["J"])[:, massive] ** 2 / values(mass)[massive]).sum(axis=1)
     mass[massive.stop :] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
     stiffness, damping = _stiffness(scene, basis, bodies, loads, placed["floor"], size)
-    response = np.zeros(size)
+    response = zeros(size)
     response[:n] = forced
     system = System(
         modes=n, bodies=len(bodies), contacts=len(contacts), mass=mass, stiffness=stiffness, damping=damping,
-        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0,
+        scale=scalar(forced[0]) if isinstance(scene.structure, Rigid) else 1.0,
         squares=basis.stiffness.copy(), viscous=basis.damping.copy(), response=response, table=table,
         outputs=_by_sector(scene, basis),
         frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
-        delassus=(units["J"] / mass) @ units["J"].T,
-        restitution_at=law_address(scene.contact, units["restitution"][: len(contacts)]),
+        delassus=(values(units["J"]) / values(mass)) @ values(units["J"]).T,
+        restitution_at=law_address(scene.contact, values(units["restitution"])[: len(contacts)]),
         in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
-    return _with_scales(system)
+    return system if active() is not None else _with_scales(system)
 
 
 # parts of a system by the names of its fields; n modes, N = size coordinates, b bodies
@@ -103,12 +104,13 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
     rows = [
         interface_row(basis, damper.at or at, f"friction_damper[{number}].at") for number, damper in enumerate(dampers)
     ]
-    grip = np.array([coefficient(damper.friction) * damper.normal_force for damper in dampers])
-    spring = np.array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])
+    grip = array([coefficient(damper.friction) * damper.normal_force for damper in dampers])
+    spring = array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])
     jenkins = np.flatnonzero((grip > 0.0) & np.isfinite(spring))
-    casing = np.zeros((len(rows), first + len(jenkins)))
-    casing[:, : len(basis.stiffness)] = np.reshape(rows, (len(rows), len(basis.stiffness)))
-    elongation = casing[jenkins]
+    casing = zeros((len(rows), first + len(jenkins)))
+    for own, row in zip(casing, rows, strict=True):
+        own[: len(row)] = row
+    elongation = casing[jenkins].copy()
     elongation[:, first:] = -np.eye(len(jenkins))
     return {
         "casing": casing, "grip": grip, "casing_spring": spring, "tangential": spring[jenkins],
@@ -121,7 +123,10 @@ def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:
     ring, name = ring_in_file(scene.structure), forced_label(scene).partition("@")[0]
     sectors = range(0 if ring is None else ring.sectors)
     rows = [interface_row(basis, f"{name}@{sector}", "excitation.at") for sector in sectors]
-    return np.reshape(rows, (len(rows), len(basis.stiffness)))
+    found = zeros((len(rows), len(basis.stiffness)))
+    for own, row in zip(found, rows, strict=True):
+        own[:] = row
+    return found
 
 
 def _excitation(
@@ -130,7 +135,7 @@ def _excitation(
 ) -> dict[str, Any]:  # fmt: skip
     """Return loads and weights. forced: (n,) functional of excitation.at; table: (e,) displacements of the base, m."""
     n, base = len(basis.stiffness), base_acceleration(scene, basis)
-    load, weight = np.zeros((len(table), size), complex), np.zeros(size)
+    load, weight = zeros((len(table), size), dtype=complex), zeros(size)
     amplitude = force_amplitude(scene, basis, forced)
     load[:, :n] = force_shapes(scene, basis, forced) * -1j * amplitude - base @ basis.base.T
     floors = [surface_labels(scene, scene.cavity_of(body.damper))[2] for body in bodies]
@@ -140,11 +145,11 @@ def _excitation(
         load[:, x] = loads.gradient[k] * table - mass * accelerated[:, k]
         weight[x] = mass * loads.along[k]
         if body.shape.extended:
-            weight[x + 1] = -mass * float(loads.across[k])
+            weight[x + 1] = -mass * loads.across[k]
             normal = basis.across(label)
             if normal is not None:
                 load[:, x + 1] = -mass * (base @ normal)
-    return {"load": load, "weight": weight, "alike": bool(np.all(accelerated == accelerated[:, :1]))}
+    return {"load": load, "weight": weight, "alike": bool(np.all(values(accelerated) == values(accelerated)[:, :1]))}
 
 
 def _places(
@@ -153,25 +158,25 @@ def _places(
 ) -> dict[str, Any]:  # fmt: skip
     """Return where the bodies are, and how their cavities move."""
     n, owner = len(basis.stiffness), [scene.cavity_of(body.damper) for body in bodies]
-    floor, turn, rise = np.zeros((3, len(bodies), size))
+    floor, turn, rise = zeros((3, len(bodies), size))
     for body, index in zip(bodies, owner, strict=True):
         ground = surfaces[index][FLOOR]
         floor[body.number, :n] = ground.motion(0.0, body.b)[0] if body.b > 0.0 else ground.along
         rise[body.number, :n], turn[body.number, :n] = ground.motion(body.centre, 0.0)[1], ground.turn
     plays = [min(scene.cavity[index].gap, scene.cavity[index].play or np.inf) for index in owner]
-    shortening = [body.shape.shortening(body.damper) for body in bodies]
+    shortening = [body.damper.shaped("shortening") for body in bodies]
     return {
         "along": np.array([body.x for body in bodies], np.int64),
         "tilt": np.array([body.x + 2 if body.shape.extended else -1 for body in bodies], np.int64),
-        "floor": floor, "turn": turn, "rise": rise, "height": np.array([body.b for body in bodies]),
+        "floor": floor, "turn": turn, "rise": rise, "height": array([body.b for body in bodies]),
         "cavity": np.array(owner, np.int64),
-        "neglected": np.array([short / play for short, play in zip(shortening, plays, strict=True)]),
+        "neglected": array([short / play for short, play in zip(shortening, plays, strict=True)]),
     }  # fmt: skip
 
 
 def _mass(bodies: list[Body], size: int) -> np.ndarray:
     """Return the masses (N,) of the coordinates; sliders' masses are still open."""
-    mass = np.ones(size)
+    mass = zeros(size) + 1.0
     for body in bodies:
         mass[body.coordinates] = body.damper.mass
         if body.shape.extended:
@@ -193,27 +198,31 @@ def _contacts(
         contacts += [layer for unit in single for layer in layered(scene.contact, unit)]
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
-    reach = np.abs(force).sum(axis=0) / squares
+    reach = np.abs(values(force)).sum(axis=0) / values(squares)
     parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"])
     own = list(element_units(scene, parts))
     contacts += [unit for unit in own if unit.normal.any()]
-    check_friction(contacts, law.mass)
+    if active() is None:
+        check_friction(contacts, law.mass)
     return contacts, [unit for unit in own if not unit.normal.any()]
 
 
 def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     """Return the units as arrays."""
     # arrays of their own, as all in a system: the compiled functions are compiled for the layout of their arguments
-    restitution, spring, dashpot = np.reshape([unit.element for unit in units], (len(units), 3)).T.astype(float, "C")
-    J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
-    kinds: dict[str, type] = dict.fromkeys(("rest", "friction", "limit", "play"), float)
-    kinds |= dict.fromkeys(("body", "other", "corner"), np.int64)
+    elements = [unit.element for unit in units]
+    J = array([unit.normal for unit in units] + [unit.slip for unit in units]).reshape(2 * len(units), size)
     found: dict[str, Any] = {
-        name: np.array([getattr(unit, name) for unit in units], kind) for name, kind in kinds.items()
+        name: np.array([getattr(unit, name) for unit in units], np.int64) for name in ("body", "other", "corner")
+    }
+    found |= {
+        name: array([getattr(unit, name) for unit in units]) for name in ("rest", "friction", "limit", "play")
     }
     return found | {
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
-        "restitution": restitution, "spring": spring, "dashpot": dashpot,
+        "restitution": array([element.restitution for element in elements]),
+        "spring": array([element.stiffness for element in elements]),
+        "dashpot": array([element.dashpot for element in elements]),
     }  # fmt: skip
 
 
@@ -222,7 +231,7 @@ def _stiffness(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return stiffness and damping (N, N) of structure and bodies on springs, dashpots and tracks."""
     n = len(basis.stiffness)
-    stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
+    stiffness, damping = zeros((size, size)), zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(basis.stiffness), basis.damping
     for body, pull, drag in zip(bodies, *binding(scene, loads), strict=True):
         if pull or drag:
@@ -258,15 +267,20 @@ def pressing(scene: Scene, loads: BodyLoads | None = None) -> list[float]:
     """Return the force (b,) that presses each body on its floor, N; negative: off it."""
     across = (body_loads(scene, basis_of(scene)) if loads is None else loads).across
     return [
-        damper.mass * float(pull) if damper.normal_load is None else damper.normal_load
+        damper.mass * pull if damper.normal_load is None else damper.normal_load
         for damper, pull in zip(scene.damper, across, strict=True)
     ]
 
 
 def _holding(scene: Scene, loads: BodyLoads) -> np.ndarray:
     """Return the friction (b,) that holds each body on its floor under its weight, at most, N."""
-    bodies = zip(scene.damper, pressing(scene, loads), strict=True)
-    return np.array([coefficient(damper.friction) * max(force, 0.0) for damper, force in bodies])
+    found = []
+    for damper, force in zip(scene.damper, pressing(scene, loads), strict=True):
+        friction = coefficient(damper.friction)
+        # the equations know it of bodies that only slide: of others it need not turn
+        force = values(force) if damper.form.extended else force
+        found.append(0.0 if vanishes(friction) else friction * max(force, 0.0))
+    return array(found)
 
 
 def _bodies(scene: Scene, first: int) -> list[Body]:
@@ -274,7 +288,7 @@ def _bodies(scene: Scene, first: int) -> list[Body]:
     bodies: list[Body] = []
     places = zip(scene.damper, heights(scene), centres(scene), strict=True)
     for number, (damper, height, centre) in enumerate(places):
-        bodies.append(Body(number, damper, first, damper.half_extent[0], float(height), float(centre)))
+        bodies.append(Body(number, damper, first, damper.half_extent[0], height, centre))
         first = bodies[-1].coordinates.stop
     return bodies
 
@@ -290,11 +304,11 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
     excitation, direction = scene.excitation, basis.directions[forced_label(scene)]
     if excitation.base_direction is not None:
         direction = np.array(excitation.base_direction) / np.linalg.norm(excitation.base_direction)
-    share = np.array(list(excitation.shares.values()))[:, None]
+    share = array(list(excitation.shares.values()), complex)[:, None]
     if isinstance(scene.structure, Prescribed):
         frequency = 2 * np.pi * scene.frequency * np.array(list(excitation.shares))[:, None]
-        return np.asarray(-(frequency**2) * (share * -1j * scene.structure.displacement_amplitude) * direction)
-    return np.asarray(share * (excitation.base_acceleration or 0.0) * -1j * direction)
+        return -(frequency**2) * (share * -1j * scene.structure.displacement_amplitude) * direction
+    return share * (excitation.base_acceleration or 0.0) * -1j * direction
 
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:

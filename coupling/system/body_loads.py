@@ -28,6 +28,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
+from vanedamp.coupling.tangents.dual import array, cos, radians, sin, zeros
 from vanedamp.files.toml_input import InputError
 
 #: fraction of its reference above which a neglected term is warned of
@@ -76,21 +77,21 @@ def body_loads(scene: Scene, basis: ModalBasis) -> BodyLoads:
                 f"damper[{index}].track_radius: the body is pulled off its concave floor by {-across:.4g} m/s^2; turn "
                 "the cavity round, or leave it out"
             )
-        if centre and (gradient or curvature):  # of several bodies side by side, none is in the middle
-            along += (gradient - curvature) * float(centre)
+        # of several bodies side by side, none is in the middle
+        along = along + (gradient - curvature) * centre
         loads.append((along, across, damper.mass * curvature, damper.mass * gradient * _held(damper)))
-    return BodyLoads(*np.reshape(loads, (-1, 4)).T)
+    return BodyLoads(*array(loads).reshape(-1, 4).T)
 
 
 def binding(scene: Scene, loads: BodyLoads) -> tuple[np.ndarray, np.ndarray]:
     """Return stiffness, N/m, and dashpot, N s/m, (b,) each, that bind the bodies to their floors."""
-    springs = np.array([damper.stiffness or 0.0 for damper in scene.damper]) + loads.track
-    return springs, np.array([damper.dashpot or 0.0 for damper in scene.damper])
+    springs = array([0.0 if damper.stiffness is None else damper.stiffness for damper in scene.damper]) + loads.track
+    return springs, array([0.0 if damper.dashpot is None else damper.dashpot for damper in scene.damper])
 
 
 def centres(scene: Scene) -> np.ndarray:
     """Return where the centres of the bodies (b,) stand in their cavities, m from the middle, side by side."""
-    places = np.zeros(len(scene.damper))
+    places = zeros(len(scene.damper))
     for cavity in scene.cavity:
         half = {number: scene.damper[number].half_extent[0] for number in scene.bodies_in(cavity)}
         end = -sum(half.values())
@@ -237,9 +238,9 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
     damper, square = scene.damper[index], scene.speed**2
     cavity = scene.cavity[scene.cavity_of(damper)]
     if not isinstance(scene.structure, Rom):
-        angle = math.radians(cavity.centrifugal_deg)
-        outward = -math.sin(angle) * _ALONG - math.cos(angle) * _ACROSS
-        return _Field(square * (cavity.radius or 0.0) * outward, square, _ALONG, _ACROSS)
+        angle = radians(cavity.centrifugal_deg)
+        outward = -sin(angle) * _ALONG - cos(angle) * _ACROSS
+        return _Field(square * (0.0 if cavity.radius is None else cavity.radius) * outward, square, _ALONG, _ACROSS)
     axis, point = basis.rotation_axis, basis.rotation_point
     if axis is None or point is None:
         raise InputError(
@@ -259,11 +260,11 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
     own = cavity.floor is None or label not in walls  # else a wall is the floor, at the cavity's position
     if own and all(wall in basis.positions for wall in walls):
         middle = 0.5 * (basis.positions[walls[0]] + basis.positions[walls[1]]) - point
-        place = place + along * float((middle - place) @ along)
+        place = place + along * ((middle - place) @ along)
     if across is not None:
         place = place + across * damper.half_extent[1]
-    load = square * (place - axis * float(place @ axis))
-    gradient = square * (1.0 - float(along @ axis) ** 2)
+    load = square * (place - axis * (place @ axis))
+    gradient = square * (1.0 - (along @ axis) ** 2)
     return _Field(load + _standing_gravity(scene, basis), gradient, along, across)
 
 
@@ -272,6 +273,6 @@ def _standing_gravity(scene: Scene, basis: ModalBasis) -> np.ndarray:
     if scene.gravity.direction is None or basis.rotation_axis is None:
         return np.zeros(3)
     down = np.array(scene.gravity.direction)
-    share = scene.gravity.acceleration * float(down @ basis.rotation_axis) / float(np.linalg.norm(down))
+    share = scene.gravity.acceleration * (float(down @ basis.rotation_axis) / float(np.linalg.norm(down)))
     part: np.ndarray = share * basis.rotation_axis
     return part

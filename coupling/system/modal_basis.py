@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
 from vanedamp.coupling.system.reduced_model_file import restricted
+from vanedamp.coupling.tangents.dual import active, array, scalar
+from vanedamp.coupling.tangents.opaque import opaque, plain
 from vanedamp.files.store import file_stamp, frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
@@ -59,8 +62,13 @@ class ModalBasis:
         if self.residual is None:
             return 0.0
         places = [list(self.rows).index(label) for label in shares]
-        weights = np.array(list(shares.values()))
-        return float(weights @ self.residual[np.ix_(places, places)] @ weights)
+        weights = array(list(shares.values()))
+        return scalar(weights @ self.residual[np.ix_(places, places)] @ weights)
+
+
+def _kept(given: Any) -> Any:
+    """Return numbers that nobody changes as an array."""
+    return frozen(given) if active() is None else array(given)
 
 
 #: direction of the one axis that a structure without an interface has
@@ -82,11 +90,28 @@ def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
 
 def basis_of(scene: Scene) -> ModalBasis:
     """Return the modes of a scene's structure at its speed. Raises InputError for an unusable model."""
-    return structure_basis(scene.structure, scene.speed)
+    structure, speed = scene.structure, scene.speed
+    if active() is None or not isinstance(structure, Rom):
+        return structure_basis(structure, speed)
+    here = structure_basis(*plain((structure, speed)))
+    found: ModalBasis = opaque(lambda one, at: _aligned(structure_basis(one, at), here), structure, speed)
+    return found
+
+
+def _aligned(basis: ModalBasis, like: ModalBasis) -> ModalBasis:
+    """Return a basis whose modes have the signs of a neighbouring one's."""
+    own, other = ([*each.rows.values(), *each.base.T] for each in (basis, like))
+    sign = np.where(sum(a * b for a, b in zip(own, other, strict=True)) < 0.0, -1.0, 1.0)
+    turned = {name: None if (one := getattr(basis, name)) is None else one * sign for name in ("in_file", "inertia")}
+    return replace(
+        basis, damping=basis.damping * sign * sign[:, None], base=basis.base * sign[:, None],
+        rows={label: row * sign for label, row in basis.rows.items()}, **turned,
+    )  # fmt: skip
 
 
 def structure_basis(structure: Structure, speed: float) -> ModalBasis:
     """Return the modes of a structure at a speed of rotation, rad/s. Raises InputError for an unusable model."""
+    structure = moved(structure)
     if isinstance(structure, Rigid):
         root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(speed)
         if not stiffness > 0.0:
@@ -96,8 +121,8 @@ def structure_basis(structure: Structure, speed: float) -> ModalBasis:
             )
         inertia = root if structure.base_mass is None else structure.base_mass / root
         return ModalBasis(
-            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(speed) / structure.mass]]),
-            frozen([inertia * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
+            *map(_kept, ([stiffness / structure.mass], [[structure.viscous_at(speed) / structure.mass]])),
+            _kept([inertia * _AXIS]), {"structure": _kept([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
@@ -113,6 +138,32 @@ def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
     if found.in_file is None or found.inertia is None:
         return basis
     return replace(basis, in_file=frozen(found.in_file @ shapes), inertia=frozen(found.inertia @ shapes))
+
+
+def moved(structure: Structure) -> Structure:
+    """Return a structure where numbers that it has no values for have moved it (derivatives.numbers)."""
+    for make, amount in getattr(structure, "moves", ()):
+        if amount:
+            structure = make(amount)
+    return structure
+
+
+def transfer_of(scene: Scene, before: float) -> np.ndarray:
+    """Return `modal_transfer` to the modes of a scene from those at a speed of rotation, rad/s."""
+    assert isinstance(scene.structure, Rom)
+    if active() is None:
+        return modal_transfer(scene.structure, before, scene.speed)
+    structure, speed = plain((scene.structure, scene.speed))
+    here = structure_basis(structure, before), structure_basis(structure, speed)
+
+    def transfer(one: Rom, after: float) -> np.ndarray:
+        bases = structure_basis(one, before), structure_basis(one, after)
+        first, last = (_aligned(*both) for both in zip(bases, here, strict=True))
+        assert first.in_file is not None and last.inertia is not None
+        return last.inertia.T @ first.in_file
+
+    found: np.ndarray = opaque(transfer, scene.structure, scene.speed)
+    return found
 
 
 def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Ring, Rom, Structure
 from vanedamp.coupling.system.engine_order import crossings
-from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, structure_basis
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, moved, structure_basis
 from vanedamp.coupling.system.sectors import unrolled
+from vanedamp.coupling.tangents.dual import active, array, solve, zeros
+from vanedamp.coupling.tangents.opaque import changed, opaque, plain
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 
@@ -63,8 +65,8 @@ def force_shapes(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.nd
     """
     shares = scene.excitation.shares
     if not scene.excitation.distributed:
-        return np.array(list(shares.values()))[:, None] * response
-    shapes = np.zeros((len(shares), len(response)), complex)
+        return array(list(shares.values()), complex)[:, None] * response
+    shapes = zeros((len(shares), len(response)), dtype=complex)
     orders = list(shares)
     for place, load in scene.excitation.loads.items():
         row = interface_row(basis, load.at, f"{place}.at" if scene.excitation.load else place)
@@ -99,9 +101,22 @@ def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> fl
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.level
-    if (meant := _at_resonance(scene)) is not scene:
-        return excitation.resonance_amplitude / chosen_resonance(meant).flexibility
-    return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
+    if _along_order(scene) or _mistuned(scene):
+
+        def flexibility(*parts: Any) -> float:
+            names = ("structure", "excitation", "rotation")
+            return chosen_resonance(changed(scene, **dict(zip(names, parts, strict=True)))).flexibility
+
+        meant: float = opaque(flexibility, scene.structure, excitation, scene.rotation)
+        return excitation.resonance_amplitude / meant
+    if active() is None:
+        return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
+    found = _chosen(*plain((scene, basis, response)))
+    # at its highest, the response does not change with the frequency
+    omega = 2 * np.pi * found.frequency
+    dynamic = np.diag(basis.stiffness - omega**2) + 1j * omega * basis.damping
+    force = force_shapes(scene, basis, response)[0] if excitation.distributed else response
+    return excitation.resonance_amplitude / abs(response @ solve(dynamic, force))
 
 
 def _at_resonance(scene: Scene) -> Scene:
@@ -109,19 +124,30 @@ def _at_resonance(scene: Scene) -> Scene:
 
     A ring is then the tuned one: the level is one for all mistuned rings.
     """
-    if isinstance(scene.structure, Ring) and scene.structure.mistuning is not None:
-        scene = replace(scene, structure=replace(scene.structure, mistuning=None))
+    if _mistuned(scene):
+        scene = changed(scene, structure=changed(scene.structure, mistuning=None))
+    if not _along_order(scene):
+        return scene
     excitation, at = scene.excitation, forced_label(scene)
     order, (low, high) = excitation.engine_order, scene.resonance_range
-    if order is None or low == high:
-        return scene
-    structure = scene.structure
+    assert order is not None
+    structure = moved(scene.structure)
     stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
     sine = {load.at: load.amplitude for load in excitation.loads.values() if load.order == 1} or {at: 1.0 + 0.0j}
     ends = speed_of(order, low), speed_of(order, high)
     speed = _resonant_speed(structure, at, tuple(sine.items()), order, *ends, stamp)
     near = replace(excitation, resonance_near=frequency_of(order, speed))
     return replace(scene, rotation=Rotation(speed=speed), excitation=near)
+
+
+def _mistuned(scene: Scene) -> bool:
+    return isinstance(scene.structure, Ring) and scene.structure.mistuning is not None
+
+
+def _along_order(scene: Scene) -> bool:
+    """Whether a resonance is sought over a range of an engine order."""
+    near = scene.excitation.resonance_near
+    return scene.excitation.engine_order is not None and isinstance(near, tuple) and near[0] != near[1]
 
 
 @lru_cache(maxsize=64)

@@ -14,6 +14,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, SIDES
 from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
+from vanedamp.coupling.tangents.dual import array, scalar, values, zeros
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import NORMAL, ROTATION
 
@@ -43,11 +44,11 @@ def heights(scene: Scene) -> np.ndarray:
     Sliders in one cavity have the mean of their heights by mass: two that touch and are nowhere held move freely
     of the structure only if it moves them alike.
     """
-    found = np.array([damper.half_extent[1] for damper in scene.damper])
-    mass = np.array([damper.mass for damper in scene.damper])
+    found = array([damper.half_extent[1] for damper in scene.damper])
+    mass = array([damper.mass for damper in scene.damper])
     for cavity in scene.cavity:
         row = np.array([k for k in scene.bodies_in(cavity) if not scene.damper[k].form.planar], int)
-        known = row[found[row] > 0.0]
+        known = row[values(found)[row] > 0.0]
         if known.size:
             found[row] = (mass[known] @ found[known]) / mass[known].sum()
     return found
@@ -64,9 +65,9 @@ def surfaces_of(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, .
     rows = [interface_row(basis, label, f"{key}.{SIDES[side]}") for side, label in enumerate(labels)]
     floor = rows[FLOOR]
     for suffix, name in ((NORMAL, "normal_motion"), (ROTATION, "rotation")):
-        if getattr(cavity, name) and below + suffix in basis.rows:
+        if below + suffix in basis.rows and getattr(cavity, name):
             raise InputError(f"{key}.{name}: the reduced model has '{below}{suffix}', which gives it; leave it out")
-    none = np.zeros(len(basis.stiffness))
+    none = zeros(len(basis.stiffness))
     across = basis.rows.get(below + NORMAL, cavity.normal_motion * floor) + none
     turn = basis.rows.get(below + ROTATION, cavity.rotation * floor) + none
     places = _places(basis, labels)
@@ -103,7 +104,7 @@ def surfaces_of(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, .
 def walls_and_floor(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, ...]:
     """Return the surfaces of a cavity by their motion along it only, for bodies without a height."""
     left, right, below = surface_labels(scene, index)
-    none = np.zeros(len(basis.stiffness))
+    none = zeros(len(basis.stiffness))
     rows = [
         interface_row(basis, label, f"cavity[{index}].{side}")
         for label, side in zip((left, right, below), SIDES, strict=False)
@@ -124,11 +125,11 @@ def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, flo
     if across is None or not all(label in at for label in labels):
         return None
     middle = at[floor] if floor in (left, right) else 0.5 * (at[left] + at[right])
-    return [(float((at[label] - middle) @ along), float((at[label] - at[floor]) @ across)) for label in labels]
+    return [(scalar((at[label] - middle) @ along), scalar((at[label] - at[floor]) @ across)) for label in labels]
 
 
 def flexibility(basis: ModalBasis, surface: Surface, is_wall: bool, lever: float = 0.0) -> float:
     """Return the residual flexibility, m/N, of a surface against a force on it; lever: m, that turns it."""
     moves, turns = surface.labels[0 if is_wall else 1], surface.labels[2]
-    shares = {moves: 1.0} | ({turns: lever} if turns and lever else {})
+    shares = {moves: 1.0} | ({turns: lever} if turns else {})
     return basis.flexibility(shares) if moves else 0.0

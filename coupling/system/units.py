@@ -23,6 +23,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, LEFT, RIGHT, SIDES, Shape, common_heights
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 from vanedamp.coupling.system.surfaces import Surface, flexibility
+from vanedamp.coupling.tangents.dual import scalar, values, zeros
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.toml_input import InputError
 
 #: smaller coefficients of friction are treated as zero: their forces are lost in the round-off of others
@@ -56,7 +58,7 @@ class Body(NamedTuple):
 
     def point(self, a: float, b: float, size: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the motion (N,) along and across of a point of the body."""
-        along, across = np.zeros(size), np.zeros(size)
+        along, across = zeros(size), zeros(size)
         along[self.x] = 1.0
         if self.shape.extended:
             along[self.x + 2], across[self.x + 1], across[self.x + 2] = -b, 1.0, a
@@ -77,12 +79,27 @@ class Law(NamedTuple):
         """
         mobility = normal**2 / self.mass
         mobility[1 : len(self.basis.stiffness)] = 0.0
-        return self.contact.element(restitution, 1 / max(float(mobility.sum()), _LIGHT), yields)
+        return element_of(self.contact, restitution, 1 / max(scalar(mobility.sum()), _LIGHT), yields)
+
+
+def element_of(contact: ContactLaw, *numbers: float) -> Element:
+    """Return the element of a contact (ContactLaw.element)."""
+    if type(contact).element is ContactLaw.element:
+        return contact.element(*numbers)
+    return Element(*opaque(lambda law, *given: law.element(*given), contact, *numbers))
+
+
+def layers_of(contact: ContactLaw, element: Element) -> tuple[tuple[float, Element], ...]:
+    """Return the elements that make up a contact (ContactLaw.layers)."""
+    if type(contact).layers is ContactLaw.layers:
+        return contact.layers(element)
+    found: tuple[tuple[float, Element], ...] = opaque(lambda law, own: law.layers(own), contact, element)
+    return found
 
 
 def layered(contact: ContactLaw, unit: Unit) -> Iterator[Unit]:
     """Yield the units of a contact of the scene's law: springs in parallel begin one below the other."""
-    for depth, element in contact.layers(unit.element):
+    for depth, element in layers_of(contact, unit.element):
         yield unit._replace(rest=unit.rest + depth, element=element)
 
 
@@ -109,7 +126,7 @@ def _at_wall(
 ) -> Iterator[Unit]:
     """Yield the contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign, moving = 1.0 if surface == LEFT else -1.0, surfaces[surface]
-    for corner, a, b in body.shape.points(body.damper, surface):
+    for corner, a, b in body.damper.shaped("points", surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(wall, body.b + b)
         # a slider without a height meets the wall where the wall's motion is known
@@ -126,7 +143,7 @@ def _at_floor(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: Bod
     """Yield the contacts with floor or ceiling."""
     below, play, moving = surface == FLOOR, cavity.play or 0.0, surfaces[surface]
     sign = 1.0 if below else -1.0
-    for corner, a, b in body.shape.points(body.damper, surface):
+    for corner, a, b in body.damper.shaped("points", surface):
         along, across = body.point(a, b, len(law.mass))
         moved_along, moved_across = moving.motion(body.centre + a, 0.0 if below else 2 * body.b + play)
         along[: len(moved_along)] -= moved_along
@@ -157,7 +174,7 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
             f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
             "no height at which they could touch: give it a shape"
         )
-    faces = [item.shape.face(item.damper) for item in (right, left)]
+    faces = [item.damper.shaped("face") for item in (right, left)]
     heights, size = common_heights(*faces), len(law.mass)
     if not heights:
         spans = [" to ".join(f"{height:g}" for height in face) for face in faces]
@@ -195,7 +212,7 @@ class ElementParts(NamedTuple):
 
     def motion(self, label: str | None, key: str) -> np.ndarray:
         """Return the displacement of an interface label. Raises InputError for an unknown one."""
-        row, n = np.zeros(self.floor.shape[1]), len(self.reach)
+        row, n = zeros(self.floor.shape[1]), len(self.reach)
         row[:n] = interface_row(self.law.basis, label or self.label, key)
         return row
 
@@ -212,13 +229,14 @@ class ElementParts(NamedTuple):
 
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves, m, at least the smallest number."""
-        return float(np.abs(normal[: len(self.reach)]) @ self.reach + self.start + np.finfo(float).tiny)
+        reach = np.abs(values(normal[: len(self.reach)])) @ self.reach
+        return float(reach + values(self.start) + np.finfo(float).tiny)
 
 
 def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
     """Yield the units of the scene's elements. Raises TypeError for springs or friction that one does not declare."""
     for table, number, element in scene.elements:
-        for unit in element.units(number, parts):
+        for unit in opaque(lambda one, of, number=number: tuple(one.units(number, of)), element, parts):
             springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid
             if (springs and not element.yields) or ((unit.friction or unit.limit) and not element.rubs):
                 raise TypeError(f"{table}: its units have springs or friction: declare `yields` or `rubs` of its class")
@@ -245,22 +263,23 @@ def friction_elements(
 
     floor (b, N), holds (b,), casing (d, N), grip (d,): as in System. Elements without a limit do not count.
     """
-    none = np.zeros(floor.shape[1])
+    none = zeros(floor.shape[1])
     for body in bodies:
-        if holds[body.number] > 0.0 and not body.shape.extended:
+        if not body.shape.extended and holds[body.number] > 0.0:
             slip = -floor[body.number]
             slip[body.x] += 1.0
-            yield Unit(none, slip, body=body.number, side="floor", limit=float(holds[body.number]))
+            yield Unit(none, slip, body=body.number, side="floor", limit=scalar(holds[body.number]))
     rubbing = np.flatnonzero(grip > 0.0)
     jenkins = [number for number in rubbing if scene.friction_damper[number].stiffness is not None]
     for number in rubbing:
         if number not in jenkins:
-            yield Unit(none, casing[number], body=int(number), limit=float(grip[number]))
+            yield Unit(none, casing[number], body=int(number), limit=scalar(grip[number]))
     sliders = np.eye(len(none))[len(none) - len(jenkins) :]
     for number, slider in zip(jenkins, sliders, strict=True):
-        yield Unit(none, slider, body=int(number), limit=float(grip[number]))
+        yield Unit(none, slider, body=int(number), limit=scalar(grip[number]))
 
 
 def coefficient(friction: float) -> float:
     """Return a coefficient of friction, zero where it is lost in the round-off of other forces."""
-    return friction if friction > _SMOOTH else 0.0
+    # at zero it may begin
+    return friction if friction > _SMOOTH else friction - values(friction)

@@ -11,7 +11,7 @@ from tests.tools.differences import quantities_of
 from tests.tools.rings import Chain
 from vanedamp.coupling.quantities.quantity import evaluated, table
 from vanedamp.coupling.scene.paths import number_at
-from vanedamp.coupling.sensitivity.dual import Dual
+from vanedamp.coupling.tangents.dual import Dual
 from vanedamp.coupling.sensitivity.sensitivity_record import NOT_IN_DERIVATIVES
 
 SHORT = TABLES | {"time": {"periods": 5, "transient": 2}, "initial": {"displacement": 0.1}}

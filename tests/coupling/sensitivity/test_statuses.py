@@ -8,7 +8,7 @@ import pytest
 
 import vanedamp as vd
 from tests.coupling.sensitivity.test_figures import TABLES, orbit_of
-from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 from vanedamp.coupling.scene.orbit import Orbit
 
 

@@ -1,0 +1,351 @@
+"""Numbers with their derivatives, on which plain numpy works: formulas of quantities need not know of them.
+
+Assembly makes its arrays by `zeros` and `array`: within `numbers(P)` they have derivatives by P numbers, and else they
+are numpy's. There a decision between equal values that turn apart is a kink, and raises NotSmooth.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.tangents.differences import NotSmooth
+
+#: derivatives of functions by each of their arguments
+_SLOPES: dict[np.ufunc, Callable[..., tuple[Any, ...]]] = {
+    np.add: lambda a, b: (1.0, 1.0),
+    np.subtract: lambda a, b: (1.0, -1.0),
+    np.multiply: lambda a, b: (b, a),
+    np.true_divide: lambda a, b: (1.0 / b, -a / b / b),
+    np.power: lambda a, b: (b * a ** (b - 1.0), a**b * np.log(a)),
+    np.negative: lambda a: (-1.0,),
+    np.sqrt: lambda a: (0.5 / np.sqrt(a),),
+    np.maximum: lambda a, b: (np.greater_equal(a, b), np.less(a, b)),
+    np.minimum: lambda a, b: (np.less_equal(a, b), np.greater(a, b)),
+    np.hypot: lambda a, b: (a / np.hypot(a, b), b / np.hypot(a, b)),
+    np.arctan2: lambda y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
+}
+#: functions that act on values and derivatives alike; those of values alone; and those that compare
+_LINEAR, _OF_VALUES = (np.conjugate, np.positive), (np.isfinite, np.isinf, np.isnan, np.sign, np.rint)
+_COMPARE = (np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal)
+
+
+class _Active(threading.local):
+    count: int | None = None
+
+
+_ACTIVE = _Active()
+
+
+@contextmanager
+def numbers(count: int | None) -> Iterator[None]:
+    """Let `zeros` and `array` make numbers with derivatives by `count` numbers; None: plain ones."""
+    before, _ACTIVE.count = _ACTIVE.count, count
+    try:
+        yield
+    finally:
+        _ACTIVE.count = before
+
+
+class Dual(np.lib.mixins.NDArrayOperatorsMixin):
+    """Numbers with their derivatives: value (...), turns (..., P)."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, value: Any, turns: Any) -> None:
+        self.value: np.ndarray = np.asarray(value)
+        self.turns: np.ndarray = np.asarray(turns)
+
+    def __array__(self, *_: Any) -> np.ndarray:
+        raise TypeError("numbers with derivatives are no plain numbers")
+
+    def __bool__(self) -> bool:
+        if _ACTIVE.count is not None and self.value == 0.0 and self.turns.any():
+            raise NotSmooth
+        return bool(self.value)
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        out = options.pop("out", None)
+        if method != "__call__" or options:
+            return NotImplemented
+        with np.errstate(all="ignore"):  # nan is what is not known
+            found = _called(ufunc, inputs, self.turns.shape[-1])
+        if out is None or found is NotImplemented:
+            return found
+        out[0][...] = found
+        return out[0]
+
+    def __array_function__(self, function: Any, types: Any, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
+        own = _FUNCTIONS.get(function)
+        return NotImplemented if own is None else own(*given, **options)
+
+    def __getitem__(self, place: Any) -> Dual:
+        return Dual(self.value[place], self.turns[_of_turns(place)])
+
+    def __setitem__(self, place: Any, given: Any) -> None:
+        self.value[place] = _value(given)
+        self.turns[_of_turns(place)] = given.turns if isinstance(given, Dual) else 0.0
+
+    def __iter__(self) -> Iterator[Dual]:
+        return (self[place] for place in range(len(self.value)))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Their shape."""
+        return self.value.shape
+
+    @property
+    def ndim(self) -> int:
+        """Number of their axes."""
+        return self.value.ndim
+
+    @property
+    def size(self) -> int:
+        """Number of them."""
+        return self.value.size
+
+    @property
+    def T(self) -> Dual:  # noqa: N802
+        """The transpose of a matrix."""
+        return Dual(self.value.T, self.turns.swapaxes(0, 1) if self.ndim == 2 else self.turns)
+
+    @property
+    def real(self) -> Dual:
+        """Their real parts."""
+        return Dual(self.value.real, self.turns.real)
+
+    @property
+    def imag(self) -> Dual:
+        """Their imaginary parts."""
+        return Dual(self.value.imag, self.turns.imag)
+
+    def copy(self) -> Dual:
+        """Return a copy."""
+        return Dual(self.value.copy(), self.turns.copy())
+
+    def reshape(self, *shape: int) -> Dual:
+        """Return them in another shape."""
+        value = self.value.reshape(*shape)
+        return Dual(value, self.turns.reshape(*value.shape, self.turns.shape[-1]))
+
+    def sum(self, axis: int = -1, keepdims: bool = False) -> Dual:
+        """Return the sum along an axis."""
+        own = axis % self.value.ndim
+        return Dual(self.value.sum(own, keepdims=keepdims), self.turns.sum(own, keepdims=keepdims))
+
+    def mean(self) -> Dual:
+        """Return the mean along the last axis."""
+        return self.sum() / self.value.shape[-1]
+
+    def max(self) -> Dual:
+        """Return the largest along the only axis."""
+        return self[int(np.argmax(self.value))]
+
+    def any(self, *options: Any, **more: Any) -> Any:
+        """Return whether any is, or may become, other than zero."""
+        return ((self.value != 0) | (self.turns != 0).any(axis=-1)).any(*options, **more)
+
+
+def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
+    """Return a function of numbers, some of which have derivatives."""
+    if ufunc is np.matmul:
+        return _product(*inputs)
+    values = [_value(one) for one in inputs]
+    value = ufunc(*values)
+    if ufunc in _COMPARE or ufunc in (np.maximum, np.minimum):
+        if _ACTIVE.count is not None:
+            _check_apart(*inputs)
+        if ufunc in _COMPARE:
+            return value
+    if ufunc in _OF_VALUES:
+        return value
+    if ufunc in _LINEAR:
+        return Dual(value, ufunc(inputs[0].turns))
+    if ufunc is np.absolute:
+        return Dual(value, _of_size(inputs[0], value))
+    if ufunc not in _SLOPES:
+        return NotImplemented
+    turns: Any = 0.0
+    for one, slope in zip(inputs, _SLOPES[ufunc](*values), strict=True):
+        if isinstance(one, Dual):
+            turns = turns + np.asarray(slope)[..., None] * one.turns
+    shape = (*np.shape(value), count)
+    return Dual(value, turns if np.shape(turns) == shape else np.broadcast_to(turns, shape).copy())
+
+
+def _of_size(one: Dual, size: Any) -> Any:
+    """Return the derivatives of absolute values."""
+    if not np.iscomplexobj(one.value):
+        return np.sign(one.value)[..., None] * one.turns
+    return (np.conjugate(one.value)[..., None] * one.turns).real / np.asarray(size)[..., None]
+
+
+def _check_apart(one: Any, other: Any) -> None:
+    """Raise NotSmooth where equal values turn apart."""
+    equal = np.asarray(_value(one) == _value(other))
+    if equal.any():
+        apart = [np.broadcast_to(_turns(each), (*equal.shape, _turns(each).shape[-1])) for each in (one, other)]
+        if (equal & (apart[0] != apart[1]).any(axis=-1)).any():
+            raise NotSmooth
+
+
+def _product(one: Any, other: Any) -> Dual:
+    """Return a product of matrices or vectors."""
+    a, b = _value(one), _value(other)
+    turns: Any = 0.0
+    if isinstance(one, Dual):
+        turns = np.moveaxis(np.matmul(np.moveaxis(one.turns, -1, 0), b), 0, -1)
+    if isinstance(other, Dual):
+        if b.ndim == 1:
+            turns = turns + np.matmul(a, other.turns)
+        else:
+            turns = turns + np.moveaxis(np.matmul(a, np.moveaxis(other.turns, -1, 0)), 0, -1)
+    return Dual(np.matmul(a, b), turns)
+
+
+def _of_turns(place: Any) -> Any:
+    """Return the place of derivatives: an ellipsis stands for the axes of values."""
+    if place is Ellipsis:
+        return place
+    steps = place if isinstance(place, tuple) else (place,)
+    return (*steps, slice(None)) if any(step is Ellipsis for step in steps) else place
+
+
+def _value(one: Any) -> Any:
+    return one.value if isinstance(one, Dual) else one
+
+
+def _turns(one: Any) -> Any:
+    return one.turns if isinstance(one, Dual) else np.zeros(1)
+
+
+def values(one: Any) -> Any:
+    """Return numbers without their derivatives."""
+    return _value(one)
+
+
+def _like(parts: Sequence[Any]) -> list[Dual]:
+    """Return parts as numbers with derivatives, of which one has some."""
+    count = next(part.turns.shape[-1] for part in parts if isinstance(part, Dual))
+    return [part if isinstance(part, Dual) else Dual(part, np.zeros((*np.shape(part), count))) for part in parts]
+
+
+def _joined(join: Any, parts: Sequence[Any], axis: int = 0) -> Dual:
+    both = _like(parts)
+    value = join([part.value for part in both], axis=axis)
+    return Dual(value, join([part.turns for part in both], axis=axis % value.ndim))
+
+
+def _where(chosen: np.ndarray, *both: Any) -> Dual:
+    return Dual(np.where(chosen, *map(_value, both)), np.where(chosen[..., None], *map(_turns, both)))
+
+
+def _diag(one: Dual) -> Dual:
+    made = np.zeros((len(one), len(one), one.turns.shape[-1]))
+    made[np.arange(len(one)), np.arange(len(one))] = one.turns
+    return Dual(np.diag(one.value), made)
+
+
+_FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.concatenate: lambda parts, axis=0: _joined(np.concatenate, parts, axis),
+    np.vstack: lambda parts: _joined(np.concatenate, [part if part.ndim > 1 else part.reshape(1, -1) for part in parts]),
+    np.hstack: lambda parts: _joined(np.concatenate, parts, -1),
+    np.stack: lambda parts, axis=0: _joined(np.stack, parts, axis),
+    np.where: _where,
+    np.outer: lambda one, other: one.reshape(-1, 1) * other.reshape(1, -1),
+    np.diag: _diag,
+    np.cross: lambda one, other: Dual(np.cross(one.value, other), np.cross(one.turns.T, other).T),
+    np.linalg.norm: lambda one: np.sqrt((one * one).sum()),
+}
+_FUNCTIONS[np.shape] = lambda one: one.value.shape
+
+
+def active() -> int | None:
+    """Return by how many numbers derivatives are wanted; None: nobody wants any."""
+    return _ACTIVE.count
+
+
+def zeros(shape: tuple[int, ...] | int, count: int | None = None, dtype: type = float) -> Any:
+    """Return zeros, with derivatives by `count` numbers (default: as many as `numbers` says)."""
+    value: np.ndarray = np.zeros(shape, dtype)
+    count = _ACTIVE.count if count is None else count
+    return value if count is None else Dual(value, np.zeros((*value.shape, count), dtype))
+
+
+def array(given: Any, dtype: type = float) -> Any:
+    """Return an array of numbers, in nested lists, of which some may have derivatives."""
+    if _ACTIVE.count is None:
+        return np.array(given, dtype)
+    value = np.array(_plain(given), dtype)
+    turns = np.zeros((*value.shape, _ACTIVE.count), dtype)
+    for place, one in _numbers_in(given):
+        turns[place] = one.turns
+    return Dual(value, turns)
+
+
+def _plain(given: Any) -> Any:
+    return [_plain(one) for one in given] if isinstance(given, list | tuple) else _value(given)
+
+
+def _numbers_in(given: Any, place: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Dual]]:
+    if isinstance(given, Dual):
+        yield place, given
+    elif isinstance(given, list | tuple):
+        for number, one in enumerate(given):
+            yield from _numbers_in(one, (*place, number))
+
+
+def scalar(one: Any) -> Any:
+    """Return a number as Python's, unless it has derivatives."""
+    return one if isinstance(one, Dual) else float(one)
+
+
+def vanishes(one: Any) -> bool:
+    """Return whether a number is zero and stays so."""
+    return bool(_value(one) == 0.0) and not (isinstance(one, Dual) and one.turns.any())
+
+
+def inverse(matrix: Any) -> Any:
+    """Return the inverse (n, n) of a matrix."""
+    found = np.linalg.inv(_value(matrix))
+    return Dual(found, -(found @ (Dual(matrix.value, matrix.turns) @ found)).turns) if isinstance(matrix, Dual) else found
+
+
+def solve(matrix: Any, right: Any) -> Any:
+    """Return the solution (n,) of a system of equations."""
+    found = np.linalg.solve(_value(matrix), _value(right))
+    if not isinstance(matrix, Dual) and not isinstance(right, Dual):
+        return found
+    left = right - matrix @ found
+    return Dual(found, np.linalg.solve(_value(matrix), left.turns))
+
+
+def _scalar(function: Callable[[float], float], slope: Callable[[float], float]) -> Callable[[Any], Any]:
+    def of(one: Any) -> Any:
+        if not isinstance(one, Dual):
+            return function(one)
+        return Dual(function(float(one.value)), slope(float(one.value)) * one.turns)
+
+    return of
+
+
+sin, cos = _scalar(math.sin, math.cos), _scalar(math.cos, lambda x: -math.sin(x))
+sqrt = _scalar(math.sqrt, lambda x: 0.5 / math.sqrt(x))
+#: angles in radians of those in degrees
+radians = _scalar(math.radians, lambda _: math.pi / 180)
+
+
+def rect(size: Any, angle: Any) -> Any:
+    """Return the complex number of a size and an angle, rad."""
+    if not isinstance(size, Dual) and not isinstance(angle, Dual):
+        return cmath.rect(size, angle)
+    return size * cos(angle) + 1j * (size * sin(angle))

@@ -1,0 +1,136 @@
+"""Functions that take plain numbers only, of records whose numbers have derivatives: by differences of themselves."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from vanedamp.coupling.tangents import dual
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
+from vanedamp.coupling.tangents.dual import Dual
+
+Record = TypeVar("Record")
+
+
+def changed(record: Record, **values: Any) -> Record:
+    """Return a frozen record with other values, which are known to be valid and may have derivatives."""
+    made = copy.copy(record)
+    for name, value in values.items():
+        object.__setattr__(made, name, value)
+    return made
+
+
+def with_number(record: Any, place: Sequence[str | int], number: Any) -> Any:
+    """Return nested records with a number at a place: names of fields, keys and places in lists."""
+    if not place:
+        return number
+    head, rest = place[0], place[1:]
+    if isinstance(record, Mapping):
+        return {**record, head: with_number(record[head], rest, number)}
+    if isinstance(record, tuple):
+        return (*record[: int(head)], with_number(record[int(head)], rest, number), *record[int(head) + 1 :])
+    if not hasattr(record, str(head)):  # keys that other code has added
+        return changed(record, added=with_number(record.added, place, number))
+    return changed(record, **{str(head): with_number(getattr(record, str(head)), rest, number)})
+
+
+def _mapped(thing: Any, change: Callable[[Any], Any], wanted: Callable[[Any], bool]) -> Any:
+    """Return nested records with their wanted parts changed; the same where nothing is."""
+    if wanted(thing):
+        return change(thing)
+    if isinstance(thing, Mapping):
+        made = {key: _mapped(one, change, wanted) for key, one in thing.items()}
+        return thing if all(made[key] is one for key, one in thing.items()) else made
+    if isinstance(thing, tuple | list):
+        parts = [_mapped(one, change, wanted) for one in thing]
+        if all(part is one for part, one in zip(parts, thing, strict=True)):
+            return thing
+        return type(thing)(*parts) if hasattr(thing, "_fields") else type(thing)(parts)
+    if is_dataclass(thing) and not isinstance(thing, type):
+        values = {name: _mapped(one, change, wanted) for name, one in vars(thing).items()}
+        turned = {name: one for name, one in values.items() if one is not vars(thing)[name]}
+        return changed(thing, **turned) if turned else thing
+    return thing
+
+
+def plain(thing: Any) -> Any:
+    """Return nested records without derivatives."""
+    return _mapped(thing, lambda one: _number(one.value), lambda one: isinstance(one, Dual))
+
+
+def _number(value: np.ndarray) -> Any:
+    return value.item() if value.ndim == 0 else value
+
+
+def _numbers(thing: Any) -> bool:
+    return isinstance(thing, float | complex | Dual) or (
+        isinstance(thing, np.ndarray | np.number) and np.issubdtype(thing.dtype, np.inexact)
+    )
+
+
+def _flat(thing: Any) -> list[np.ndarray]:
+    """Return the numbers of nested records, complex ones as pairs."""
+    found: list[np.ndarray] = []
+
+    def take(one: Any) -> Any:
+        values = np.atleast_1d(np.asarray(one)).ravel()
+        reals = values.view(float) if np.iscomplexobj(values) else values.astype(float)
+        found.append(np.where(np.isfinite(reals), reals, 0.0))  # what is infinite stays so
+        return one
+
+    _mapped(thing, take, _numbers)
+    return found
+
+
+def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False) -> Any:
+    """Return a function of records whose numbers may have derivatives: nested records, with derivatives of theirs.
+
+    By differences of high order along each number that turns them. Raises NotSmooth at a kink. unknown: derivatives are
+    nan there, and judged by each number in place of the largest of an array.
+    """
+    count, turned = dual.active(), list[Dual]()
+    _mapped(arguments, turned.append, lambda one: isinstance(one, Dual))
+    ways = [] if count is None else [p for p in range(count) if any(one.turns[..., p].any() for one in turned)]
+    with dual.numbers(None):
+        found = function(*plain(arguments))
+        here = _flat(found) if ways else []
+        if not here:
+            return found
+        flat = np.concatenate(here)
+        scale = np.concatenate([np.full(len(one), np.abs(one).max(initial=0.0)) for one in here])
+        scale = np.abs(flat) if unknown else scale
+        scale = np.where(scale > 0.0, scale, 1.0)
+        turns = np.zeros((len(flat), count or 0))
+        for p in ways:
+
+            def at(amount: float, p: int = p) -> np.ndarray:
+                moved = _mapped(
+                    arguments, lambda one: _number(one.value + amount * one.turns[..., p]), lambda one: isinstance(one, Dual)
+                )
+                values = _flat(function(*moved))
+                if [len(one) for one in values] != [len(one) for one in here]:
+                    raise NotSmooth
+                return np.concatenate(values) / scale
+
+            try:
+                turns[:, p] = derivative(at, 0.0, 1.0, flat / scale) * scale
+            except NotSmooth:
+                if not unknown:
+                    raise
+                turns[:, p] = np.nan
+    left = iter(np.split(turns, np.cumsum([len(one) for one in here])[:-1]))
+    return _mapped(found, lambda one: _turned(one, left), _numbers)
+
+
+def _turned(one: Any, left: Iterator[np.ndarray]) -> Any:
+    """Return numbers with the next derivatives, plain where these are zero."""
+    turns = next(left)
+    if not turns.any():
+        return one
+    if np.iscomplexobj(one):
+        turns = turns[0::2] + 1j * turns[1::2]
+    return Dual(one, turns.reshape(*np.shape(one), -1))
