@@ -172,8 +172,8 @@ def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np
     """
     try:
         for path, values in numbers.items():
-            for end in (values.min(), values.max()):
-                maker.raw({**first, path: float(end)})
+            for end in {float(values.min()), float(values.max())}:
+                maker.raw({**first, path: end})
     except InputError:
         return False
     return True

@@ -86,8 +86,8 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
             own.put_parts(values[places[place]], parts | {"transient": 0})
 
         numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
-        first, several = points[places[0]], len(places) > 1 and bool(paths)
-        kind = kind_of(maker, first, paths) if several and are_scenes(maker, first, numbers) else None
+        first = points[places[0]]
+        kind = kind_of(maker, first, paths) if paths and are_scenes(maker, first, numbers) else None
         found = None
         if kind is not None:
             with suppress(InputError):  # a start that does not fit: the runs say so
@@ -100,6 +100,8 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
             continue
         job, linear, state = found
         ran = np.flatnonzero(job.codes)
+        if not len(ran):
+            continue
         at = np.array(places)[ran]
         sums = sources_of(job.sums[ran])
         undamped, fixed = linear[ran].T

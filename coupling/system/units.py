@@ -23,7 +23,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, LEFT, RIGHT, SIDES, Shape, common_heights
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 from vanedamp.coupling.system.surfaces import Surface, flexibility
-from vanedamp.coupling.tangents.dual import scalar, values, zeros
+from vanedamp.coupling.tangents.dual import scalar, values, vanishes, zeros
 from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.toml_input import InputError
 
@@ -182,8 +182,10 @@ def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body
             f"damper[{right.number}].shape: touches a neighbour in cavity '{cavity.name}' from {spans[0]} m above the "
             f"floor, and damper[{left.number}] from {spans[1]} m: neighbours must have a height in common"
         )
-    coefficient = law.contact.pair_restitution(left.damper.restitution, right.damper.restitution)
-    friction = (left.damper.friction * right.damper.friction) ** 0.5 if left.shape.extended else 0.0
+    both = left.damper, right.damper
+    coefficient = opaque(law.contact.pair_restitution, *(body.restitution for body in both))
+    smooth = not left.shape.extended or any(vanishes(body.friction) for body in both)
+    friction = 0.0 if smooth else (both[0].friction * both[1].friction) ** 0.5
     # the mean flexibility of the cavity's walls
     yields = 0.5 * sum(flexibility(law.basis, surfaces[side], True) for side in (LEFT, RIGHT))
     for height in heights:

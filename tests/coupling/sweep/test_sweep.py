@@ -212,6 +212,7 @@ def test_a_broken_run_is_one_point(monkeypatch, result):
             raise ZeroDivisionError("no such luck")
         return simulate(point)
 
+    monkeypatch.setattr(module, "kind_of", lambda *_: None)  # points run one by one
     monkeypatch.setattr(module, "simulate", brittle)
     found = sweep(scene())
     assert found.status[1, -1] == "error: ZeroDivisionError: no such luck"
@@ -238,6 +239,7 @@ def test_what_is_no_fault_of_a_point_ends_a_sweep(fault, monkeypatch, result, tm
         return simulate(point)
 
     kept = tmp_path / "sweep.partial"
+    monkeypatch.setattr(module, "kind_of", lambda *_: None)  # points run one by one
     monkeypatch.setattr(module, "simulate", poor)
     where = f"stopped at cavity.c1.gap = 0.0002, excitation.frequency = {last}: {type(fault).__name__}: "
     with pytest.raises(SweepError, match=where):
