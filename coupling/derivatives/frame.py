@@ -175,5 +175,3 @@ def _later(system: System, begin: float) -> System:
         return system
     turned = system.phases(np.array([2.0 * np.pi * begin]))[0]
     return system._replace(load=system.load * turned[:, None], table=system.table * turned)
-
-

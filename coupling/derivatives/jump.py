@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine
-from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 
 #: a speed after an impact below this fraction of the fastest of its contacts counts as zero: the end of a chatter
 _PLASTIC = 1e-9

@@ -159,7 +159,9 @@ def _turned(
         own = np.eye(len(paths))[place]
         if isinstance(path, MatrixDirection):
             sizes[place] = path.size(scene)
-            moves.append((lambda amount, path=path: derived(path.at(scene, amount)).structure, Dual(0.0, sizes[place] * own)))
+            moves.append(
+                (lambda amount, path=path: derived(path.at(scene, amount)).structure, Dual(0.0, sizes[place] * own))
+            )
             continue
         value = number_of_motion(scene, path, "numbers")
         sizes[place] = abs(value) or _size(path, dynamics)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import svd
 
-from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.period_map import PeriodMap
+from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.files.record import empty
 from vanedamp.files.toml_input import InputError
 

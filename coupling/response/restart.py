@@ -197,9 +197,7 @@ def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
     model does not have.
     """
     structure = scene.structure
-    if not (start.speed.size and isinstance(structure, Rom)) or (
-        active() is None and start.speed[0] == scene.speed
-    ):
+    if not (start.speed.size and isinstance(structure, Rom)) or (active() is None and start.speed[0] == scene.speed):
         return start
     transfer = transfer_of(scene, float(start.speed[0]))
     if transfer.shape[1] != len(start.displacement):

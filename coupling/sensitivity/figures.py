@@ -12,9 +12,9 @@ from vanedamp.coupling.quantities.quantity import evaluated, labels, table
 from vanedamp.coupling.quantities.sums import SUMS, sources_of
 from vanedamp.coupling.response.by_sector import sectors_of_bodies, tuned_amplitude
 from vanedamp.coupling.response.figures import measure, measured_of
-from vanedamp.coupling.tangents.dual import Dual, zeros
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.peaks import Swing, joined, top_of
+from vanedamp.coupling.tangents.dual import Dual, zeros
 
 
 class Figures:

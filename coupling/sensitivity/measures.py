@@ -15,7 +15,6 @@ from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import EventRun, Segment
 from vanedamp.coupling.response.static_deflection import deflects
-from vanedamp.coupling.tangents.dual import Dual, zeros
 from vanedamp.coupling.sensitivity.integrands import (
     POWERS,
     Functionals,
@@ -31,6 +30,7 @@ from vanedamp.coupling.sensitivity.sensitivity_record import Impact
 from vanedamp.coupling.sensitivity.strength import Struck
 from vanedamp.coupling.sensitivity.wear import Wearing
 from vanedamp.coupling.system.system import FLOOR, System
+from vanedamp.coupling.tangents.dual import Dual, zeros
 
 #: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
 _KEPT, _SAME = 1000, 1e-12
@@ -219,7 +219,7 @@ class Measures:
                 r = units[place]
                 if met[place].value > 0.0 and impulse.value[r] != 0.0:
                     after = speed(r, float(event.after[place]), w_after, turns[1])
-                    self.contacts.strike(met[place], after, np.abs(impulse[r]))
+                    self.contacts.strike(met[place], after, abs(impulse[r]))
 
     def _impulses(self, impulse: np.ndarray, turns: np.ndarray, massive: np.ndarray) -> Dual:
         """Return impulses (2u,), N s, by how the speeds that they change turn; nan of those that these do not tell."""

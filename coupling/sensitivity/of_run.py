@@ -19,11 +19,11 @@ from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, check_together, record
 from vanedamp.coupling.sensitivity.of_orbit import of_orbit
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
-from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 

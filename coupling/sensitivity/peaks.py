@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from vanedamp.coupling.derivatives.series import Course, Series
-from vanedamp.coupling.tangents.dual import Dual
 from vanedamp.coupling.sensitivity.integrands import Functionals
+from vanedamp.coupling.tangents.dual import Dual
 
 #: nodes within this fraction of the largest are followed to their summits: more than a summit may be from its node;
 #: steps of Newton's method, its last one

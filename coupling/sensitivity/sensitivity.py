@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.restart_state import RestartState
@@ -18,6 +17,7 @@ from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, nothing, t
 from vanedamp.coupling.sensitivity.of_orbit import of_orbit
 from vanedamp.coupling.sensitivity.of_run import of_ramp, of_ring_down, of_run
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
+from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import InputError

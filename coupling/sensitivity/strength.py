@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.tangents.dual import Dual
 from vanedamp.coupling.sensitivity.peaks import Found, largest
 from vanedamp.coupling.strength.contact_strength import loaded, wanted
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
+from vanedamp.coupling.tangents.dual import Dual
 
 
 class Worst(NamedTuple):

@@ -215,9 +215,7 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     found: dict[str, Any] = {
         name: np.array([getattr(unit, name) for unit in units], np.int64) for name in ("body", "other", "corner")
     }
-    found |= {
-        name: array([getattr(unit, name) for unit in units]) for name in ("rest", "friction", "limit", "play")
-    }
+    found |= {name: array([getattr(unit, name) for unit in units]) for name in ("rest", "friction", "limit", "play")}
     return found | {
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
         "restitution": array([element.restitution for element in elements]),

@@ -102,7 +102,9 @@ def _aligned(basis: ModalBasis, like: ModalBasis) -> ModalBasis:
     """Return a basis whose modes have the signs of a neighbouring one's."""
     own, other = ([*each.rows.values(), *each.base.T] for each in (basis, like))
     sign = np.where(sum(a * b for a, b in zip(own, other, strict=True)) < 0.0, -1.0, 1.0)
-    turned = {name: None if (one := getattr(basis, name)) is None else one * sign for name in ("in_file", "inertia")}
+    turned: dict[str, Any] = {
+        name: None if (one := getattr(basis, name)) is None else one * sign for name in ("in_file", "inertia")
+    }
     return replace(
         basis, damping=basis.damping * sign * sign[:, None], base=basis.base * sign[:, None],
         rows={label: row * sign for label, row in basis.rows.items()}, **turned,
@@ -121,7 +123,7 @@ def structure_basis(structure: Structure, speed: float) -> ModalBasis:
             )
         inertia = root if structure.base_mass is None else structure.base_mass / root
         return ModalBasis(
-            *map(_kept, ([stiffness / structure.mass], [[structure.viscous_at(speed) / structure.mass]])),
+            _kept([stiffness / structure.mass]), _kept([[structure.viscous_at(speed) / structure.mass]]),
             _kept([inertia * _AXIS]), {"structure": _kept([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):

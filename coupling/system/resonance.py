@@ -12,7 +12,14 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Ring, Rom, Structure
 from vanedamp.coupling.system.engine_order import crossings
-from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, moved, structure_basis
+from vanedamp.coupling.system.modal_basis import (
+    ModalBasis,
+    basis_of,
+    forced_label,
+    interface_row,
+    moved,
+    structure_basis,
+)
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.tangents.dual import active, array, solve, zeros
 from vanedamp.coupling.tangents.opaque import changed, opaque, plain

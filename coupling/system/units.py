@@ -242,7 +242,8 @@ def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
             springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid
             if (springs and not element.yields) or ((unit.friction or unit.limit) and not element.rubs):
                 raise TypeError(f"{table}: its units have springs or friction: declare `yields` or `rubs` of its class")
-            named = unit._replace(side=table)
+            play = unit.play or max(values(unit.rest), parts.travel(unit.normal))
+            named = unit._replace(side=table, play=play)
             yield from (named,) if element.yields or not unit.normal.any() else layered(scene.contact, named)
 
 

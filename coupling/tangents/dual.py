@@ -114,7 +114,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         return self.value.size
 
     @property
-    def T(self) -> Dual:  # noqa: N802
+    def T(self) -> Dual:
         """The transpose of a matrix."""
         return Dual(self.value.T, self.turns.swapaxes(0, 1) if self.ndim == 2 else self.turns)
 
@@ -257,7 +257,9 @@ def _diag(one: Dual) -> Dual:
 
 _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.concatenate: lambda parts, axis=0: _joined(np.concatenate, parts, axis),
-    np.vstack: lambda parts: _joined(np.concatenate, [part if part.ndim > 1 else part.reshape(1, -1) for part in parts]),
+    np.vstack: lambda parts: _joined(
+        np.concatenate, [part if part.ndim > 1 else part.reshape(1, -1) for part in parts]
+    ),
     np.hstack: lambda parts: _joined(np.concatenate, parts, -1),
     np.stack: lambda parts, axis=0: _joined(np.stack, parts, axis),
     np.where: _where,
@@ -285,8 +287,8 @@ def array(given: Any, dtype: type = float) -> Any:
     """Return an array of numbers, in nested lists, of which some may have derivatives."""
     if _ACTIVE.count is None:
         return np.array(given, dtype)
-    value = np.array(_plain(given), dtype)
-    turns = np.zeros((*value.shape, _ACTIVE.count), dtype)
+    value: np.ndarray = np.array(_plain(given), dtype)
+    turns: np.ndarray = np.zeros((*value.shape, _ACTIVE.count), dtype)
     for place, one in _numbers_in(given):
         turns[place] = one.turns
     return Dual(value, turns)
@@ -317,7 +319,9 @@ def vanishes(one: Any) -> bool:
 def inverse(matrix: Any) -> Any:
     """Return the inverse (n, n) of a matrix."""
     found = np.linalg.inv(_value(matrix))
-    return Dual(found, -(found @ (Dual(matrix.value, matrix.turns) @ found)).turns) if isinstance(matrix, Dual) else found
+    return (
+        Dual(found, -(found @ (Dual(matrix.value, matrix.turns) @ found)).turns) if isinstance(matrix, Dual) else found
+    )
 
 
 def solve(matrix: Any, right: Any) -> Any:

@@ -109,7 +109,9 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
 
             def at(amount: float, p: int = p) -> np.ndarray:
                 moved = _mapped(
-                    arguments, lambda one: _number(one.value + amount * one.turns[..., p]), lambda one: isinstance(one, Dual)
+                    arguments,
+                    lambda one: _number(one.value + amount * one.turns[..., p]),
+                    lambda one: isinstance(one, Dual),
                 )
                 values = _flat(function(*moved))
                 if [len(one) for one in values] != [len(one) for one in here]:

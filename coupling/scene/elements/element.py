@@ -15,7 +15,8 @@ class Unit(NamedTuple):
 
     A contact has a normal row, whose displacement and `rest` are its gap, and may have a slip row with a coefficient of
     friction; a friction element has a slip row and a constant limit. body: number of the body that it moves, or of its
-    own entry where it moves none; side: name of what it meets, which assembly sets to the name of an element's table.
+    own entry where it moves none; play: 0 of an element for its gap at rest or how far it moves, the larger; side: name
+    of what it meets, which assembly sets to the name of an element's table.
     """
 
     normal: np.ndarray

@@ -51,10 +51,7 @@ class Stop(SceneElement):
             raise ValueError("at: name the interface label of the reduced model that hits the stop")
 
     def units(self, number: int, parts: Parts) -> Iterator[Unit]:
-        """Yield its contact, whose gap closes as the structure moves to its side.
-
-        A gap may be zero: its scale is at least how far the place moves.
-        """
+        """Yield its contact, whose gap closes as the structure moves to its side."""
         towards = -1.0 if self.side == "right" else 1.0
         normal = towards * parts.motion(self.at, f"stop[{number}].at")
         labels = [self.at]
@@ -62,5 +59,4 @@ class Stop(SceneElement):
             normal = normal - towards * parts.motion(self.to, f"stop[{number}].to")
             labels.append(self.to)
         contact = parts.contact(normal, self.restitution, *labels)
-        play = max(self.gap, parts.travel(normal))
-        yield Unit(normal, np.zeros(len(normal)), self.gap, element=contact, play=play, body=number)
+        yield Unit(normal, np.zeros(len(normal)), self.gap, element=contact, play=0.0, body=number)

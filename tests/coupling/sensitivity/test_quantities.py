@@ -11,8 +11,8 @@ from tests.tools.differences import quantities_of
 from tests.tools.rings import Chain
 from vanedamp.coupling.quantities.quantity import evaluated, table
 from vanedamp.coupling.scene.paths import number_at
-from vanedamp.coupling.tangents.dual import Dual
 from vanedamp.coupling.sensitivity.sensitivity_record import NOT_IN_DERIVATIVES
+from vanedamp.coupling.tangents.dual import Dual
 
 SHORT = TABLES | {"time": {"periods": 5, "transient": 2}, "initial": {"displacement": 0.1}}
 WEAR = {"wear": {"rate": 2e-13, "impact_rate": 3e-9, "impact_exponent": 1.3, "area": 1e-4}}

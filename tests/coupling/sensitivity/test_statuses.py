@@ -8,8 +8,8 @@ import pytest
 
 import vanedamp as vd
 from tests.coupling.sensitivity.test_figures import TABLES, orbit_of
-from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 from vanedamp.coupling.scene.orbit import Orbit
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 
 
 def test_smooth_functions_have_derivatives_to_round_off():

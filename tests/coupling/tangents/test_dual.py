@@ -20,12 +20,15 @@ C = RNG.normal(size=3) + 1j * RNG.normal(size=3)
 STEP = 1e-6
 
 FORMULAS = {
-    "matrix by vector": lambda a, b: a @ b, "vector by matrix": lambda a, b: b @ a, "scalar product": lambda a, b: b @ b,
+    "matrix by vector": lambda a, b: a @ b, "vector by matrix": lambda a, b: b @ a,
+    "scalar product": lambda a, b: b @ b,
     "matrices": lambda a, b: a @ a.T, "transposed": lambda a, b: a.T @ b, "columns": lambda a, b: a * b[:, None],
     "inverse": lambda a, b: inverse(a), "solution": lambda a, b: solve(a, b),
     "complex size": lambda a, b: abs(C @ solve(a + 1j * np.eye(3), b)), "outer": lambda a, b: np.outer(b, b),
-    "diagonal": lambda a, b: np.diag(b), "norm": lambda a, b: np.linalg.norm(b), "cross": lambda a, b: np.cross(b, A[0]),
-    "stacked": lambda a, b: np.vstack([a, b]), "joined": lambda a, b: np.concatenate([b, b]), "sum": lambda a, b: a.sum(axis=0),
+    "diagonal": lambda a, b: np.diag(b), "norm": lambda a, b: np.linalg.norm(b),
+    "cross": lambda a, b: np.cross(b, A[0]),
+    "stacked": lambda a, b: np.vstack([a, b]), "joined": lambda a, b: np.concatenate([b, b]),
+    "sum": lambda a, b: a.sum(axis=0),
     "beside": lambda a, b: np.hstack([a, a]), "chosen": lambda a, b: np.where(B > 0.0, b, 0.0),
 }  # fmt: skip
 
