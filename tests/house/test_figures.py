@@ -7,7 +7,6 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,9 @@ import pytest
 
 import vanedamp as vd
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep import alike
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.files.toml_input import validate
 
 ROOT = Path(__file__).parents[2]
 FIGURES = tomllib.loads(Path(__file__).with_name("figures.toml").read_text(encoding="utf-8"))
@@ -42,14 +43,13 @@ def scene() -> Scene:
     return found
 
 
-def _calls(command: Callable[[], Any]) -> dict[str, int]:
-    """Return how often a command assembles a system and validates a scene."""
-    wanted: dict[CodeType, str] = {assemble.__code__: "assemblies", Scene.__post_init__.__code__: "scenes"}
-    counts = dict.fromkeys(wanted.values(), 0)
+def _assemblies(command: Callable[[], Any]) -> int:
+    """Return how often a command assembles a system."""
+    found = 0
 
     def count(frame: Any, event: str, _: Any) -> None:
-        if event == "call" and frame.f_code in wanted:
-            counts[wanted[frame.f_code]] += 1
+        nonlocal found
+        found += event == "call" and frame.f_code is assemble.__code__
 
     before = sys.getprofile()
     sys.setprofile(count)
@@ -57,21 +57,34 @@ def _calls(command: Callable[[], Any]) -> dict[str, int]:
         command()
     finally:
         sys.setprofile(before)
-    return counts
+    return found
 
 
 def test_a_run_assembles_once(scene: Scene) -> None:
-    assert _calls(lambda: vd.simulate(scene)) == FIGURES["calls"]["run"]
+    assert _assemblies(lambda: vd.simulate(scene)) == FIGURES["assemblies"]["run"]
 
 
 @pytest.mark.parametrize("points", [4, 400])
-def test_a_sweep_assembles_as_often_as_is_said(scene: Scene, points: int) -> None:
+def test_a_sweep_assembles_once_a_kind_and_for_its_references(scene: Scene, points: int) -> None:
+    alike._LAST.key = b""
     swept = dataclasses.replace(scene, sweep={"excitation.frequency": list(np.linspace(2300.0, 2360.0, points))})
-    assert _calls(lambda: vd.sweep(swept)) == FIGURES["calls"][f"sweep_of_{points}"]
+    assert _assemblies(lambda: vd.sweep(swept)) == FIGURES["assemblies"][f"sweep_of_{points}"]
 
 
 @pytest.mark.parametrize("count", [3, 10])
-def test_a_derivative_assembles_once_whatever_the_numbers(scene: Scene, count: int) -> None:
+def test_a_derivative_assembles_the_scene_and_its_tangents(scene: Scene, count: int) -> None:
     short = scene.replace({"time.periods": 6, "time.transient": 2})
-    found = _calls(lambda: vd.sensitivity(short, NUMBERS[:count]))
-    assert found == FIGURES["calls"][f"derivative_by_{count}"]
+    found = _assemblies(lambda: vd.sensitivity(short, NUMBERS[:count]))
+    assert found == FIGURES["assemblies"][f"derivative_by_{count}"]
+
+
+def test_so_does_the_derivative_of_an_orbit(scene: Scene) -> None:
+    orbit = vd.find_orbit(scene)
+    found = _assemblies(lambda: vd.sensitivity(orbit, NUMBERS[:3]))
+    assert found == FIGURES["assemblies"]["derivative_of_orbit"]
+
+
+def test_a_ramp_assembles_as_often_as_is_said(scene: Scene) -> None:
+    table = {"from": 2300.0, "to": 2302.0, "periods": 100}
+    ramped = validate(Scene, scene.to_dict() | {"ramp": table}, "scene")
+    assert _assemblies(lambda: vd.ramp(ramped)) == FIGURES["assemblies"]["ramp_of_100"]
