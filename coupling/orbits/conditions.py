@@ -24,8 +24,8 @@ from vanedamp.coupling.orbits.problem import Problem
 _LEVEL = 1e-7
 #: scaled steps of differences: of first derivatives for a normal form, of amplitudes, and of conditions
 _NORMAL_FORM, _AMPLITUDE, _STEP, _SMALL_STEP = 1e-4, 1e-5, 1e-7, 1e-2 * _LEVEL
-#: by which they are shortened where another motion lies within them
-_SHRINKS = (1.0, 1e-2, 1e-4)
+#: by which they are shortened where another motion lies within them; and largest change of a derivative within one
+_SHRINKS, _CHANGE = (1.0, 1e-2, 1e-4), 0.1
 
 
 class Counts(NamedTuple):
@@ -133,15 +133,21 @@ class Singular(Condition):
         are as stable as the others were.
         """
         right, left, _ = self._solved(passage)
-        step = _NORMAL_FORM * np.append(right, (0.0, 0.0))
-        above, below = (self.problem.passage(y + way * step) for way in (1, -1))
-        if above is None or below is None or not above.sequence == below.sequence == passage.sequence:
+        M = self.problem.derivative(passage)
+        for step in _NORMAL_FORM * np.array(_SHRINKS):
+            sides = [self.problem.passage(y + way * step * np.append(right, (0.0, 0.0))) for way in (1, -1)]
+            up, down = (
+                self.problem.derivative(side) if side and side.sequence == passage.sequence else np.full(M.shape, np.nan)
+                for side in sides
+            )
+            if np.abs(up - down).max() < _CHANGE * np.abs(M).max():
+                break
+        else:
             return np.nan
-        M, up, down = (self.problem.derivative(each) for each in (passage, above, below))
-        second = (up - down) / (2 * _NORMAL_FORM)
+        second = (up - down) / (2 * step)
         if self.unit > 0:
             return float(left @ second @ right / 2)
-        third = (up + down - 2 * M) / _NORMAL_FORM**2
+        third = (up + down - 2 * M) / step**2
         bent = solve(np.eye(len(M)) - M, second @ right)
         return float(left @ third @ right / 6 + left @ second @ bent / 2)
 

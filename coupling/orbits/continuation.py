@@ -39,13 +39,13 @@ class Continuation(Path):
     def resume(
         cls, problem: Problem, table: Table, branch: Branch, head: np.ndarray, step: float
     ) -> Continuation | None:
-        """Return a branch that was interrupted, from its last y and row (2, k + 1); None if that is no orbit."""
-        if (last := beginning(problem, *head)) is None:
+        """Return a branch that was interrupted, from where it continues (Diagram.place); None if that is no orbit."""
+        if (last := beginning(problem, *head[:2])) is None:
             return None
         resumed = cls(table, last, branch.source)
         resumed.points, resumed.special = branch.rows, list(branch.special)
         resumed.first = problem.pack(branch.state[0], float(branch.parameter[0]))
-        resumed.step, resumed.end = step, branch.end
+        resumed.step, resumed.end, resumed.trail = step, branch.end, list(head[2:])
         return resumed
 
     @property
