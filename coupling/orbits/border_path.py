@@ -33,7 +33,7 @@ class BorderPath(Path):
         self.own, self.visits = own, list[np.ndarray]()
 
     def _kept(self, point: Point) -> dict[str, Any]:
-        problem, counts, found = self.problem, _counts(point), multipliers(self.problem.derivative(point.passage))[0]
+        problem, counts, found = self.problem, _counts(point), multipliers(point.orbit.derivative)[0]
         parameter, second = problem.numbers(point.exact)
         return {
             "parameter": parameter, "second": second, "state": problem.state(point.exact),
@@ -73,15 +73,15 @@ class BorderPath(Path):
 
     def _steep(self, point: Point) -> str | None:
         """Say which event comes to graze where motions part fast next to a point; None where they do not."""
-        parts = np.abs(self.problem.derivative(point.passage)).max() ** (2 if self.problem.mirrored else 1)
+        parts = np.abs(point.orbit.derivative).max() ** (2 if self.problem.mirrored else 1)
         slowest = min(point.passage.crossings, key=lambda crossing: abs(crossing.speed), default=None)
         if parts < _STEEP or slowest is None:
             return None
         return f"{slowest.name} nearly grazes: motions part by {parts:.0e} per passage"
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
         if last is not self.head and regular(last) is not None:
-            self._add(self.head, self._passed(self.head, last))
+            self._onward(self._passed(self.head, last))
             if self.end:
                 return
         head, after = self.head, None
@@ -91,11 +91,14 @@ class BorderPath(Path):
             point = beside and regular(near(beside, start, head.tangent, 2 * max(_BEYOND)))
             if point is not None and point.passage.sequence != head.passage.sequence:
                 self._change(head, passage)
-                self.head = point
+                self.head, self.trail = point, []
                 self.points.append(self._kept(point))
                 self.step = max(self.table.step / 8, self.table.min_step)
                 return
-        self.end = f"{self._change(head, after)}; no such orbit found beyond"
+        if lost:
+            self.step = max(step / 4, self.table.min_step)
+        else:
+            self.end = f"{self._change(head, after)}; no such orbit found beyond"
 
     def _change(self, head: Point, after: Passage | None) -> str:
         """Name a change of the sequence of events, and return what it is."""

@@ -90,7 +90,7 @@ class Continuation(Path):
 
     # -- changes of the event sequence
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
         if last is not self.head and self._passed(self.head, last) is None:
             return
         point = beyond
@@ -99,6 +99,9 @@ class Continuation(Path):
             point, how = centred, CENTRED
         elif (passed := self._other_side.past_the_start(last)) is not None:
             point, how = passed[0], " at the start of the period"
+        elif lost:
+            self.step = max(step / 4, self.table.min_step)
+            return self._onward(last)
         elif point is None:
             point, how = self._other_side.find(last, step)
         if point is not None and passed is None and point.tangent[-1] * last.tangent[-1] < 0:

@@ -7,7 +7,6 @@ smooth, and so is a curve as long as the sequence of events along its orbits sta
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -294,20 +293,10 @@ class Path:
                 quick = point.zero.iterations <= _EFFORT[point.given is not None][2] and cosine > _STRAIGHT
                 self.step = min(1.5 * step, self._longest(point)) if quick else max(step, least)
                 if (last := self._passed(head, point)) is not None:
-                    self.trail = [*self.trail[-1:], head.y]
-                    self._add(head, last)
+                    self._onward(last)
                 return
             step /= 2
-        last, beyond, ahead = self._last(head, failed)
-        if ahead > least and (way := float(np.linalg.norm(last.y - head.y))) > least and regular(last) is not None:
-            # nothing vanishes at the last point found: it is Newton's method that has come no further
-            self.step = max(way / 2, least)
-            if (last := self._passed(head, last)) is not None:
-                self.trail = [*self.trail[-1:], head.y]
-                self._add(head, last)
-            return
-        self._cross(failed, last, beyond)
-        self.trail = []
+        self._cross(failed, *self._last(head, failed))
 
     def _longest(self, point: Point) -> float:
         """Return the longest step: with a condition states may change fast, and it is the numbers' that is bounded."""
@@ -316,10 +305,16 @@ class Path:
 
     def _add(self, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
-        self.head = point
+        self.head, self.trail = point, []
         self.points.append(self._kept(point))
         if not self.end and (why := self._ending(before, point)):
             self._end(why, point)
+
+    def _onward(self, point: Point) -> None:
+        """Add the next point of a smooth piece."""
+        trail = [*self.trail[-1:], self.head.y]
+        self._add(self.head, point)
+        self.trail = trail
 
     def _ending(self, before: Point, point: Point) -> str:
         """Say why the path ends at a point that was added; "" if it does not."""
@@ -334,10 +329,10 @@ class Path:
         share = first @ piece / max(float(piece @ piece), np.finfo(float).tiny)
         return bool(0.0 <= share < 1.0 and np.linalg.norm(first - share * piece) < 0.05 * np.linalg.norm(piece))
 
-    def _last(self, head: Point, step: float) -> tuple[Point, Point | None, float]:
+    def _last(self, head: Point, step: float) -> tuple[Point, Point | None, bool]:
         """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
 
-        And how far from the last one the sequence ends by what vanishes there; inf where that is unknown.
+        And whether it is Newton's method that comes no further from the head, for nothing vanishes there.
 
         Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
         where to look; bisection makes it sure.
@@ -360,8 +355,9 @@ class Path:
                 seen.append((at, point))
             else:
                 high, beyond = at, point
-        end = forecast([(where, point.passage) for where, point in seen[-2:]])
-        return seen[-1][1], beyond, math.inf if end is None else end - seen[-1][0]
+        end, least = forecast([(where, point.passage) for where, point in seen[-2:]]), self.table.min_step
+        lost = low > least and (end is None or end - low > least) and regular(seen[-1][1]) is not None
+        return seen[-1][1], beyond, lost
 
     def _note(self, point: Point, kind: str, note: str) -> None:
         y = point.exact
@@ -378,8 +374,8 @@ class Path:
         """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
         raise NotImplementedError
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
-        """Continue with another sequence of events, or end the path.
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
+        """Continue with another sequence of events, or with the last point where that is lost, or end the path.
 
         step: that leads from the head beyond the end of the sequence; last, beyond: points on both sides of it (_last).
         """
