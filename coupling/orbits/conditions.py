@@ -264,20 +264,16 @@ class Peak(Condition):
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the slope of the logarithm of the amplitude along the branch."""
-        mean, tangent = float(passage.peaks.mean()), self._tangent(y, passage)
+        mean, tangent = self.problem.amplitude(y, passage), self._tangent(y, passage)
         if tangent is None or mean == 0.0:
             return np.nan
         way = np.append(tangent, 0.0)
-        return difference(self.problem, _amplitude, y, passage, way, _AMPLITUDE, False) / mean
+        return difference(self.problem, self.problem.amplitude, y, passage, way, _AMPLITUDE, False) / mean
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
         """Return the condition with the branch at a passage."""
         way = self._tangent(y, passage)
         return self if way is None else replace(self, way=way)
-
-
-def _amplitude(y: np.ndarray, passage: Passage) -> float:
-    return float(passage.peaks.mean())
 
 
 def difference(
