@@ -167,7 +167,7 @@ class Borders:
                 passage = problem.passage(y)
                 if passage is None or "; ".join(passage.sequence) != branch.sequence[index]:
                     continue
-                first = first_point(Clearance(problem, 0), y)
+                first = first_point(Clearance.of(problem, y, passage), y)
                 if first is not None and np.abs(first.exact - here)[-2:].max() < _NEAR:
                     return first
         return None

@@ -229,15 +229,27 @@ class Pair(Condition):
 
 @dataclass(frozen=True, eq=False)
 class Clearance(Condition):
-    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level."""
+    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level.
+
+    after: of two events between which the time vanishes, in periods, the number of the first; None for a clearance.
+    """
 
     kind = "grazing"
     step = _SMALL_STEP
     level = _LEVEL
+    after: int | None = None
+
+    @classmethod
+    def of(cls, problem: Problem, y: np.ndarray, passage: Passage) -> Clearance:
+        """Return the condition that nearly holds at a point: of a clearance, or of the two events next to each other."""
+        apart = np.diff(problem.at(y).times(passage))
+        return cls(problem, 0, None if np.isfinite(passage.clearance[0]) or not len(apart) else int(apart.argmin()))
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
-        """Return the smallest clearance, less the level."""
+        """Return the smallest clearance, or the time between two events, less the level."""
         least = passage.clearance[0]
+        if self.after is not None:
+            least = float(np.diff(self.problem.at(y).times(passage))[self.after])
         return least - self.level if np.isfinite(least) else np.nan
 
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:

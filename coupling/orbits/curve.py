@@ -174,10 +174,11 @@ def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Poi
 def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
     """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
 
-    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence.
+    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence; with a condition,
+    whose slopes are learnt on the way, a shorter step is better.
     """
     point = corrected(head, step)
-    if known and (point is None or point.passage.sequence != head.passage.sequence):
+    if known and head.given is None and (point is None or point.passage.sequence != head.passage.sequence):
         other = corrected(head, step, known)
         point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
