@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,13 @@ from vanedamp.coupling.orbits.border import BorderPoint
 from vanedamp.coupling.orbits.conditions import Condition, Counts
 from vanedamp.coupling.orbits.curve import Path, Point, beginning, located, near, regular
 from vanedamp.coupling.orbits.multipliers import multipliers
+from vanedamp.coupling.orbits.other_side import changed, jumped
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: largest derivative of the map, scaled: it goes as one over the speed of an impact that comes to graze
 _STEEP = 1e5
-#: scaled distances from an end at which the other side is sought, and how much farther a state is that has jumped
-_BEYOND, _FARTHER = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 1e3
+#: scaled distances from an end at which the other side is sought
+_BEYOND = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 #: points where a pair of multipliers becomes real: the border has no Neimark-Sacker points beyond
 _LAST = {"1:1 resonance", "1:2 resonance"}
 
@@ -33,7 +34,7 @@ class BorderPath(Path):
         self.own, self.visits = own, list[np.ndarray]()
 
     def _kept(self, point: Point) -> dict[str, Any]:
-        problem, counts, found = self.problem, _counts(point), multipliers(self.problem.derivative(point.passage))[0]
+        problem, counts, found = self.problem, _counts(point), multipliers(point.orbit.derivative)[0]
         parameter, second = problem.numbers(point.exact)
         return {
             "parameter": parameter, "second": second, "state": problem.state(point.exact),
@@ -73,29 +74,32 @@ class BorderPath(Path):
 
     def _steep(self, point: Point) -> str | None:
         """Say which event comes to graze where motions part fast next to a point; None where they do not."""
-        parts = np.abs(self.problem.derivative(point.passage)).max() ** (2 if self.problem.mirrored else 1)
+        parts = np.abs(point.orbit.derivative).max() ** (2 if self.problem.mirrored else 1)
         slowest = min(point.passage.crossings, key=lambda crossing: abs(crossing.speed), default=None)
         if parts < _STEEP or slowest is None:
             return None
         return f"{slowest.name} nearly grazes: motions part by {parts:.0e} per passage"
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
         if last is not self.head and regular(last) is not None:
-            self._add(self.head, self._passed(self.head, last))
+            self._onward(self._passed(self.head, last))
             if self.end:
                 return
         head, after = self.head, None
-        for start, passage in self._beyond(head):
+        for start, passage in (*changed(head, _BEYOND), *jumped(head)):
             after = after or passage
             beside = regular(beginning(self.problem, start, head.tangent, head.condition))
             point = beside and regular(near(beside, start, head.tangent, 2 * max(_BEYOND)))
             if point is not None and point.passage.sequence != head.passage.sequence:
                 self._change(head, passage)
-                self.head = point
+                self.head, self.trail = point, []
                 self.points.append(self._kept(point))
                 self.step = max(self.table.step / 8, self.table.min_step)
                 return
-        self.end = f"{self._change(head, after)}; no such orbit found beyond"
+        if lost:
+            self.step = max(step / 4, self.table.min_step)
+        else:
+            self.end = f"{self._change(head, after)}; no such orbit found beyond"
 
     def _change(self, head: Point, after: Passage | None) -> str:
         """Name a change of the sequence of events, and return what it is."""
@@ -103,29 +107,6 @@ class BorderPath(Path):
         # grazing is of codimension two
         self._note(head, f"{_condition(head).kind}-grazing" if kind == "grazing" else kind, note)
         return note
-
-    def _beyond(self, head: Point) -> Iterator[tuple[np.ndarray, Passage]]:
-        """Yield states of another sequence next to the last one, along the border, and where the state has jumped.
-
-        It jumps where an event passes the start of the period; the state beyond is how a passage ends that begins next
-        to the last one, with the event at both of its ends (orbits.other_side).
-        """
-        sequence = head.passage.sequence
-        for size in _BEYOND:
-            y = head.y + size * head.tangent
-            passage = self.problem.passage(y)
-            if passage is not None and passage.sequence != sequence:
-                yield y, passage
-        for size in _BEYOND[:2]:
-            for direction in (*np.eye(len(head.y))[:-2], *-np.eye(len(head.y))[:-2]):
-                y = head.y + size * (direction + head.tangent)
-                passage = self.problem.passage(y)
-                if passage is None:
-                    continue
-                image = np.append(passage.state / self.problem.weight, y[-2:])
-                beyond = self.problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
-                if beyond is not None:
-                    yield image, beyond
 
 
 def _condition(point: Point) -> Condition:

@@ -42,8 +42,9 @@ class _Candidate(NamedTuple):
 class Borders:
     """The borders of some branches, found one after the other.
 
-    period_map: of one excitation period; table: with the second number; origin, span: (2,) values of the two numbers at
-    which the scaled ones are 0, and their ranges; second: its value on the branches; notes: what could not be done.
+    period_map: of one excitation period, or of waves; table: with the second number; origin, span: (2,) values of the
+    two numbers at which the scaled ones are 0, and their ranges; second: its value on the branches; notes: what could
+    not be done.
     """
 
     def __init__(
@@ -123,8 +124,9 @@ class Borders:
 
     def _problem(self, branch: Branch, index: int, mirrored: bool = False) -> Problem:
         """Return the problem of orbits around a regular one of a branch."""
-        paths = (self.table.parameter, self.track.parameter)
-        problem = Problem(self.map.over(branch.periods), paths, self.origin, self.span, mirrored)
+        paths, along = (self.table.parameter, self.track.parameter), self.map.over(branch.periods)
+        along = replace(along, wave=along.wave and not mirrored)
+        problem = Problem(along, paths, self.origin, self.span, mirrored)
         passage = problem.passage(self._orbit(problem, branch, index))
         return problem if passage is None or mirrored else problem.anchored(passage)
 
@@ -133,11 +135,12 @@ class Borders:
 
     def _smooth(self, branch: Branch, point: SpecialPoint) -> Point | None:
         """Return the first point of a fold, pitchfork, doubling or Neimark-Sacker border."""
-        mirrored = point.kind == "pitchfork" or (point.kind == "fold" and bool(branch.symmetric[point.index]))
-        problem, neutral = self._problem(branch, point.index, mirrored), int(branch.neutral[point.index])
+        symmetric, neutral = bool(branch.symmetric[point.index]), int(branch.neutral[point.index])
+        mirrored = point.kind == "pitchfork" or (point.kind == "fold" and symmetric and not self.map.wave)
+        problem = self._problem(branch, point.index, mirrored)
         y = problem.pack(point.state, point.parameter, self.second)
         passage = problem.passage(y)
-        if passage is None or (mirrored and neutral):
+        if passage is None or (neutral and (mirrored or self.map.wave)):
             return None
         condition: Condition
         if point.kind == "neimark-sacker":
@@ -165,13 +168,15 @@ class Borders:
                 passage = problem.passage(y)
                 if passage is None or "; ".join(passage.sequence) != branch.sequence[index]:
                     continue
-                first = first_point(Clearance(problem, 0), y)
+                first = first_point(Clearance.of(problem, y, passage), y)
                 if first is not None and np.abs(first.exact - here)[-2:].max() < _NEAR:
                     return first
         return None
 
     def _peak(self, branch: Branch, index: int) -> Point | None:
         """Return the first point of a peak next to the largest of a branch's orbits."""
+        if self.map.wave and branch.neutral[index]:
+            return None  # in a part, a body that may be moved takes the place of another one
         problem = self._problem(branch, index)
         y, before, after = (self._orbit(problem, branch, i) for i in (index, index - 1, index + 1))
         return first_point(Peak(problem, int(branch.neutral[index]), (after - before)[:-1]), y)

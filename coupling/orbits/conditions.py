@@ -24,8 +24,8 @@ from vanedamp.coupling.orbits.problem import Problem
 _LEVEL = 1e-7
 #: scaled steps of differences: of first derivatives for a normal form, of amplitudes, and of conditions
 _NORMAL_FORM, _AMPLITUDE, _STEP, _SMALL_STEP = 1e-4, 1e-5, 1e-7, 1e-2 * _LEVEL
-#: by which they are shortened where another motion lies within them
-_SHRINKS = (1.0, 1e-2, 1e-4)
+#: by which they are shortened where another motion lies within them; and largest change of a derivative within one
+_SHRINKS, _CHANGE = (1.0, 1e-2, 1e-4), 0.1
 
 
 class Counts(NamedTuple):
@@ -133,15 +133,19 @@ class Singular(Condition):
         are as stable as the others were.
         """
         right, left, _ = self._solved(passage)
-        step = _NORMAL_FORM * np.append(right, (0.0, 0.0))
-        above, below = (self.problem.passage(y + way * step) for way in (1, -1))
-        if above is None or below is None or not above.sequence == below.sequence == passage.sequence:
+        M = self.problem.derivative(passage)
+        for step in _NORMAL_FORM * np.array(_SHRINKS):
+            sides = [self.problem.passage(y + way * step * np.append(right, (0.0, 0.0))) for way in (1, -1)]
+            same = [self.problem.derivative(side) for side in sides if side and side.sequence == passage.sequence]
+            if len(same) == 2 and np.abs(same[0] - same[1]).max() < _CHANGE * np.abs(M).max():
+                up, down = same
+                break
+        else:
             return np.nan
-        M, up, down = (self.problem.derivative(each) for each in (passage, above, below))
-        second = (up - down) / (2 * _NORMAL_FORM)
+        second = (up - down) / (2 * step)
         if self.unit > 0:
             return float(left @ second @ right / 2)
-        third = (up + down - 2 * M) / _NORMAL_FORM**2
+        third = (up + down - 2 * M) / step**2
         bent = solve(np.eye(len(M)) - M, second @ right)
         return float(left @ third @ right / 6 + left @ second @ bent / 2)
 
@@ -223,15 +227,27 @@ class Pair(Condition):
 
 @dataclass(frozen=True, eq=False)
 class Clearance(Condition):
-    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level."""
+    """An event that does not happen, but nearly: orbits without it, whose distance to it is the level.
+
+    after: of two events between which the time vanishes, in periods, the number of the first; None for a clearance.
+    """
 
     kind = "grazing"
     step = _SMALL_STEP
     level = _LEVEL
+    after: int | None = None
+
+    @classmethod
+    def of(cls, problem: Problem, y: np.ndarray, passage: Passage) -> Clearance:
+        """Return the condition that nearly holds at a point: of a clearance, or of the two nearest events."""
+        apart = np.diff(problem.at(y).times(passage))
+        return cls(problem, 0, None if np.isfinite(passage.clearance[0]) or not len(apart) else int(apart.argmin()))
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
-        """Return the smallest clearance, less the level."""
+        """Return the smallest clearance, or the time between two events, less the level."""
         least = passage.clearance[0]
+        if self.after is not None:
+            least = float(np.diff(self.problem.at(y).times(passage))[self.after])
         return least - self.level if np.isfinite(least) else np.nan
 
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
@@ -258,20 +274,16 @@ class Peak(Condition):
 
     def value(self, y: np.ndarray, passage: Passage) -> float:
         """Return the slope of the logarithm of the amplitude along the branch."""
-        mean, tangent = float(passage.peaks.mean()), self._tangent(y, passage)
+        mean, tangent = self.problem.amplitude(y, passage), self._tangent(y, passage)
         if tangent is None or mean == 0.0:
             return np.nan
         way = np.append(tangent, 0.0)
-        return difference(self.problem, _amplitude, y, passage, way, _AMPLITUDE, False) / mean
+        return difference(self.problem, self.problem.amplitude, y, passage, way, _AMPLITUDE, False) / mean
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Peak:
         """Return the condition with the branch at a passage."""
         way = self._tangent(y, passage)
         return self if way is None else replace(self, way=way)
-
-
-def _amplitude(y: np.ndarray, passage: Passage) -> float:
-    return float(passage.peaks.mean())
 
 
 def difference(

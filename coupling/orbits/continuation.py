@@ -39,13 +39,13 @@ class Continuation(Path):
     def resume(
         cls, problem: Problem, table: Table, branch: Branch, head: np.ndarray, step: float
     ) -> Continuation | None:
-        """Return a branch that was interrupted, from its last y and row (2, k + 1); None if that is no orbit."""
-        if (last := beginning(problem, *head)) is None:
+        """Return a branch that was interrupted, from where it continues (Diagram.place); None if that is no orbit."""
+        if (last := beginning(problem, *head[:2])) is None:
             return None
         resumed = cls(table, last, branch.source)
         resumed.points, resumed.special = branch.rows, list(branch.special)
         resumed.first = problem.pack(branch.state[0], float(branch.parameter[0]))
-        resumed.step, resumed.end = step, branch.end
+        resumed.step, resumed.end, resumed.trail = step, branch.end, list(head[2:])
         return resumed
 
     @property
@@ -90,7 +90,7 @@ class Continuation(Path):
 
     # -- changes of the event sequence
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
         if last is not self.head and self._passed(self.head, last) is None:
             return
         point = beyond
@@ -98,7 +98,10 @@ class Continuation(Path):
         if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED
         elif (passed := self._other_side.past_the_start(last)) is not None:
-            point, how = passed[0], " at the start of the period"
+            point, how = passed, " at the start of the period"
+        elif lost:
+            self.step = max(step / 4, self.table.min_step)
+            return self._onward(last)
         elif point is None:
             point, how = self._other_side.find(last, step)
         if point is not None and passed is None and point.tangent[-1] * last.tangent[-1] < 0:
@@ -108,7 +111,7 @@ class Continuation(Path):
         self._note(last, kind, f"{what}{how}")
         if point is None:
             self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last)
-        elif passed is None or not self._ends_on(passed[1]):
+        else:
             self._add(last if passed is None else point, point)  # at the start of the period the state jumps
             self.step = max(self.table.step / 8, self.table.min_step)
 

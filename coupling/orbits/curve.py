@@ -7,13 +7,13 @@ smooth, and so is a curve as long as the sequence of events along its orbits sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.interpolate import barycentric_interpolate
+from scipy.interpolate import KroghInterpolator
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
@@ -158,14 +158,29 @@ def beginning(problem: Problem, y: np.ndarray, row: np.ndarray, condition: Condi
     return None if passage is None else Point(problem, Zero(OrbitStatus.OK, y, passage, np.nan, 0), row, condition)
 
 
-def corrected(head: Point, step: float) -> Point | None:
-    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near."""
-    return near(head, head.y + step * head.tangent, head.tangent, abs(step))
+def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
+    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near.
+
+    It is predicted on the tangent, or on the curve of least order that has it and passes the two nearest of some known
+    points (k + m,). Next to an event that grazes, with a speed v, a state may be away from its orbit by some v^3 before
+    its own sequence is another: there the tangent serves for steps of v^1.5 only.
+    """
+    places = {float((y - head.y) @ head.tangent): y for y in known}
+    nearest = sorted(places.keys() - {0.0}, key=lambda place: abs(place - step))[:2]
+    curve = KroghInterpolator([0.0, 0.0, *nearest], [head.y, head.tangent, *(places[place] for place in nearest)])
+    return near(head, curve(step), head.tangent, abs(step))
 
 
-def reached(head: Point, step: float) -> Point | None:
-    """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none."""
+def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
+    """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
+
+    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence; with a condition,
+    whose slopes are learnt on the way, a shorter step is better.
+    """
     point = corrected(head, step)
+    if known and head.given is None and (point is None or point.passage.sequence != head.passage.sequence):
+        other = corrected(head, step, known)
+        point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
         return None
     for number in range(head.problem.size, len(head.y)):
@@ -201,18 +216,15 @@ def located(
 def _root(before: Point, after: Point, function: Callable[[Point], float], size: float) -> tuple[float, Point] | None:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
-    Points are sought on the parabola through the three nearest that are known: near a pitchfork Newton's method,
-    whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, a
-    branch's zero is the chord's.
+    Points are predicted from those that are known: near a pitchfork Newton's method, whose derivative is singular
+    there, has only a small part of its way left for it. Where even that is too much, a branch's zero is the chord's.
     """
     length = float((after.y - before.y) @ before.tangent)
     points: dict[float, Point] = {0.0: before, length: after}
 
     def value(at: float) -> float:
         if at not in points:
-            known = sorted(points, key=lambda other: abs(other - at))[:3]
-            predicted = barycentric_interpolate(known, [points[other].y for other in known], at)
-            point = near(before, predicted, before.tangent, abs(length))
+            point = corrected(before, at, [point.y for point in points.values()])
             if point is None or point.passage.sequence != before.passage.sequence:
                 raise _Lost
             points[at] = point
@@ -249,8 +261,9 @@ def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) ->
 class Path:
     """A curve while it is followed from a point one way, within the ranges of its numbers.
 
-    head: the last point; points: what is kept of all; special: its named points; step: the next one; end: why it is not
-    followed further, "" while it is. What a curve watches, keeps and does where its sequence ends is said by its kind.
+    head: the last point; trail: y (k + m,) of some of its sequence before it; points: what is kept of all; special: its
+    named points; step: the next one; end: why it is not followed further, "" while it is. What a curve watches, keeps
+    and does where its sequence ends is said by its kind.
     """
 
     #: record of a named point; why a path ends at the end of a range, and where it began
@@ -260,7 +273,7 @@ class Path:
 
     def __init__(self, table: Table, head: Point, most: int) -> None:
         self.table, self.head, self.most, self.problem = table, head, most, head.problem
-        self.first, self.step, self.end = head.y, table.step, ""
+        self.first, self.step, self.end, self.trail = head.y, table.step, "", list[np.ndarray]()
         self.points, self.special = [self._kept(head)], list[Any]()
 
     def advance(self) -> None:
@@ -270,7 +283,7 @@ class Path:
             return
         head, step, failed, least = self.head, self.step, self.step, self.table.min_step
         while step >= least:
-            point = reached(head, step)
+            point = reached(head, step, self.trail)
             if point is None:
                 failed, step = step, step / 4
                 continue
@@ -282,7 +295,7 @@ class Path:
                 quick = point.zero.iterations <= _EFFORT[point.given is not None][2] and cosine > _STRAIGHT
                 self.step = min(1.5 * step, self._longest(point)) if quick else max(step, least)
                 if (last := self._passed(head, point)) is not None:
-                    self._add(head, last)
+                    self._onward(last)
                 return
             step /= 2
         self._cross(failed, *self._last(head, failed))
@@ -294,10 +307,16 @@ class Path:
 
     def _add(self, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
-        self.head = point
+        self.head, self.trail = point, []
         self.points.append(self._kept(point))
         if not self.end and (why := self._ending(before, point)):
             self._end(why, point)
+
+    def _onward(self, point: Point) -> None:
+        """Add the next point of a smooth piece."""
+        trail = [*self.trail[-1:], self.head.y]
+        self._add(self.head, point)
+        self.trail = trail
 
     def _ending(self, before: Point, point: Point) -> str:
         """Say why the path ends at a point that was added; "" if it does not."""
@@ -312,8 +331,10 @@ class Path:
         share = first @ piece / max(float(piece @ piece), np.finfo(float).tiny)
         return bool(0.0 <= share < 1.0 and np.linalg.norm(first - share * piece) < 0.05 * np.linalg.norm(piece))
 
-    def _last(self, head: Point, step: float) -> tuple[Point, Point | None]:
+    def _last(self, head: Point, step: float) -> tuple[Point, Point | None, bool]:
         """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
+
+        And whether it is Newton's method that comes no further from the head, for nothing vanishes there.
 
         Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
         where to look; bisection makes it sure.
@@ -330,13 +351,15 @@ class Path:
                 at = middle
             else:
                 at = float(np.clip(at + (margin if attempt % 3 else -margin), low + margin / 2, high - margin / 2))
-            point = corrected(head, at)
+            point = corrected(head, at, [*self.trail, *(each.y for _, each in seen)])
             if point is not None and point.passage.sequence == head.passage.sequence:
                 low = at
                 seen.append((at, point))
             else:
                 high, beyond = at, point
-        return seen[-1][1], beyond
+        end, least = forecast([(where, point.passage) for where, point in seen[-2:]]), self.table.min_step
+        lost = low > least and (end is None or end - low > least) and regular(seen[-1][1]) is not None
+        return seen[-1][1], beyond, lost
 
     def _note(self, point: Point, kind: str, note: str) -> None:
         y = point.exact
@@ -353,8 +376,8 @@ class Path:
         """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
         raise NotImplementedError
 
-    def _cross(self, step: float, last: Point, beyond: Point | None) -> None:
-        """Continue with another sequence of events, or end the path.
+    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
+        """Continue with another sequence of events, or with the last point where that is lost, or end the path.
 
         step: that leads from the head beyond the end of the sequence; last, beyond: points on both sides of it (_last).
         """

@@ -63,11 +63,11 @@ class Diagram:
 
     @property
     def place(self) -> tuple[np.ndarray, float]:
-        """Last y and row (2, k + 1), and step, with which the last branch continues."""
+        """Last y, its row and y of points before it (r, k + 1), and step, with which the last branch continues."""
         if self.current is None:
             return np.zeros((2, len(self.map.scale) + 1)), 0.0
         head = self.current.head
-        return np.stack([head.y, head.row]), self.current.step
+        return np.stack([head.y, head.row, *self.current.trail]), self.current.step
 
     def resume(self, branches: Sequence[Branch], head: np.ndarray, step: float, iterations: int) -> None:
         """Take up what an interrupted search has found."""

@@ -20,7 +20,7 @@ from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
-from vanedamp.coupling.orbits.waves import find_wave
+from vanedamp.coupling.orbits.waves import find_wave, of_waves
 from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -189,7 +189,8 @@ class _Search:
             return None
         low, high = track.within or (self.low, self.to)
         origin, span = (low, self.first_second), (high - low, track.to - self.first_second)
-        return Borders(self.map, self.table, origin, span, self.second)
+        along = of_waves(self.map) if self.table.wave else self.map
+        return Borders(along, self.table, origin, span, self.second)
 
     def starts(self) -> Starts:
         """Return the states from which the first orbit is sought. Raises InputError if the run ends early."""

@@ -109,6 +109,12 @@ class Problem:
         """Return the derivative (k, k) of the map in scaled coordinates."""
         return passage.scaled(self.map.scale)
 
+    def amplitude(self, y: np.ndarray, passage: Passage) -> float:
+        """Return the mean of the largest displacement in each period, m, of which a wave's passage has a part."""
+        if self.map.wave:
+            passage = replace(self.at(y), wave=False, _earlier=[])(self.state(y), False)
+        return float(passage.peaks.mean())
+
     def by_state(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of the residual by the state, with the anchor."""
         return np.asarray(self.derivative(passage) - np.eye(self.size) + self.anchor)

@@ -70,8 +70,8 @@ class Orbit:
             raise ValueError("to: say where the branch that begins at `from` ends, or leave `from` out")
         if self.to is not None and self.to == self.from_:
             raise ValueError(f"to ({self.to:g}) must differ from `from`")
-        if self.wave and (self.switch or self.track is not None or (self.periods or 1) != 1):
-            raise ValueError("wave: one takes a period, and is followed alone; leave `periods`, `switch`, `track` out")
+        if self.wave and (self.switch or (self.periods or 1) != 1):
+            raise ValueError("wave: one takes a period, and is followed alone; leave `periods` and `switch` out")
         if self.track is not None and self.to is None:
             raise ValueError("track: special points are those of a branch; give `to`")
         within = None if self.track is None else self.track.within

@@ -135,6 +135,33 @@ def test_the_sequence_of_events_changes_along_its_closed_form():
         assert numbers[-1] == pytest.approx([1.0, end], abs=1e-6) and path.end == "the end of a number's range"
 
 
+def test_a_mass_that_rubs_begins_to_stick_at_its_turns_where_den_hartog_has_it():
+    """Without stops it turns at X, X^2 = V^2 - (R U)^2 (DryFriction), and goes on as long as r^2 X > R."""
+
+    def limit(r):
+        held, turned = r**2 / (1 - r**2), r / (1 + math.cos(math.pi / r)) * math.sin(math.pi / r)
+        return held / math.sqrt(1 + turned**2)
+
+    unit, own = 1 / (2 * math.pi), limit(0.6)
+    track = {
+        "parameter": "excitation.frequency", "from": 0.58 * unit, "to": 0.62 * unit, "kinds": ["sequence"],
+        "within": (0.7 * own, 1.3 * own),
+    }  # fmt: skip
+    data = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.0},
+        excitation={"frequency": 0.6 * unit, "force": 1.0},
+        friction_damper=[{"normal_force": 1.0, "friction": 0.98 * own}], time={"periods": 200, "transient": 100},
+        orbit={
+            "parameter": "friction_damper.0.friction", "to": 1.02 * own, "step": 0.5, "max_step": 1.0, "min_step": 1e-3,
+            "track": track,
+        },
+    )  # fmt: skip
+    (border,) = orbits(data).borders
+    r = border.second / unit
+    assert sorted(r[[0, -1]]) == pytest.approx([0.58, 0.62]) and border.kind == "sequence"
+    assert border.parameter == pytest.approx([limit(each) for each in r], rel=1e-8)
+
+
 def stopped(force, frequency=1.2, **orbit):
     """x'' + 0.1 x' + x = force sin(frequency t) below a stop at 1 with restitution 1/2."""
     return scene(

@@ -17,10 +17,14 @@ from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.reference.orbit_upright_body import UprightBody
 from tests.tools.closed_form_scenes import ball, scene
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.orbits.newton import OrbitStatus
+from vanedamp.coupling.orbits.continuation import Continuation
+from vanedamp.coupling.orbits.curve import Point
+from vanedamp.coupling.orbits.newton import OrbitStatus, solve
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.problem import Problem
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.simulation import simulate
 
 UNIT = {"model": "rigid", "mass": 1.0, "stiffness": 1.0}
@@ -310,6 +314,22 @@ def test_a_branch_turns_where_two_symmetric_motions_meet():
     assert places(branch, "fold") == pytest.approx([GAP.fold(1.25, 1.4)], rel=1e-8)
     assert places(branch, "neimark-sacker")[0] == pytest.approx(GAP.neimark_sacker(1.13, 1.2), rel=1e-8)
     lie_on(branch, both=True)
+
+
+def test_a_branch_keeps_its_sequence_while_both_of_its_impacts_come_to_graze():
+    """A state that is away from its orbit by the cube of their speed has another sequence."""
+    grazes = brentq(lambda omega: 1 / abs(1 - omega**2 + 0.1j * omega) - GAP.half_gap, 0.9, 1.0, xtol=1e-14)
+    unit = grazes / (2 * math.pi)
+    orbit = replace(GAP, omega=0.999 * grazes, larger=False)
+    problem = Problem.along(period_map(gapped(orbit)), 0.999 * unit, 0.00095 * unit)
+    row = problem.row()
+    zero = solve(problem, problem.pack(orbit.state, 0.999 * unit), row)
+    path = Continuation(Table(**{"from": 0.999 * unit, "to": 0.99995 * unit}), Point(problem, zero, row))
+    while not path.end:
+        path.advance()
+    assert path.end == path.edge and [named.kind for named in path.branch.special] == ["end"]
+    for frequency, state in zip(path.branch.parameter, path.branch.state, strict=True):
+        assert state == pytest.approx(replace(orbit, omega=2 * math.pi * frequency).state, abs=1e-6)
 
 
 @pytest.mark.parametrize(("restitution", "phase"), [(0.3, 0.0), (0.5, 20.0), (0.8, 60.0)])

@@ -7,6 +7,8 @@ import pytest
 
 import vanedamp as vd
 from tests.tools.rings import Chain
+from vanedamp.coupling.orbits.borders import first_point
+from vanedamp.coupling.orbits.conditions import Peak
 from vanedamp.coupling.orbits.continuation import Continuation
 from vanedamp.coupling.orbits.curve import Point
 from vanedamp.coupling.orbits.newton import find_orbit as newton_orbit
@@ -197,3 +199,25 @@ def test_an_impact_passes_the_start_of_a_part_and_one_of_another_sector_its_end(
 def test_a_wave_without_contact_is_an_orbit(tmp_path):
     wave = find_orbit(ring_scene(tmp_path / "ring.h5", 5, 2, 50).replace({"excitation.force": 1e-3}))
     assert wave.status == "ok" and wave.passage.sequence == ()
+
+
+@pytest.mark.slow
+def test_a_border_of_waves_is_that_of_orbits_of_whole_periods(tmp_path):
+    """A peak over the force: the condition on whole periods of all sectors has the same point."""
+    scene = ring_scene(tmp_path / "ring.h5", 3, 1, 800)
+    own = scene.excitation.frequency
+    low, high = (0.9891289894 - 1e-5) * own, (0.9891289894 + 1.2e-5) * own
+    track = {"parameter": "excitation.force", "to": 25.1, "kinds": ["peak"], "max_points": 2}
+    table = {"to": high, "step": 0.5, "max_step": 1.0, "min_step": 0.01, "max_points": 8, "track": track}
+    tables = {f"orbit.{name}": value for name, value in table.items()}
+    scene = scene.replace({"excitation.frequency": low} | tables)
+    (border,) = orbits(scene).borders
+    assert border.second[0] == 25.0 < border.second[1] and (border.stable_orbits == 1).all()
+    whole = period_map(scene, second="excitation.force")
+    origin, span = np.array([low, 25.0]), np.array([high - low, 0.1])
+    problem = Problem(whole, ("excitation.frequency", "excitation.force"), origin, span)
+    y = problem.pack(border.state[1], float(border.parameter[1]), float(border.second[1]))
+    found = first_point(Peak(problem, 0, np.eye(problem.size + 1)[-1]), y + 1e-3 * problem.row(-2))
+    assert problem.numbers(found.y)[0] == pytest.approx(border.parameter[1], rel=1e-8)
+    values = np.linalg.eigvals(problem.derivative(found.passage))
+    assert np.abs(border.multipliers[1]) == pytest.approx(np.sort(np.abs(values))[::-1], abs=1e-5)
