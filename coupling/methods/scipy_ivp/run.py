@@ -1,10 +1,11 @@
 """A general solver of differential equations with events: scipy's DOP853, stopped at every change of contact.
 
-An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units), but neither
-motion nor search nor decisions nor impacts. Closed contacts and what sticks are constraints on accelerations
-(methods.scipy_ivp.motion, methods.scipy_ivp.contact_states), impacts jumps between two integrations
-(methods.scipy_ivp.impacts); events are searched on the solver's interpolant, where none can be missed
-(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.recorder).
+An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units) and the table
+of their laws (coupling.system.unit_laws), but neither motion nor search nor decisions nor the solution of impacts.
+Closed contacts and what sticks are constraints on accelerations (methods.scipy_ivp.motion,
+methods.scipy_ivp.contact_states), impacts jumps between two integrations (methods.scipy_ivp.impacts); events are
+searched on the solver's interpolant, where none can be missed (methods.scipy_ivp.root_search). Energies and harmonics
+are integrated along (methods.scipy_ivp.recorder).
 """
 
 from __future__ import annotations
