@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics, ways
+from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.system.unit_laws import rubs, ways
 
 
 class Affine(NamedTuple):
@@ -71,8 +72,7 @@ class Constraints:
     def begun(self, state: np.ndarray, closed: np.ndarray, z: np.ndarray) -> Affine:
         """Return the map that contacts `closed` (u,) and units that stick in states (u,) leave at z (K,)."""
         system = self.dynamics.system
-        rubs = (system.friction > 0.0) | (np.arange(len(state)) >= system.contacts)
-        held = self.held(closed & np.isinf(system.spring), (state == codes.STICK) & rubs, z)
+        held = self.held(closed & np.isinf(system.spring), (state == codes.STICK) & rubs(system), z)
         return held.then(self.followed(state, z))
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine, Constraints
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.jump import Untrusted, impact, scaled
 from vanedamp.coupling.derivatives.numbers import Numbers
@@ -21,6 +21,7 @@ from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Event, Segment
+from vanedamp.coupling.system.unit_laws import EVENTS, contacts_of, presses
 
 #: largest difference of the engine's motion and the own flows', relative to a coordinate's size, and that size
 #: where it hardly moves, relative to its typical one
@@ -43,7 +44,6 @@ _NOTHING, _ONE_INSTANT = 1e-9, 1e-6
 _LAST_FLIGHT, _LAST_SPEED = 1e-6, 1e-3
 #: times this close, relative to a period: of an event and the passage's start or end; of two events at one instant
 _SIMULTANEOUS, _INSTANT = 1e-12, 1e-15
-_FORCES = (codes.PARTS, codes.AT_LOW, codes.AT_HIGH)
 
 
 class Guard(NamedTuple):
@@ -149,7 +149,7 @@ class Derivative:
             # a gap that round-off has opened closes at once, without speed
             met = abs(float(self.dynamics.speed[event.unit] @ before.z))
             rests = np.isinf(self.system.spring[event.unit]) and met <= _ROUND_OFF * before.segment.speed
-            if event.what in (codes.CLOSES, codes.OPENS, codes.RECLOSES) and not rests:
+            if EVENTS[event.what].order == codes.POSITION and not rests:
                 self.worsen(PassageStatus.GRAZING)
         else:
             M = self._saltation(before, new, flow, z, jump, kick, guards)
@@ -206,7 +206,7 @@ class Derivative:
         events = [(event.unit, event.what)]
         rigid = event.struck[np.isinf(system.spring[event.struck])]
         events += [(c, int(codes.CLOSES)) for c in rigid.tolist() if segment.state[c] == codes.OPEN and c != event.unit]
-        if event.what == codes.STOPS:
+        if EVENTS[event.what].order == codes.VELOCITY:
             own = before.flow
             slides = (own.way != 0.0) & ~own.slips_held & own.rubs & (new.state != segment.state)
             still = np.abs(system.J[u:] @ new.v) <= _ROUND_OFF * segment.speed
@@ -221,7 +221,7 @@ class Derivative:
         rate, bend = float(slope @ before.z), float(slope @ before.flow.X @ before.z)
         if not np.isfinite(scale):
             terms = float(np.abs(functional) @ np.abs(before.z))
-            scale = before.segment.speed if what == codes.STOPS else terms
+            scale = before.segment.speed if EVENTS[what].order == codes.VELOCITY else terms
         gradient, own = functional[: self.dynamics.one], np.zeros(0)
         if self.numbers is not None:
             time = before.segment.start + before.segment.duration
@@ -286,7 +286,8 @@ class Derivative:
         rate = (before.flow.X @ before.z)[:k]
         rate_after = (flow.X @ z)[:k]
         kick = rate_after - jump.matrix @ rate
-        round_off = _CONTINUOUS if event.what in _FORCES else _ROUND_OFF
+        of_force = EVENTS[event.what].order == codes.FORCE
+        round_off = _CONTINUOUS if of_force else _ROUND_OFF
         kick[np.abs(kick) <= round_off * (np.abs(rate_after) + np.abs(jump.matrix) @ np.abs(rate))] = 0.0
         if event.impulse.any():
             kick[dynamics.places] = dynamics.rate * jumped
@@ -321,7 +322,7 @@ class Derivative:
             self.worsen(PassageStatus.COINCIDENT)
         if rests and (free or apart.any()):  # nothing is left of gaps and speeds
             moved = self._constraints.held(closed, np.zeros(len(new.state), bool), z)(unmoved)
-        if before.segment.open_force.any() and event.what in _FORCES:
+        if before.segment.open_force.any() and of_force:
             raise Untrusted  # of forces that the laws leave open the engine has chosen one
         self._last = new.start, shifts
         return moved
@@ -380,7 +381,7 @@ class Derivative:
     def _check_still(self, new: Segment, M: np.ndarray, z: np.ndarray) -> None:
         """Raise Untrusted if the derivative moves coordinates at rest."""
         dynamics, u = self.dynamics, len(new.state)
-        closed = np.isinf(self.system.spring) & presses(new.state) & (np.arange(u) < self.system.contacts)
+        closed = np.isinf(self.system.spring) & presses(new.state) & contacts_of(self.system)
         rigid, k = np.flatnonzero(closed), dynamics.one
         stuck = u + np.flatnonzero(dynamics.flow(new.state, new.open_force).stuck)
         speeds = np.concatenate([rigid, stuck])

@@ -28,22 +28,13 @@ from vanedamp.coupling.derivatives.minima import least_minimum
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Segment
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, presses, signals_of, ways
 from vanedamp.coupling.tangents.dual import values, zeros
 
 #: singular values below this are zero: rows that depend on each other
 DEPENDENT = 1e-9
 #: points of a period, and of one turn of the fastest motion, between which least margins are sought; flows kept
 _LOOKS, _TURN, _KEPT = 32, 12, 1000
-
-
-def presses(state: np.ndarray) -> np.ndarray:
-    """Return whether contacts in states (u,) are closed with a force of their own."""
-    return (state < codes.OPEN) | (state == codes.CLOSED)
-
-
-def ways(state: np.ndarray) -> np.ndarray:
-    """Return the directions (u,) in which units in states (u,) slip, or 0."""
-    return np.asarray((state == codes.SLIP_RIGHT).astype(float) - (state == codes.SLIP_LEFT))
 
 
 def _rates(system: System) -> np.ndarray:
@@ -248,42 +239,26 @@ class Flow:
         power, k = expm(self.X * duration), self.dynamics.one
         return power @ z, power[:k, :k]
 
+    def signals(self, r: int) -> dict[str, np.ndarray]:
+        """Return the signals of unit r as functionals (K,) of z (system.unit_laws)."""
+        dynamics = self.dynamics
+        one = np.zeros(len(self.X))
+        one[dynamics.one] = 1.0 / dynamics.size
+        return signals_of(r, dynamics.gap, dynamics.speed, self.forces, one)
+
     def function(self, r: int, what: int) -> tuple[np.ndarray, float]:
         """Return the event function `what` (numerics.codes) of unit r, a functional (K,) of z, and its scale.
 
         It falls through zero at its event. The scale is inf for forces and slips that have none of their own.
         """
-        dynamics, system, u = self.dynamics, self.dynamics.system, len(self.state)
-        if what in (codes.CLOSES, codes.OPENS):
-            return dynamics.gap[r] * (1.0 if what == codes.CLOSES else -1.0), float(system.play[r])
-        if what == codes.RECLOSES:
-            pushes = system.spring[r] * dynamics.gap[r] + system.dashpot[r] * dynamics.speed[r]
-            return pushes, float(system.spring[r] * system.play[r])
-        if what == codes.STOPS:
-            return self.way[r] * dynamics.speed[u + r], np.inf
-        if what == codes.PARTS:
-            return self.forces[r], np.inf
-        room = system.friction[r] * self.forces[r] + (
-            self.forces[u + r] if what == codes.AT_LOW else -self.forces[u + r]
-        )
-        room[dynamics.one] += system.limit[r] / dynamics.size
-        return room, float(system.limit[r]) or np.inf
+        event, system = EVENTS[what], self.dynamics.system
+        return event.function(event.factors(system, r, self.way[r]), self.signals(r)), event.size(system, r)
 
     @cached_property
     def possible(self) -> list[tuple[int, int]]:
         """The events that can happen, each by its unit and its code."""
-        found: list[tuple[int, int]] = []
-        for r, state in enumerate(self.state.tolist()):
-            if r < self.dynamics.system.contacts:
-                if state == codes.OPEN:
-                    found.append((r, int(codes.CLOSES)))
-                elif state not in (codes.TOUCHING, codes.LEAVING):
-                    found.append((r, int(codes.PARTS)))
-            if state == codes.STICK and self.rubs[r]:
-                found += [(r, int(codes.AT_LOW)), (r, int(codes.AT_HIGH))]
-            elif self.way[r] != 0.0 and self.rubs[r] and not self.slips_held[r]:
-                found.append((r, int(codes.STOPS)))
-        return found
+        events = possible_events(self.dynamics.system, self.state)
+        return [(r, int(event.code)) for r, event in events if event.order != codes.VELOCITY or not self.slips_held[r]]
 
     @cached_property
     def _margins(self) -> np.ndarray:

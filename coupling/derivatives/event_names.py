@@ -7,14 +7,10 @@ import numpy as np
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import CASING, FLOOR, SURFACES, System
+from vanedamp.coupling.system.unit_laws import EVENTS, contacts_of, rubs, slips
 
 #: which of two units carries a redundant force is no event
 _ALIKE = {int(codes.HELD): int(codes.STICK), int(codes.TOUCHING): int(codes.CLOSED)}
-#: what could happen at a unit, for event functions that stay above zero
-_COULD = {
-    int(codes.CLOSES): "impact", int(codes.PARTS): "leaves", int(codes.STOPS): "sticks", int(codes.AT_LOW): "slips",
-    int(codes.AT_HIGH): "slips", int(codes.OPENS): "leaves", int(codes.RECLOSES): "presses",
-}  # fmt: skip
 _WAYS = {int(codes.SLIP_LEFT): " left", int(codes.SLIP_RIGHT): " right"}
 
 
@@ -22,8 +18,7 @@ class EventNames:
     """Names of the units of a scene, and of what happens at them."""
 
     def __init__(self, scene: Scene, system: System) -> None:
-        self._contact = np.arange(len(system.rest)) < system.contacts
-        self._rubs = (system.friction > 0.0) | ~self._contact
+        self._contact, self._rubs = contacts_of(system), rubs(system)
         #: whether the unit belongs to a body that only slides, or to none
         self._slides = np.r_[system.tilt, -1][np.where(system.without_body, system.bodies, system.body)] < 0
         # of bodies that only slide, floors and friction dampers come first
@@ -45,8 +40,9 @@ class EventNames:
 
     def possible(self, r: int, what: int) -> str:
         """Return the name of an event that did not happen at unit r, by the meaning of its function."""
-        turns = what == codes.STOPS and not self._contact[r]
-        return f"{'turns' if turns else _COULD[int(what)]} {self.names[r]}"
+        event = EVENTS[what]
+        turns = event.order == codes.VELOCITY and not self._contact[r]
+        return f"{'turns' if turns else event.name} {self.names[r]}"
 
     def event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
         """Return the name of an event from the states (u,) of the units before and after it and those hit (m,)."""
@@ -67,11 +63,9 @@ class EventNames:
             return "leaves" if new == codes.OPEN else "lags"
         if contact and old in (codes.OPEN, codes.LEAVING):
             return "presses" if old == codes.LEAVING else "impact" if new == codes.SPRUNG else "rests"
-        if not rubs or new not in (codes.STICK, codes.SLIP_LEFT, codes.SLIP_RIGHT):
-            return ""
-        if new == codes.STICK:
-            return "sticks"
-        return "turns" if old in (codes.SLIP_LEFT, codes.SLIP_RIGHT) else "slips"
+        if rubs and slips(new):
+            return "turns" if slips(old) else "slips"
+        return "sticks" if rubs and new == codes.STICK else ""
 
 
 def _alike(state: int) -> int:

@@ -11,6 +11,7 @@ from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Flow
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.system.unit_laws import EVENTS, signals_of, wrenches
 
 #: flows whose derivatives are kept
 _KEPT = 1000
@@ -43,13 +44,8 @@ class FlowDerivative:
         free[:, :, dynamics.places] -= turns / dynamics.rate
         # the projector P along wrenches W onto the rows R's null space: R P = 0, P W = 0, P P = P
         rows, of_rows = dynamics.rows[s.kept], of.rows[:, s.kept]
-        of_wrench = np.concatenate(
-            [
-                of.rows[:, m] - drag[m] * of.rows[:, u + m] - turned[:, m] * dynamics.rows[u + m],
-                of.rows[:, u + s.stick],
-            ],
-            axis=1,
-        ).transpose(0, 2, 1)
+        of_wrench = wrenches(of.rows, m, drag[m, 0], s.stick)
+        of_wrench[..., : len(m)] -= (turned[:, m] * dynamics.rows[u + m]).swapaxes(1, 2)
         length = np.linalg.norm(rows, axis=1)
         along = np.linalg.pinv(s.wrench / length, rcond=DEPENDENT) / length[:, None]
         across, held = pseudo_inverse(rows), np.eye(len(rows.T)) - s.oblique
@@ -78,20 +74,13 @@ class FlowDerivative:
 
     def function(self, r: int, what: int) -> np.ndarray:
         """Return the derivatives (P, K) of the functional of an event (Flow.function)."""
-        dynamics, of, u = self.flow.dynamics, self.numbers.parts, len(self.flow.state)
-        system = dynamics.system
-        if what in (codes.CLOSES, codes.OPENS):
-            return of.gap[:, r] * (1.0 if what == codes.CLOSES else -1.0)
-        if what == codes.RECLOSES:
-            return self._pushes(np.array([r]))[:, 0]
-        if what == codes.STOPS:
-            return self.flow.way[r] * of.speed[:, u + r]
-        if what == codes.PARTS:
-            return self.forces[:, r]
-        room = of.friction[:, r, None] * self.flow.forces[r] + system.friction[r] * self.forces[:, r]
-        room = room + (self.forces[:, u + r] if what == codes.AT_LOW else -self.forces[:, u + r])
-        room[:, dynamics.one] += of.limit[:, r] / dynamics.size
-        return np.asarray(room)
+        flow, of, event = self.flow, self.numbers.parts, EVENTS[what]
+        own, signals = signals_of(r, of.gap, of.speed, self.forces, np.zeros(len(flow.X))), flow.signals(r)
+        found = event.function(event.factors(flow.dynamics.system, r, flow.way[r]), own)
+        for name, factor in event.terms:
+            if factor in of._fields:
+                found = found + np.multiply.outer(getattr(of, str(factor))[:, r], signals[name])
+        return found
 
 
 def derivative_of(flow: Flow, numbers: Numbers) -> FlowDerivative:

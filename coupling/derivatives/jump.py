@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
+from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_laws import Grip, wrenches
 from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 
 #: a speed after an impact below this fraction of the fastest of its contacts counts as zero: the end of a chatter
@@ -58,18 +59,14 @@ class _Laws(NamedTuple):
             return cls(system, *(np.zeros((0, *getattr(system, name).shape)) for name in names))
         return cls(system, *(getattr(numbers.parts, name) for name in names))
 
-    def lever(self, units: np.ndarray, drag: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what impulses on units (m,), with friction `drag` (m,) of each, and on rows (n,) do to the speeds.
-
-        (N, m + n), and derivatives (P, N, m + n).
-        """
+    def lever(self, contacts: np.ndarray, drag: np.ndarray, slips: np.ndarray, lever: np.ndarray) -> np.ndarray:
+        """Return the derivatives (P, N, m + n) of what impulses do to the speeds: as in Grip, `lever` (N, m + n)."""
         J, mass, u = self.system.J, self.system.mass, len(self.system.rest)
-        friction = self.system.friction[units]
-        turned = np.divide(drag, friction, out=np.zeros_like(drag), where=friction > 0.0) * self.friction[:, units]
-        ways = np.vstack([J[units] - drag[:, None] * J[u + units], J[rows]]).T
-        moved = self.J[:, units] - drag[:, None] * self.J[:, u + units] - turned[:, :, None] * J[u + units]
-        of_ways = np.concatenate([moved, self.J[:, rows]], axis=1).transpose(0, 2, 1)
-        return ways / mass[:, None], of_ways / mass[:, None] - ways * (self.mass / mass**2)[:, :, None]
+        friction = self.system.friction[contacts]
+        turned = np.divide(drag, friction, out=np.zeros_like(drag), where=friction > 0.0) * self.friction[:, contacts]
+        moved = wrenches(self.J, contacts, drag, slips)
+        moved[..., : len(contacts)] -= (turned[:, :, None] * J[u + contacts]).swapaxes(1, 2)
+        return np.asarray(moved / mass[:, None] - lever * (self.mass / mass)[:, :, None])
 
 
 class _Roles(NamedTuple):
@@ -142,14 +139,15 @@ def _expand(
     """
     system, u, n = laws.system, len(laws.system.rest), len(pressed.v)
     slides = np.where(np.isin(np.arange(u), roles.sticks), 0.0, roles.drag)
-    lever, of_lever = laws.lever(np.arange(u), slides, np.zeros(0, int))
+    every, none = np.arange(u), np.arange(0)
+    lever = wrenches(system.J, every, slides, none) / system.mass[:, None]
     begun = Jump(pressed.v + lever @ given, pressed.derivative + lever @ steep)
-    begun.derivative[:, n:] += (of_lever @ given).T
+    begun.derivative[:, n:] += (laws.lever(every, slides, none, lever) @ given).T
     mobility = np.diag(system.delassus)[roles.hit]
     found, asked = impulse[roles.hit] * mobility, given[roles.hit] * mobility
     more = roles.hit[found - asked > _EDGE * found + _ROUND_OFF * speed]
-    none = np.zeros(len(more)), np.zeros((len(more), steep.shape[1]))
-    return _blow(laws, begun, roles._replace(hit=more), *none).jump
+    stop = np.zeros(len(more)), np.zeros((len(more), steep.shape[1]))
+    return _blow(laws, begun, roles._replace(hit=more), *stop).jump
 
 
 def _newton(laws: _Laws, begun: Jump, event: Event, met: _Approach, speed: float) -> Jump:
@@ -199,12 +197,10 @@ def _blow(laws: _Laws, begun: Jump, roles: _Roles, target: np.ndarray, steep: np
 
     Those that stick lose their slips. begun: the speeds so far.
     """
-    system, u, n = laws.system, len(laws.system.rest), len(begun.v)
-    kept = np.concatenate([roles.hit, u + roles.sticks])
-    rows, of_rows = system.J[kept], laws.J[:, kept]
-    lever, of_lever = laws.lever(roles.hit, roles.drag[roles.hit], u + roles.sticks)
-    size = 1.0 / np.sqrt((rows**2 / system.mass).sum(axis=1))
-    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=DEPENDENT) * size * size[:, None]
+    n, kept = len(begun.v), np.concatenate([roles.hit, len(laws.system.rest) + roles.sticks])
+    who = roles.hit, roles.drag[roles.hit], roles.sticks
+    rows, lever, solve = Grip.of(laws.system, *who)
+    of_rows, of_lever = laws.J[:, kept], laws.lever(*who, lever)
     impulse = solve @ (np.concatenate([target, np.zeros(len(roles.sticks))]) - rows @ begun.v)
     slope = np.vstack([steep, np.zeros((len(roles.sticks), steep.shape[1]))]) - rows @ begun.derivative
     slope[:, n:] -= (of_rows @ (begun.v + lever @ impulse) + (of_lever @ impulse) @ rows.T).T

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Constraints
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.jump import impact, scaled
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
 from vanedamp.coupling.response.segment import Event, Segment
 from vanedamp.coupling.system.system import FLOOR
+from vanedamp.coupling.system.unit_laws import contacts_of, presses
 
 #: gaps this close are closed, relative to the free travel; speeds this slow count as zero, relative to the fastest
 _SHUT, _STILL = 1e-12, 1e-12
@@ -44,7 +45,7 @@ class Start:
         gap, rate = system.rest + system.J[:u] @ segment.q, system.J[:u] @ segment.v
         # one at rest that parts from now on has been closed until now
         rests = (gap <= _SHUT * system.play) & (np.abs(rate) <= _STILL * segment.speed)
-        return np.asarray((np.arange(u) < system.contacts) & ((segment.state != OPEN) | rests))
+        return np.asarray(contacts_of(system) & ((segment.state != OPEN) | rests))
 
     def derivative(
         self, event: Event, segment: Segment, flow: Flow, z: np.ndarray
@@ -97,7 +98,7 @@ class Start:
             # gaps of bodies that were pushed and are closed now stay closed
             gap = dynamics.gap[:, : dynamics.one] @ dynamics.from_state
             shut = np.abs(system.rest + system.J[: len(gap)] @ segment.q) <= _SHUT * system.play
-            shut &= np.any(gap[:, pushed] != 0.0, axis=1) & (np.arange(len(gap)) < system.contacts)
+            shut &= np.any(gap[:, pushed] != 0.0, axis=1) & contacts_of(system)
             kept[pushed] = 0.0
             opened = gap[shut] @ kept
             if numbers is not None:
@@ -113,9 +114,8 @@ class Start:
         M: (2N, k + P) of the start, which may keep what is to count.
         """
         system, u = self.system, len(segment.state)
-        contact = np.arange(u) < system.contacts
         gap = system.rest + system.J[:u] @ segment.q
-        parts = contact & (segment.state == OPEN) & (gap <= _SHUT * system.play) & ~self.closed(segment)
+        parts = contacts_of(system) & (segment.state == OPEN) & (gap <= _SHUT * system.play) & ~self.closed(segment)
         slides = (flow.way != 0.0) & ~flow.slips_held & flow.rubs
         faster = flow.way * (self.dynamics.speed[u:] @ flow.X @ z) > 0.0  # one that stops at once has been at rest
         slips = slides & faster & (np.abs(system.J[u:] @ segment.v) <= _STILL * segment.speed)
@@ -145,7 +145,7 @@ class Start:
         system, units, unit = self.system, len(segment.state), np.arange(len(segment.state))
         force = flow.forces @ z
         noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical
-        closed = (unit < system.contacts) & np.isinf(system.spring) & presses(segment.state)
+        closed = contacts_of(system) & np.isinf(system.spring) & presses(segment.state)
         touched = system.J[:units, system.along] != 0.0  # (u, bodies)
         floors = (unit >= system.contacts) & (system.surface == FLOOR)
         holds = floors & np.isin(segment.state, (STICK, HELD))

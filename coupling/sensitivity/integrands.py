@@ -9,7 +9,6 @@ import numpy as np
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.numbers import Numbers
-from vanedamp.coupling.numerics import codes
 
 #: energies that are integrals of powers, as in records.ENERGIES
 POWERS = ("excitation", "viscous", "friction", "contact")
@@ -56,8 +55,7 @@ def each_of(rows: np.ndarray, own: np.ndarray) -> list[Functionals]:
 
 def slipping(flow: Flow) -> np.ndarray:
     """Return the units (m,) that slip in a flow."""
-    slips = (flow.state == codes.SLIP_LEFT) | (flow.state == codes.SLIP_RIGHT)
-    return np.flatnonzero((flow.way != 0.0) & slips)
+    return np.flatnonzero(flow.way)
 
 
 def momentum_of(dynamics: Dynamics, numbers: Numbers) -> Functionals:

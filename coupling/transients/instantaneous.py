@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from vanedamp.coupling.numerics.codes import CLOSED, OPEN
 from vanedamp.coupling.response.segment import Segment, beyond_line
+from vanedamp.coupling.system.unit_laws import presses
 
 #: fraction of the largest speed below which a mode is not felt
 _FELT = 1e-9
@@ -73,7 +73,7 @@ class Followed:
         total = 0.5 * float(system.mass[massive] @ v[massive] ** 2 + q @ system.stiffness @ q)
         total -= float(system.weight[n:] @ q[n:])
         state = self._segment.state[:u]
-        pressed = np.isfinite(system.spring[:u]) & ((state < OPEN) | (state == CLOSED))
+        pressed = np.isfinite(system.spring[:u]) & presses(state)
         gap = (system.rest[:u] + system.J[:u] @ q)[pressed]
         total += 0.5 * float(system.spring[:u][pressed] @ gap**2 + system.tangential @ (system.elongation @ q) ** 2)
         return Energy(total, kinetic + 0.5 * float(q[:n] @ system.stiffness[:n, :n] @ q[:n]), kinetic)

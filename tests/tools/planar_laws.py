@@ -20,7 +20,6 @@ from scipy.linalg import expm, null_space
 from tests.tools.planar import Run, open_run
 from vanedamp.coupling.engine.line.event_functions import CHATTER
 from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
-from vanedamp.coupling.engine.line.impacts import COLLAPSE
 from vanedamp.coupling.engine.plane.automaton import advance, begin
 from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow
 from vanedamp.coupling.engine.run import IllConditioned
@@ -40,6 +39,7 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     UNDECIDED,
 )
+from vanedamp.coupling.numerics.tolerances import COLLAPSE
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System

@@ -13,17 +13,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from vanedamp.coupling.methods.scipy_ivp.motion import (
-    LEFT,
-    LOOSE,
-    OPEN,
-    RIGHT,
-    STICK,
-    Motion,
-    States,
-    Unforced,
-    Wrong,
-)
+from vanedamp.coupling.methods.scipy_ivp.motion import Motion, States, Unforced, Wrong
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.system.unit_laws import presses, slip_towards
 
 #: states that may be tried in turn: all of six contacts with friction, the nearest of more
 _MOST = 5000
@@ -50,8 +42,8 @@ def search(
             return found
         unit, state = wrong[0]
         if state not in options[unit]:
-            free = state in (OPEN, LOOSE)
-            state = next((other for other in options[unit] if (other in (OPEN, LOOSE)) == free), at[unit])
+            pressed = presses(state)
+            state = next((other for other in options[unit] if presses(other) == pressed), at[unit])
         at = (*at[:unit], state, *at[unit + 1 :])
     for states in islice(_around(options, begin), _MOST):
         if states not in seen:
@@ -83,14 +75,14 @@ def decide(
     options, begin = [], []
     for r in range(free.u):
         slip = speed[free.u + r]
-        ways = [STICK, RIGHT, LEFT] if slip == 0.0 else [RIGHT if slip > 0.0 else LEFT]
+        ways = [STICK, SLIP_RIGHT, SLIP_LEFT] if slip == 0.0 else [slip_towards(slip)]
         if not free.rubs[r]:
-            ways = [RIGHT] if free.contact[r] else [OPEN]
+            ways = [SLIP_RIGHT]
         if free.sprung[r]:
             ways = free.ways_of_slider(r, now, sizes, slip, slow)
         if free.contact[r]:
             closed = gaps[r] <= 0.0 and (free.soft[r] or speed[r] <= 0.0)
-            ways = [*ways, LOOSE if gaps[r] < 0.0 else OPEN] if closed else [OPEN]
+            ways = [*ways, LEAVING if gaps[r] < 0.0 else OPEN] if closed else [OPEN]
         options.append(ways)
         begin.append(int(present[r]) if present[r] in ways else ways[0])
 

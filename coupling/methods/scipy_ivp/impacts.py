@@ -8,17 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.contact_states import search
-from vanedamp.coupling.methods.scipy_ivp.motion import (
-    LEFT,
-    OPEN,
-    RIGHT,
-    ROUND_OFF,
-    STICK,
-    Holding,
-    States,
-    Unforced,
-    Wrong,
-)
+from vanedamp.coupling.methods.scipy_ivp.motion import ROUND_OFF, Holding, States, Unforced, Wrong
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.system.unit_laws import slip_towards, slips
 
 #: sweeps that guess the states of an impact, the change that ends them, and how near to its bound a force slips
 _SWEEPS, _CONVERGED, _NEARLY = 200, 1e-9, 1e-6
@@ -63,7 +55,7 @@ def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution:
     slow = ROUND_OFF * float((np.abs(J) @ np.abs(v)).max(initial=0.0))
     options = [[OPEN] for _ in range(u)]
     for r in closed:
-        options[r] = [STICK, RIGHT, LEFT, OPEN] if free.rubs[r] else [RIGHT, OPEN]
+        options[r] = [STICK, SLIP_RIGHT, SLIP_LEFT, OPEN] if free.rubs[r] else [SLIP_RIGHT, OPEN]
 
     def judge(states: States) -> tuple[Impact, list[Wrong]] | None:
         # friction elements are free of impulses
@@ -105,8 +97,8 @@ def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.nda
     for r in closed:
         push, drag = found[r], found.get(u + r, 0.0)
         if push > 0.0:
-            slips = not free.rubs[r] or abs(drag) >= (1 - _NEARLY) * system.friction[r] * push
-            state[r] = STICK if not slips else LEFT if drag > 0.0 else RIGHT
+            sticks = free.rubs[r] and abs(drag) < (1 - _NEARLY) * system.friction[r] * push
+            state[r] = STICK if sticks else slip_towards(-drag)
     return state
 
 
@@ -116,7 +108,6 @@ def _violation(
 ) -> list[Wrong]:  # fmt: skip
     """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
     u, least, wrong = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0)), []
-    way = {LEFT: -1.0, RIGHT: 1.0}
     for r in closed:
         push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]
         if states[r] == OPEN:
@@ -125,7 +116,7 @@ def _violation(
         elif push < -least:
             wrong.append(Wrong(r, OPEN))
         elif states[r] == STICK and abs(drag) > bound + least:
-            wrong.append(Wrong(r, LEFT if drag > 0.0 else RIGHT))
-        elif states[r] in way and free.rubs[r] and way[states[r]] * (free.slip[r] @ after) < -slow:
+            wrong.append(Wrong(r, slip_towards(-drag)))
+        elif slips(states[r]) and free.rubs[r] and states[r] * (free.slip[r] @ after) < -slow:
             wrong.append(Wrong(r, STICK))
     return wrong

@@ -12,23 +12,30 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import OPEN, STICK
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_laws import (
+    Grip,
+    contacts_of,
+    possible_events,
+    presses,
+    rubs,
+    signals_of,
+    slip_towards,
+    ways,
+)
 
-#: states of a unit; a closed contact without friction slips to the right; LOOSE: a spring is compressed without force
-OPEN, STICK, LEFT, RIGHT, LOOSE = range(5)
-_WAY = np.array([0.0, 0.0, -1.0, 1.0, 0.0])
 #: derivatives that are evaluated, and the order of a zero whose derivatives all vanish
 _LEVELS, NEVER = 7, 99
 #: values below this fraction of the terms that they are sums of are round-off
 ROUND_OFF = 1e-11
-#: relative tolerance of rows that depend on each other
-_DEPENDENT = 1e-9
 #: fraction of a row's motion by which forces may fail to hold it
 _LOST = 1e-7
 #: gaps below these fractions of the play, and of the terms that they are sums of, are closed; the second ones are those
 #: of rigid planar bodies, whose corners are to meet a surface together
 _TOUCH, _TOUCH_EXTENDED = (0.0, 2e-14), (1e-11, 10 * ROUND_OFF)
 
+#: of units (numerics.codes); a closed contact without friction slips to the right
 States = tuple[int, ...]
 
 
@@ -68,10 +75,10 @@ class Unforced:
         self.relative = system.J @ self.accelerations
         self.respond = (system.J / system.mass).T  # (N, 2u)
         self.normal, self.slip = system.J[:u], system.J[u:]
-        self.contact = np.arange(u) < system.contacts
+        self.contact = contacts_of(system)
         self.soft = self.contact & np.isfinite(system.spring)
         self.rigid = self.contact & ~self.soft
-        self.rubs = np.where(self.contact, system.friction, system.limit) > 0.0
+        self.rubs = rubs(system)
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
@@ -101,14 +108,14 @@ class Unforced:
         """
         pull = self.pull[r - self.u]
         force, limit = float(pull @ now), self.system.limit[r]
-        way = RIGHT if force < 0.0 else LEFT
-        if abs(force) < limit - ROUND_OFF * (limit + float(np.abs(pull) @ sizes)) or _WAY[way] * speed < -slow:
+        way = slip_towards(-force)
+        if abs(force) < limit - ROUND_OFF * (limit + float(np.abs(pull) @ sizes)) or way * speed < -slow:
             return [STICK]
-        return [way] if _WAY[way] * speed > slow else [STICK, way]
+        return [way] if way * speed > slow else [STICK, way]
 
 
 class Holding:
-    """The rows that states keep at rest, and the wrenches of their forces: W_N - way mu W_T of a contact that slips.
+    """The rows that states keep at rest, and what their forces do (system.unit_laws.Grip).
 
     kept (k,): rows; inverse (k, k): forces of the kept rows that give them accelerations; possible: whether there are
     such forces.
@@ -118,16 +125,10 @@ class Holding:
         system, u = free.system, free.u
         self.closed = np.flatnonzero((state != OPEN) & free.rigid)
         self.stick = np.flatnonzero((state == STICK) & free.rubs & ~free.sprung)
-        self.drag = (_WAY[state] * system.friction)[self.closed]
+        self.drag = (ways(state) * system.friction)[self.closed]
         self.kept = np.concatenate([self.closed, u + self.stick])
-        mobility = system.delassus[np.ix_(self.kept, self.kept)]
-        mobility[:, : len(self.closed)] -= self.drag * system.delassus[np.ix_(self.kept, u + self.closed)]
-        scale = 1 / np.sqrt(np.maximum(np.diag(system.delassus)[self.kept], 1e-300))
-        scaled = mobility * scale * scale[:, None]
-        inverse = np.linalg.pinv(scaled, rcond=_DEPENDENT) if len(scale) else scaled
-        self.inverse = inverse * scale[:, None] * scale
-        rows = system.J[self.kept]
-        left = rows - mobility @ (self.inverse @ rows)
+        rows, lever, self.inverse = Grip.of(system, self.closed, self.drag, self.stick)
+        left = rows - rows @ lever @ (self.inverse @ rows)
         sizes = np.abs(rows).max(axis=1, initial=0.0)
         self.possible = bool(np.all(np.abs(left).max(axis=1, initial=0.0) <= _LOST * sizes))
 
@@ -150,11 +151,11 @@ class Motion:
     def __init__(self, free: Unforced, states: States) -> None:
         system, u = free.system, free.u
         state = self.state = np.array(states, int)
-        holding, way = Holding(free, state), _WAY[state][:, None]
+        holding, way = Holding(free, state), ways(state)[:, None]
         self.possible = holding.possible
         if not self.possible:
             return
-        self.pressed = free.soft & (state != OPEN) & (state != LOOSE)
+        self.pressed = free.soft & presses(state)
         force = np.zeros((2 * u, free.extent))
         force[:u][self.pressed] = free.push[self.pressed]
         force[u:] = -way * system.friction[:, None] * force[:u]
@@ -176,25 +177,17 @@ class Motion:
         self.terms[free.s] = np.abs(free.relative) + np.abs(system.delassus) @ np.abs(force)
         force[u:][free.sprung] = free.pull
         self.force = force
-        self._watch(free, way)
+        self._watch(free)
 
-    def _watch(self, free: Unforced, way: np.ndarray) -> None:
+    def _watch(self, free: Unforced) -> None:
         """Set the event functions of all units, in their order, and what each says where it is negative."""
-        state, u, force = self.state, free.u, self.force
-        closed = free.contact & (state != OPEN) & (state != LOOSE)
-        bound = free.system.friction[:, None] * force[:u]
-        bound[:, free.one] += free.system.limit
-        stick, loose = free.rubs & (state == STICK), state == LOOSE
-        kinds = [
-            (free.gap, free.contact & (state == OPEN), STICK), (-free.gap, loose, OPEN), (-free.push, loose, STICK),
-            (force[:u], closed, OPEN), (bound - force[u:], stick, LEFT), (bound + force[u:], stick, RIGHT),
-            (way * free.speed[u:], free.rubs & (way[:, 0] != 0.0), STICK),
-        ]  # fmt: skip
-        unit = np.concatenate([np.flatnonzero(which) for _, which, _ in kinds])
-        order = np.argsort(unit, kind="stable")
-        self.guard = np.concatenate([rows[which] for rows, which, _ in kinds])[order]
-        instead = np.repeat([state for *_, state in kinds], [np.count_nonzero(which) for _, which, _ in kinds])
-        self.wrong = [Wrong(*pair) for pair in zip(unit[order].tolist(), instead[order].tolist(), strict=True)]
+        system, way, one = free.system, ways(self.state), np.eye(free.extent)[free.one]
+        events, self.wrong = possible_events(system, self.state), list[Wrong]()
+        self.guard = np.zeros((len(events), free.extent))
+        for guard, (r, event) in zip(self.guard, events, strict=True):
+            signals = signals_of(r, free.gap, free.speed, self.force, one)
+            guard[:] = event.function(event.factors(system, r, way[r]), signals)
+            self.wrong.append(Wrong(r, event.after))
         self._sizes = np.abs(self.guard)
 
     def judge(self, now: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, list[Wrong]]:

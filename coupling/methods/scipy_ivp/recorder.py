@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
-from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, OPEN, ROUND_OFF, Motion, Unforced
+from vanedamp.coupling.methods.scipy_ivp.motion import ROUND_OFF, Motion, Unforced
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN
 from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH
 from vanedamp.coupling.response.recorder import cubic_extremum, note_outputs, note_step, record_section
 from vanedamp.coupling.response.records import (
@@ -21,6 +22,7 @@ from vanedamp.coupling.response.records import (
     Records,
 )
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
+from vanedamp.coupling.system.unit_laws import presses
 
 #: the integrals; behind them, of each contact that yields, its impulses, along and across, and its loss
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(10)
@@ -209,7 +211,7 @@ class Recorder:
         free, system, old, new = self.free, self.system, self.state, motion.state
         self.state, loaded = new, motion.pressed
         for i, r in enumerate(self.soft):
-            if loaded[r] == (old[r] not in (OPEN, LOOSE)):
+            if loaded[r] == presses(old[r]):
                 continue
             gap, speed = y[free.d][r], y[free.s][r]
             energy, passed = 0.5 * system.spring[r] * gap * gap, y[free.size + _COUNT + 3 * i :][:3]
@@ -219,7 +221,7 @@ class Recorder:
                     entry, start = self.begun[r]
                     width = len(entry) - 5
                     entry[4:] = speed, *(passed - start + [0.0, 0.0, energy])[:width]
-            elif old[r] == LOOSE:
+            elif old[r] == LEAVING:
                 self.spring_loss -= energy
             elif speed < 0:
                 self.begun[r] = self._count(t, int(r), speed, 0.0, 0.0, 0.0, 0.0), passed.copy()
@@ -245,7 +247,7 @@ class Recorder:
         # what Jenkins elements have taken is in their springs, or lost
         springs = 0.5 * float(system.tangential @ (system.elongation @ q) ** 2)
         ledger[FRICTION] -= springs
-        pressed = self.soft[~np.isin(self.state[self.soft], (OPEN, LOOSE))]
+        pressed = self.soft[presses(self.state[self.soft])]
         springs += 0.5 * float(system.spring[pressed] @ y[free.d][pressed] ** 2)
         record_section(system, self.records, self.period, q.copy(), y[free.v].copy(), springs, ledger)
         extended = free.extended(0.0, y[: free.size])

@@ -1,10 +1,11 @@
 """A general solver of differential equations with events: scipy's DOP853, stopped at every change of contact.
 
-An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units), but neither
-motion nor search nor decisions nor impacts. Closed contacts and what sticks are constraints on accelerations
-(methods.scipy_ivp.motion, methods.scipy_ivp.contact_states), impacts jumps between two integrations
-(methods.scipy_ivp.impacts); events are searched on the solver's interpolant, where none can be missed
-(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.recorder).
+An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units) and the table
+of their laws (coupling.system.unit_laws), but neither motion nor search nor decisions nor the solution of impacts.
+Closed contacts and what sticks are constraints on accelerations (methods.scipy_ivp.motion,
+methods.scipy_ivp.contact_states), impacts jumps between two integrations (methods.scipy_ivp.impacts); events are
+searched on the solver's interpolant, where none can be missed (methods.scipy_ivp.root_search). Energies and harmonics
+are integrated along (methods.scipy_ivp.recorder).
 """
 
 from __future__ import annotations
@@ -18,18 +19,10 @@ from scipy.integrate import DOP853
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact, impact
-from vanedamp.coupling.methods.scipy_ivp.motion import (
-    LOOSE,
-    NEVER,
-    OPEN,
-    ROUND_OFF,
-    STICK,
-    Motion,
-    States,
-    Unforced,
-)
+from vanedamp.coupling.methods.scipy_ivp.motion import NEVER, ROUND_OFF, Motion, States, Unforced
 from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, STICK
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.plane import plane_of
@@ -156,7 +149,7 @@ class IvpRun:
         self.events += 1
         self.standing = self.standing + 1 if arc.duration < _AT_ONCE * self.system.period else 0
         unit, instead = self.motion.wrong[self.watched[arc.event]]
-        if self.state[unit] == OPEN or (self.state[unit] == LOOSE and instead == OPEN):
+        if self.state[unit] == OPEN or (self.state[unit] == LEAVING and instead == OPEN):
             self.y[self.free.d][unit] = 0.0
         return Status.OK if self.standing <= _STANDING and self._decide() else Status.UNDECIDED
 
