@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine, Constraints
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.jump import Untrusted, impact, scaled
 from vanedamp.coupling.derivatives.numbers import Numbers
@@ -21,6 +21,7 @@ from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Event, Segment
+from vanedamp.coupling.system.flow import presses
 
 #: largest difference of the engine's motion and the own flows', relative to a coordinate's size, and that size
 #: where it hardly moves, relative to its typical one

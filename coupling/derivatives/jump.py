@@ -15,9 +15,10 @@ import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Affine
 from vanedamp.coupling.derivatives.differences import NotSmooth, derivative
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
+from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.response.segment import Event
+from vanedamp.coupling.system.flow import SINGULAR
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
@@ -204,7 +205,7 @@ def _blow(laws: _Laws, begun: Jump, roles: _Roles, target: np.ndarray, steep: np
     rows, of_rows = system.J[kept], laws.J[:, kept]
     lever, of_lever = laws.lever(roles.hit, roles.drag[roles.hit], u + roles.sticks)
     size = 1.0 / np.sqrt((rows**2 / system.mass).sum(axis=1))
-    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=DEPENDENT) * size * size[:, None]
+    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=SINGULAR) * size * size[:, None]
     impulse = solve @ (np.concatenate([target, np.zeros(len(roles.sticks))]) - rows @ begun.v)
     slope = np.vstack([steep, np.zeros((len(roles.sticks), steep.shape[1]))]) - rows @ begun.derivative
     slope[:, n:] -= (of_rows @ (begun.v + lever @ impulse) + (of_lever @ impulse) @ rows.T).T

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.derivatives.constraints import Constraints
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow, presses
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.jump import impact, scaled
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
 from vanedamp.coupling.response.segment import Event, Segment
+from vanedamp.coupling.system.flow import presses
 from vanedamp.coupling.system.system import FLOOR
 
 #: gaps this close are closed, relative to the free travel; speeds this slow count as zero, relative to the fastest
