@@ -29,6 +29,34 @@ _SQUARED = 1e-13
 HELD_ROUND_OFF = 1e-15
 
 
+def attached(system: System, held: np.ndarray, moving: np.ndarray | None = None, across: bool = False) -> np.ndarray:
+    """Return the motions (N, k) of a structure with bodies `held` (b,) at rest on their floors, others not there.
+
+    By the modes (n,), then by the positions of bodies `moving` (b,), none of which is held. across: whether bodies that
+    are held follow their floors across the cavity and in its rotation, too.
+    """
+    n, alone = system.modes, np.zeros(0, int) if moving is None else np.flatnonzero(moving)
+    motions = np.zeros((len(system.mass), n + len(alone)))
+    motions[:n, :n] = np.eye(n)
+    motions[system.along, :n] = held[:, None] * system.floor[:, :n]
+    motions[system.along[alone], np.arange(n, n + len(alone))] = 1.0
+    for b in np.flatnonzero(across & held & (system.tilt >= 0)):
+        x = system.along[b]
+        motions[x + 1, :n], motions[x + 2, :n] = system.rise[b, :n], system.turn[b, :n]
+    return motions
+
+
+def mass_of(system: System, motions: np.ndarray) -> np.ndarray:
+    """Return the mass matrix (k, k) of a system that has motions (N, k) only."""
+    mass: np.ndarray = (motions.T * system.mass) @ motions
+    return mass
+
+
+def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return mass, damping and stiffness (k, k) of a system that has motions (N, k) only, without Jenkins elements."""
+    return mass_of(system, motions), motions.T @ system.damping @ motions, motions.T @ system.stiffness @ motions
+
+
 def presses(state: np.ndarray) -> np.ndarray:
     """Return whether contacts in states (u,) are closed with a force of their own."""
     return (state < OPEN) | (state == CLOSED)
