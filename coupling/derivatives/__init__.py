@@ -1,1 +1,1 @@
-"""Derivatives of motions by their start and by numbers of their scenes, from the equations, apart from the engines."""
+"""Derivatives of motions by their start and by numbers of their scenes, from the equations of motion."""

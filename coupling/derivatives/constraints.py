@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics
+from vanedamp.coupling.derivatives.dynamics import Dynamics
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.system.unit_laws import rubs, ways
+from vanedamp.coupling.system.unit_laws import SINGULAR, rubs, ways
 
 
 class Affine(NamedTuple):
@@ -80,4 +80,4 @@ def pseudo_inverse(rows: np.ndarray) -> np.ndarray:
     """Return the pseudo-inverse (N, m) of rows that may depend on each other."""
     length = np.linalg.norm(rows, axis=1)
     length = np.where(length > 0.0, length, 1.0)
-    return np.asarray(np.linalg.pinv(rows / length[:, None], rcond=DEPENDENT) / length)
+    return np.asarray(np.linalg.pinv(rows / length[:, None], rcond=SINGULAR) / length)

@@ -1,4 +1,4 @@
-"""The derivative of a passage by its start, event by event, from the equations of motion, apart from the engine's.
+"""The derivative of a passage by its start, event by event, from the equations of motion.
 
 It is the product, in the order of time, of the propagators of segments and of the saltation matrices
 of events (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical

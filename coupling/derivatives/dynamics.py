@@ -1,4 +1,4 @@
-"""The motion of a system as linear flows by the states of its units, from its equations and apart from the engines.
+"""The motion of a system as linear flows by the states of its units.
 
 The state is u = (y, w): coordinates q times root mass and a typical frequency, rates q' times root mass. Energies are
 squares of u, and every matrix has entries of the order of the frequencies. Between events it flows by
@@ -8,31 +8,26 @@ squares of u, and every matrix has entries of the order of the frequencies. Betw
 where loads and constants are columns of X. Gaps, slips and forces are functionals of z, so that their rates and second
 derivatives refer to z: whatever an event asks of its function is in one row.
 
-M q'' = -K q - C q' + loads + W lambda, with W the directions of the forces of units: a contact that slips has its
-friction in the direction of its normal force, W_N - sigma mu W_T. What closed contacts and units that stick hold, is
-held by forces for which J q'' = 0: accelerations are projected, obliquely where friction slips, onto the motions N that
-the constraints leave, along the wrenches, to which Y is normal: N (Y^T N)^-1 Y^T.
+The accelerations are those of system.flow.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm, null_space
+from scipy.linalg import expm
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.minima import least_minimum
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Segment
+from vanedamp.coupling.system.flow import StateFlow
 from vanedamp.coupling.system.system import System
-from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, presses, signals_of, ways
+from vanedamp.coupling.system.unit_laws import EVENTS, SINGULAR, possible_events, signals_of
 from vanedamp.coupling.tangents.dual import values, zeros
 
-#: singular values below this are zero: rows that depend on each other
-DEPENDENT = 1e-9
 #: points of a period, and of one turn of the fastest motion, between which least margins are sought; flows kept
 _LOOKS, _TURN, _KEPT = 32, 12, 1000
 
@@ -110,6 +105,12 @@ class Dynamics:
         self._flows: dict[bytes, Flow] = {}
 
     @cached_property
+    def per(self) -> np.ndarray:
+        """Entries (K,) of z per unit of root mass q, of its rate, and of the constant and the harmonics."""
+        size = len(self.root)
+        return np.r_[self.rate, np.ones(size), np.full(len(self.turn) - 2 * size, self.size)]
+
+    @cached_property
     def part(self) -> np.ndarray:
         """Numbers (N,) of the parts of the system that do not feel each other."""
         system = self.system
@@ -160,74 +161,23 @@ class Dynamics:
         return matrix
 
 
-class Solved(NamedTuple):
-    """How the accelerations of a flow were found: its derivatives by numbers follow from the same equations.
-
-    closed, springs, stick, slides: units that are rigid and closed, yield and press, stick, and slide; holds: (j,)
-    Jenkins elements whose sliders rest; acts: (2u, N) coordinates of forces; free: (N, K) accelerations without what
-    holds; kept (m,), wrench (N, m): rows that hold and the directions of their forces; oblique (N, N): projector along
-    these; carried (m, K): forces.
-    """
-
-    closed: np.ndarray
-    springs: np.ndarray
-    stick: np.ndarray
-    slides: np.ndarray
-    holds: np.ndarray
-    acts: np.ndarray
-    free: np.ndarray
-    kept: np.ndarray
-    wrench: np.ndarray
-    oblique: np.ndarray
-    carried: np.ndarray
-
-
 class Flow:
     """The flow X (K, K) with units in states (u,), and the forces (2u, K) of the units.
 
-    rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0; stuck: (u,) whether they
-    stick; slips_held: (u,) whether constraints hold the slip of a unit that counts as slipping.
+    solved: the same in coordinates root mass q; free: (N, K) accelerations without what holds, known: (2u, K) forces
+    but those that hold, carried: (m, K). rubs, way, stuck: (u,) as there; slips_held: (u,) whether constraints hold the
+    slip of a unit that counts as slipping.
     """
 
     def __init__(self, dynamics: Dynamics, state: np.ndarray, open_force: np.ndarray) -> None:
-        self.dynamics, self.state = dynamics, state
-        system, rows, one = dynamics.system, dynamics.rows, dynamics.one
-        u, size = len(state), len(dynamics.root)
-        contact, rigid = np.arange(u) < system.contacts, np.isinf(system.spring)
-        self.rubs = ~contact | (system.friction > 0.0)
-        self.way = ways(state)
-        closed = np.flatnonzero(contact & presses(state) & rigid)
-        springs = np.flatnonzero(contact & presses(state) & ~rigid)
-        self.stuck = (state == codes.STICK) & self.rubs
-        stick, slides = np.flatnonzero(self.stuck), np.flatnonzero(~contact & (self.way != 0.0))
-        drag = (self.way * system.friction)[:, None]
-        # known forces, and their coordinates: the force of a moving slider acts on its driver
-        self.forces, acts = np.zeros((2 * u, len(dynamics.turn))), rows.copy()
-        self.forces[:, one] = open_force / dynamics.size
-        pushed = system.spring[springs, None] * dynamics.gap[springs]
-        self.forces[springs] = -pushed - system.dashpot[springs, None] * dynamics.speed[springs]
-        self.forces[u + springs] = -drag[springs] * self.forces[springs]
-        self.forces[u + slides, one] = -(self.way * system.limit)[slides] / dynamics.size
-        drawn, holds = dynamics.pulled, state[dynamics.jenkins] == codes.STICK
-        acts[u:][dynamics.jenkins][~holds] += drawn[~holds]
-        free = dynamics.load + acts.T @ self.forces
-        stretch = drawn[holds]
-        free[:, dynamics.places] -= stretch.T @ (system.tangential[holds, None] * stretch) / dynamics.rate
-        # and those that hold
-        kept = np.concatenate([closed, u + stick])
-        wrench = np.vstack([rows[closed] - drag[closed] * rows[u + closed], rows[u + stick]]).T
-        oblique = _oblique(rows[kept], wrench)
-        length = np.linalg.norm(rows[kept], axis=1)  # of forces that depend on each other, the least by these
-        carried = (np.linalg.pinv(wrench / length, rcond=DEPENDENT) @ (oblique @ free - free)) / length[:, None]
-        self.forces[kept] += carried
-        self.forces[u + closed] -= drag[closed] * carried[: len(closed)]
-        self.solved = Solved(closed, springs, stick, slides, holds, acts, free, kept, wrench, oblique, carried)
-        self.X = dynamics.turn.copy()
-        self.X[dynamics.rates] = oblique @ free
-        moves = dynamics.followed(state)[dynamics.rates, dynamics.rates]
-        self.X[dynamics.rates] = moves @ self.X[dynamics.rates]
-        left = acts[u:] @ (np.eye(size) - np.linalg.pinv(rows[kept], rcond=DEPENDENT) @ rows[kept])
-        self.slips_held = np.linalg.norm(left, axis=1) <= DEPENDENT * np.linalg.norm(acts[u:], axis=1)
+        self.dynamics, self.state, self.solved = dynamics, state, StateFlow(dynamics.system, state)
+        solved, per = self.solved, dynamics.per
+        self.rubs, self.way, self.stuck, self.slips_held = solved.rubs, solved.way, solved.stuck, solved.held
+        free = solved.free(open_force)
+        self.X = per[:, None] * solved.generator(free) / per
+        self.free, self.known = free / per, solved.known_forces(open_force) / per
+        self.carried = solved.carried @ self.free
+        self.forces = self.known + solved.spread(self.carried)
 
     @cached_property
     def named(self) -> np.ndarray:
@@ -292,24 +242,5 @@ def _projector(rows: np.ndarray) -> np.ndarray:
         return np.eye(rows.shape[1])
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     _, sizes, right = np.linalg.svd(rows / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    basis = right[sizes > DEPENDENT]
+    basis = right[sizes > SINGULAR]
     return np.eye(rows.shape[1]) - basis.T @ basis
-
-
-def _oblique(rows: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Return the projector (N, N) of accelerations onto what rows (m, N) leave, along wrenches (N, m).
-
-    By bases of both sides, whose condition is not the square of the condition of nearly dependent rows. Where
-    these differ in number, as wrenches depend on each other and rows do not, by the least squares of the rows.
-    """
-    if np.array_equal(rows, wrench.T):
-        return _projector(rows)
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    rows, wrench = rows / length, wrench / length.T
-    free, normal = null_space(rows, rcond=DEPENDENT), null_space(wrench.T, rcond=DEPENDENT)
-    if free.shape == normal.shape:
-        meeting = normal.T @ free
-        if np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) > DEPENDENT:
-            return np.asarray(free @ np.linalg.solve(meeting, normal.T))
-    inverse = np.linalg.pinv(rows @ wrench, rcond=DEPENDENT)
-    return np.asarray(np.eye(rows.shape[1]) - wrench @ inverse @ rows)

@@ -6,8 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.constraints import pseudo_inverse
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Flow
+from vanedamp.coupling.derivatives.dynamics import Flow
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
@@ -26,39 +25,32 @@ class FlowDerivative:
         system, rates, one = dynamics.system, dynamics.rates, dynamics.one
         u, way = len(flow.state), flow.way
         drag, turned = (way * system.friction)[:, None], (way * of.friction)[:, :, None]
-        n, m = s.springs, s.closed
+        n, m = s.pressed, s.closed
         self.forces = np.zeros((len(numbers), *flow.forces.shape))
         self.forces[:, n] = -self._pushes(n)
         self.forces[:, u + n] = -turned[:, n] * flow.forces[n] - drag[n] * self.forces[:, n]
         self.forces[:, u + s.slides, one] = -(way * of.limit)[:, s.slides] / dynamics.size
-        # forces known before those that hold: what these add is found below
-        known = flow.forces.copy()
-        known[s.kept] -= s.carried
-        known[u + m] += drag[m] * s.carried[: len(m)]
         acts = of.rows.copy()
-        acts[:, u:][:, dynamics.jenkins][:, ~s.holds] += of.pulled[:, ~s.holds]
-        free = of.load + acts.transpose(0, 2, 1) @ known + s.acts.T @ self.forces
+        acts[:, u:][:, dynamics.jenkins] += of.pulled
+        free = of.load + acts.transpose(0, 2, 1) @ flow.known + s.drawn.T @ self.forces
         stretch, pull, spring = dynamics.pulled[s.holds], of.pulled[:, s.holds], system.tangential[s.holds, None]
         turns = pull.transpose(0, 2, 1) @ (spring * stretch)
         turns = turns + turns.transpose(0, 2, 1) + stretch.T @ (of.tangential[:, s.holds, None] * stretch)
         free[:, :, dynamics.places] -= turns / dynamics.rate
-        # the projector P along wrenches W onto the rows R's null space: R P = 0, P W = 0, P P = P
-        rows, of_rows = dynamics.rows[s.kept], of.rows[:, s.kept]
+        # the projector P = 1 + W C along wrenches W onto the rows R's null space, C: what they carry of loads
+        of_rows, held = of.rows[:, s.kept], np.eye(len(s.root)) - s.oblique
         of_wrench = wrenches(of.rows, m, drag[m, 0], s.stick)
         of_wrench[..., : len(m)] -= (turned[:, m] * dynamics.rows[u + m]).swapaxes(1, 2)
-        length = np.linalg.norm(rows, axis=1)
-        along = np.linalg.pinv(s.wrench / length, rcond=DEPENDENT) / length[:, None]
-        across, held = pseudo_inverse(rows), np.eye(len(rows.T)) - s.oblique
-        oblique = -s.oblique @ of_wrench @ (along @ held) - (held @ across) @ of_rows @ s.oblique
-        moved = oblique @ s.free + s.oblique @ free
-        carried = along @ (moved - free - of_wrench @ s.carried)
+        oblique = s.oblique @ of_wrench @ s.carried - held @ s.inverse @ of_rows @ s.oblique
+        moved = oblique @ flow.free + s.oblique @ free
+        carried = s.carried @ (free + of_wrench @ flow.carried - moved)
         self.forces[:, s.kept] += carried
-        self.forces[:, u + m] -= turned[:, m] * s.carried[: len(m)] + drag[m] * carried[:, : len(m)]
+        self.forces[:, u + m] -= turned[:, m] * flow.carried[: len(m)] + drag[m] * carried[:, : len(m)]
         self.X = of.turn.copy()
         self.X[:, rates] = dynamics.followed(flow.state)[rates, rates] @ moved
         slips = flow.state[dynamics.jenkins] != codes.STICK
         follows = of.follows[:, slips, rates]
-        self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ s.free)
+        self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ flow.free)
 
     def _pushes(self, n: np.ndarray) -> np.ndarray:
         """Return the derivatives (P, m, K) of the pressures of springs and dashpots of contacts (m,)."""

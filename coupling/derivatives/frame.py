@@ -14,7 +14,9 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.flow import attached, matrices
 from vanedamp.coupling.system.modal_basis import transfer_of
+from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.tangents.dual import inverse, zeros
 from vanedamp.files.store import frozen
@@ -100,22 +102,14 @@ class Frame:
 
         Amplitudes are inf at a resonance without damping.
         """
-        system, n = self.system, self.system.modes
-        lying = np.eye(len(system.mass))[:, :n]
-        for b, x in enumerate(system.along):
-            lying[x] = system.floor[b, :n]
-            if system.tilt[b] >= 0:
-                lying[x + 1], lying[x + 2] = system.rise[b, :n], system.turn[b, :n]
-        mass, stiffness, damping = (
-            lying.T @ part @ lying for part in (np.diag(system.mass), system.stiffness, system.damping)
-        )
-        omega = system.frequency[:, None, None]
-        dynamic = stiffness + 1j * omega * damping - omega**2 * mass
+        system, e = self.system, len(self.system.frequency)
+        lying = attached(system, np.ones(system.bodies, bool), across=True)
+        mass, damping, stiffness = matrices(system, lying)
         sag = np.linalg.solve(stiffness, system.weight @ lying)
         try:
-            return np.linalg.solve(dynamic, (system.load @ lying)[:, :, None])[:, :, 0], sag
+            return steady_motion(stiffness, damping, mass, system.load @ lying, system.frequency), sag
         except np.linalg.LinAlgError:
-            return np.full((len(omega), n), np.inf + 0j), sag
+            return np.full((e, system.modes), np.inf + 0j), sag
 
     def linear_orbit(self) -> np.ndarray:
         """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors.

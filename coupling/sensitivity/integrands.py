@@ -75,7 +75,7 @@ def powers_of(flow: Flow, numbers: Numbers) -> list[Product]:
     harmonics, damped = np.zeros(K), np.zeros(K)
     harmonics[dynamics.one + 1 :], damped[dynamics.rates] = 1.0, -1.0
     presses = np.zeros(u, bool)
-    presses[flow.solved.springs] = True
+    presses[flow.solved.pressed] = True
     dashpot, of_dashpot = np.where(presses, system.dashpot, 0.0), np.where(presses, of.dashpot, 0.0)
     slips = slipping(flow)
     slip = Functionals(dynamics.speed[u:][slips], of.speed[:, u:][:, slips])

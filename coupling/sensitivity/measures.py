@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from vanedamp.coupling.derivatives.derivative import Before
-from vanedamp.coupling.derivatives.dynamics import DEPENDENT, Dynamics, Flow
+from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Course
@@ -30,6 +30,7 @@ from vanedamp.coupling.sensitivity.sensitivity_record import Impact
 from vanedamp.coupling.sensitivity.strength import Struck
 from vanedamp.coupling.sensitivity.wear import Wearing
 from vanedamp.coupling.system.system import FLOOR, System
+from vanedamp.coupling.system.unit_laws import SINGULAR
 from vanedamp.coupling.tangents.dual import Dual, zeros
 
 #: flows whose powers are kept; difference of speeds, relative to the fastest, that is round-off
@@ -227,14 +228,14 @@ class Measures:
         rows, found = self.dynamics.rows[acts][:, massive], np.full((len(impulse), self._P), np.nan)
         length = np.linalg.norm(rows, axis=1)
         left = turns - (impulse[acts] @ self.numbers.parts.rows[:, acts][:, :, massive]).T
-        told = np.linalg.norm(null_space((rows / length[:, None]).T, DEPENDENT), axis=1) <= DEPENDENT
-        found[acts[told]] = (np.linalg.pinv(rows.T / length, DEPENDENT) @ left / length[:, None])[told]
+        told = np.linalg.norm(null_space((rows / length[:, None]).T, SINGULAR), axis=1) <= SINGULAR
+        found[acts[told]] = (np.linalg.pinv(rows.T / length, SINGULAR) @ left / length[:, None])[told]
         return Dual(impulse, found)
 
     def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
         """Take the energy of springs whose force ends, or begins, while they are pressed: it is lost with contact."""
         dynamics, of = self.dynamics, self.numbers.parts
-        own, new = before.flow.solved.springs, after.solved.springs
+        own, new = before.flow.solved.pressed, after.solved.pressed
         Z = self._whole(before.M, before.segment.start + before.segment.duration)
         row = 1 + POWERS.index("contact")
         for r in np.setxor1d(own, new).tolist():

@@ -22,8 +22,7 @@ from vanedamp.coupling.numerics.compiler.jit import strict
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.elimination import reciprocal, solve
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.body_loads import binding, body_loads
-from vanedamp.coupling.system.modal_basis import basis_of
+from vanedamp.coupling.system.flow import attached, matrices
 from vanedamp.coupling.system.system import System
 
 #: eigenvalues of an oscillator this close to each other, relative to its frequency, are taken to lie so far apart
@@ -75,10 +74,9 @@ def linear_systems(scene: Scene, system: System) -> list[tuple[LinearParts, Line
     """Return the loose system of a scene and, where that is another one, the held one, with empty modes."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
-    rolls = np.array([damper.form.rolls for damper in scene.damper], bool)
     made = [_system(scene, system, sprung, np.zeros(len(sprung), bool))]
     # what pulls a body along its cavity presses it on a wall
-    held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
+    held = np.where(sprung, rough & ~_rolling(scene), rough | (system.of_bodies.weight != 0.0))
     if held.any() or np.isfinite(system.casing_spring).any():
         made.append(_system(scene, system, sprung & ~held, held, True))
     return made
@@ -100,40 +98,21 @@ def _system(
 
     stuck: sliders of Jenkins elements hold.
     """
-    n, b = system.modes, system.bodies
-    basis = np.zeros((n + b, n + int(moving.sum())))
-    basis[:n, :n], basis[n:, :n] = np.eye(n), held[:, None] * system.floor[:, :n]
-    basis[n + np.flatnonzero(moving), np.arange(n, basis.shape[1])] = 1.0
-    free = np.r_[np.arange(n), system.along]
-    mass, stiffness = np.diag(system.mass[free]), np.diag(np.r_[system.squares, np.zeros(b)])
-    damping = np.zeros((n + b, n + b))
-    damping[:n, :n] = system.viscous
-    floor = system.floor[:, :n]
-    if moving.any():
-        loads = body_loads(scene, basis_of(scene))
-        springs, dashpots = binding(scene, loads)
-        slip = np.hstack([-floor, np.eye(b)])
-        mass += slip.T @ (_turning(scene)[:, None] * slip)
-        stiffness += slip.T @ (springs[:, None] * slip) - np.diag(np.r_[np.zeros(n), loads.gradient])
-        damping += slip.T @ (dashpots[:, None] * slip)
+    basis = attached(system, held, moving)
+    for b in np.flatnonzero(moving & _rolling(scene)):
+        basis[system.tilt[b]] = (basis[system.along[b]] - system.floor[b] @ basis) / scene.damper[b].half_extent[0]
+    mass, damping, stiffness = matrices(system, basis)
     if stuck:
         drawn = np.isfinite(system.casing_spring)
-        rows = system.casing[drawn][:, free]
+        rows = system.casing[drawn] @ basis
         stiffness += rows.T @ (system.casing_spring[drawn, None] * rows)
-    together = basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis
-    whole = np.zeros((len(system.mass), basis.shape[1]))
-    whole[free] = basis
-    place = np.r_[np.arange(n), n + np.flatnonzero(moving)]
-    return _with_modes(together, whole, place, system.response @ whole, system.weight @ whole)
+    place = np.r_[np.arange(system.modes), system.modes + np.flatnonzero(moving)]
+    return _with_modes((mass, damping, stiffness), basis, place, system.response @ basis, system.weight @ basis)
 
 
-def _turning(scene: Scene) -> np.ndarray:
-    """Return the mass (b,) by which its rotation makes a disc heavier that rolls, kg."""
-    rolling = [damper.form.rolls and damper.friction > 0 for damper in scene.damper]
-    return np.array([
-        damper.moment_of_inertia / damper.half_extent[0] ** 2 if rolls else 0.0
-        for damper, rolls in zip(scene.damper, rolling, strict=True)
-    ])  # fmt: skip
+def _rolling(scene: Scene) -> np.ndarray:
+    """Return whether each body (b,) is a disc that rolls."""
+    return np.array([damper.form.rolls and damper.friction > 0 for damper in scene.damper], bool)
 
 
 def _static(stiffness: np.ndarray, weight: np.ndarray) -> np.ndarray:

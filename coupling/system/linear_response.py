@@ -16,6 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.engine_order import Natural, crossings
+from vanedamp.coupling.system.flow import attached, mass_of
 from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
@@ -150,14 +151,14 @@ def linear_amplitudes(scene: Scene, frequencies: np.ndarray) -> tuple[np.ndarray
     """
     order = scene.excitation.engine_order
     if order is None:
-        free, glued = (response.amplitude(frequencies) for response in linear_responses(scene))
-        return free, glued
+        free, fixed = (response.amplitude(frequencies) for response in linear_responses(scene))
+        return free, fixed
     curves = []
     for frequency in frequencies:
         turning = replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
         curves.append([response.amplitude(np.array([frequency]))[0] for response in linear_responses(turning)])
-    free, glued = np.transpose(curves)
-    return free, glued
+    free, fixed = np.transpose(curves)
+    return free, fixed
 
 
 def linear_peaks(scene: Scene, low: float, high: float) -> tuple[LinearPeak, LinearPeak]:
@@ -167,8 +168,8 @@ def linear_peaks(scene: Scene, low: float, high: float) -> tuple[LinearPeak, Lin
     """
     order = scene.excitation.engine_order
     if order is None:
-        free, glued = (response.peak(low, high) for response in linear_responses(scene))
-        return free, glued
+        free, fixed = (response.peak(low, high) for response in linear_responses(scene))
+        return free, fixed
 
     @cache
     def at(speed: float) -> tuple[LinearResponse, LinearResponse]:
@@ -228,24 +229,21 @@ def linear_responses(scene: Scene, system: System | None = None) -> tuple[Linear
     if scene.excitation.signal is not None:
         raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
     system = assemble(scene) if system is None else system
-    modes, bodies = system.of_structure, system.of_bodies
-    glued_load = modes.load + bodies.load @ system.floor[:, : system.modes]
-    order = system.order
+    modes, order = system.of_structure, system.order
     moves = np.flatnonzero(system.load.any(axis=1) | (system.table != 0) | (order == order[-1]))
-    free, glued = (
+    free, fixed = (
         LinearResponse(
-            modes.stiffness, modes.damping, mass, load[moves], modes.response, system.table[moves], order[moves]
+            modes.stiffness, modes.damping, mass_of(system, motions), (system.load @ motions)[moves],
+            modes.response, system.table[moves], order[moves],
         )
-        for mass, load in ((np.diag(modes.mass), modes.load), (glued_mass(system), glued_load))
-    )
-    return free, glued
+        for motions in (attached(system, np.full(system.bodies, held)) for held in (False, True))
+    )  # fmt: skip
+    return free, fixed
 
 
-def glued_mass(system: System) -> np.ndarray:
+def fixed_mass(system: System) -> np.ndarray:
     """Return the modal mass matrix (n, n) of the structure with every body fixed to its floor."""
-    floor = system.floor[:, : system.modes]
-    mass: np.ndarray = np.diag(system.of_structure.mass) + (floor.T * system.of_bodies.mass) @ floor
-    return mass
+    return mass_of(system, attached(system, np.ones(system.bodies, bool)))
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
@@ -254,7 +252,7 @@ def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np
     Without bodies, or (`fixed`) with every body fixed to its cavity's floor.
     """
     system = assemble(scene)
-    modes, mass = system.of_structure, glued_mass(system) if fixed else np.eye(system.modes)
+    modes, mass = system.of_structure, fixed_mass(system) if fixed else np.eye(system.modes)
     omega = 2 * np.pi * np.asarray(frequencies)
     motion = steady_motion(modes.stiffness, modes.damping, mass, modes.response, omega)
     return np.asarray(motion @ modes.response)

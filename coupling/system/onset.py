@@ -15,7 +15,6 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.coupling.system.sectors import unrolled
 
 #: R omega^2 over the acceleration of friction from which on a body slips without a stop (Code_Aster, SDND104)
@@ -75,7 +74,7 @@ def onsets(scene: Scene) -> list[Onset | None]:
     if scene.excitation.signal is not None or len(system.frequency) != 1:
         return [None] * count
     omega, free, bodies = system.omega, linear_responses(scene, system)[0], system.of_bodies
-    wave = steady_motion(free.stiffness, free.damping, free.mass, free.load[0], np.array([omega]))[0]
+    wave = free.motion(scene.frequency)[0]
     response = abs(wave @ free.response + free.table[0])
     # a body that nothing holds stays where it is in space, which moves against the base
     reach = np.abs(system.floor[:, : system.modes] @ wave + bodies.load[0] / (bodies.mass * omega**2))

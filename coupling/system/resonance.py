@@ -87,7 +87,7 @@ def steady_motion(
 ) -> np.ndarray:
     """Return the complex modal coordinates (f, n) under modal forces (n,), or (f, n), at angular frequencies (f,).
 
-    Raises LinAlgError at a resonance without damping.
+    stiffness: (n,) of modes, or (n, n). Raises LinAlgError at a resonance without damping.
     """
     loads = np.broadcast_to(force, (len(omega), force.shape[-1]))[:, :, None]
     parts = np.array_split(np.arange(len(omega)), 1 + len(omega) * len(stiffness) ** 2 // _TOGETHER)
@@ -98,7 +98,7 @@ def _solved(
     stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, loads: np.ndarray, omega: np.ndarray
 ) -> np.ndarray:
     omega = omega[:, None, None]
-    dynamic = np.diag(stiffness) + 1j * omega * damping - omega**2 * mass
+    dynamic = (np.diag(stiffness) if stiffness.ndim == 1 else stiffness) + 1j * omega * damping - omega**2 * mass
     return np.asarray(np.linalg.solve(dynamic, loads)[:, :, 0])
 
 

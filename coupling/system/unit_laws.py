@@ -33,8 +33,8 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.system.system import System
 
-#: singular values below this are zero: rows that depend on each other
-_DEPENDENT = 1e-9
+#: singular values, times the largest, below which rows or wrenches depend on each other
+SINGULAR = 1e-9
 
 
 def presses(state: Any) -> Any:
@@ -182,4 +182,4 @@ class Grip(NamedTuple):
         mobility = (rows**2 / system.mass).sum(axis=1)
         scale = 1.0 / np.sqrt(np.where(mobility > 0.0, mobility, 1.0))
         both = np.multiply.outer(scale, scale)
-        return cls(rows, lever, np.linalg.pinv(rows @ lever * both, rcond=_DEPENDENT) * both)
+        return cls(rows, lever, np.linalg.pinv(rows @ lever * both, rcond=SINGULAR) * both)

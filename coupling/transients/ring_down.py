@@ -28,7 +28,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import glued_mass
+from vanedamp.coupling.system.linear_response import fixed_mass
 from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
@@ -135,7 +135,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 def _linear(system: System, mode: int) -> LinearMode:
     """Return the results of a mode without bodies, and with all of them fixed: of the mode that is most like it."""
     modes = system.of_structure
-    squares, shapes = eigh(np.diag(modes.stiffness), glued_mass(system))
+    squares, shapes = eigh(np.diag(modes.stiffness), fixed_mass(system))
     like = int(np.argmax(np.abs(shapes[mode])))
     omega, fixed, shape = np.sqrt(modes.stiffness[mode]), np.sqrt(squares[like]), shapes[:, like]
     return LinearMode(

@@ -22,19 +22,18 @@ from vanedamp.coupling.engine.peaks import GRIDS, grid_factors
 from vanedamp.coupling.engine.plane.tolerances import (
     APART,
     FASTEST,
-    HELD_ROUND_OFF,
     RANK,
     REFINED,
-    SINGULAR,
     SLOWEST,
-    SQUARED,
     STIFFEST,
 )
 from vanedamp.coupling.engine.run import IllConditioned, with_free_place
-from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, WORK_MAP
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
+from vanedamp.coupling.system.flow import HELD_ROUND_OFF, StateFlow
 from vanedamp.coupling.system.system import FLOOR, System
+from vanedamp.coupling.system.unit_laws import SINGULAR
 
 
 @record_with(free_axes=1)
@@ -176,85 +175,39 @@ def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     return basis
 
 
-class _Contacts:
-    """The behaviour of units in their states (u,), in coordinates sqrt(M) q.
-
-    closed, pressed: rigid and compliant contacts with forces; stick: units whose slips are kept at rest; slides:
-    friction elements that slip. kept (k,): the rows at rest; wrench (N, k): directions of their forces; push (N, p): of
-    of springs; drag (u,): friction per normal force; drawn (u, N): slips, a slider's with what draws it.
-    """
-
-    def __init__(self, system: System, state: np.ndarray) -> None:
-        u, units, compliant = len(state), np.arange(len(state)), np.isfinite(system.spring)
-        self.root, self.u = np.sqrt(system.mass), u
-        rows = self.rows = system.J / self.root
-        rigid, way = (units < system.contacts) & ~compliant, (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
-        self.closed, self.pressed = np.flatnonzero((state < OPEN) & rigid), np.flatnonzero((state < OPEN) & compliant)
-        self.touching = np.flatnonzero((state != OPEN) & rigid)
-        self.stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
-        self.slides = np.flatnonzero((units >= system.contacts) & (way != 0))
-        self.kept = np.concatenate([self.closed, u + self.stick])
-        self.drag, self.known = way * system.friction, -(way * system.limit)[self.slides]
-        sliding, push = (
-            rows[which] - self.drag[which, None] * rows[u + which] for which in (self.closed, self.pressed)
-        )
-        self.wrench, self.push = np.vstack([sliding, rows[u + self.stick]]).T, push.T
-        # a slider that moves hands its force on to what draws it
-        self.drawn = rows[u:].copy()
-        self.drawn[u - len(system.tangential) :] += system.elongation / self.root
-
-    def spread(self, kept: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
-        """Return the forces (2u, ...) of all rows from those of the kept rows (k, ...) and of springs (p, ...)."""
-        acting, count = np.concatenate([self.closed, self.pressed]), len(self.closed)
-        forces = np.zeros((2 * self.u, *kept.shape[1:]), kept.dtype)
-        forces[self.closed], forces[self.pressed] = kept[:count], pushes
-        forces[self.u + acting] = -(self.drag[acting] * forces[acting].T).T
-        forces[self.u + self.stick] = kept[count:]
-        return forces
-
-    def projectors(self) -> dict[str, Any]:
-        """Return the entries of Flows that correct gaps, slips and forces."""
-        u, rows, root, kept, drawn = self.u, self.rows, self.root, self.kept, self.drawn
-        self_stress = np.zeros((2 * u, 2 * u))
-        close_gaps, stop_rows, held = np.zeros((len(root), u)), np.zeros((len(root), 2 * u)), np.zeros(u, bool)
-        if len(kept) > 1:  # one force alone balances none
-            lever = np.linalg.norm(self.wrench, axis=0)
-            balanced = null_space(self.wrench / lever, rcond=SINGULAR)
-            self_stress[:, kept] = self.spread(balanced @ balanced.T / lever[:, None] * lever)
-        stopped = np.concatenate([self.touching, u + self.stick])
-        if holds := len(stopped) > 0:
-            inverse = np.linalg.pinv(rows[stopped], rcond=SINGULAR)
-            stop_rows[:, stopped] = inverse / root[:, None]
-            own, forced = (
-                inverse if len(which) == len(stopped) else np.linalg.pinv(rows[which], rcond=SINGULAR)
-                for which in (self.touching, kept)
-            )
-            close_gaps[:, self.touching] = own / root[:, None]
-            free = drawn - drawn @ forced @ rows[kept]
-            held = np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(drawn, axis=1)
-        return {
-            "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": held, "holds": holds,
-        }  # fmt: skip
+def _projectors(flow: StateFlow) -> dict[str, Any]:
+    """Return the entries of Flows that correct gaps, slips and forces."""
+    u, rows, root, kept, touching = flow.u, flow.rows, flow.root, flow.kept, flow.touching
+    self_stress, close_gaps = np.zeros((2 * u, 2 * u)), np.zeros((len(root), u))
+    stop_rows = np.zeros((len(root), 2 * u))
+    if len(kept) > 1:  # one force alone balances none
+        lever = np.linalg.norm(flow.wrench, axis=0)
+        balanced = null_space(flow.wrench / lever, rcond=SINGULAR)
+        self_stress[:, kept] = flow.spread(balanced @ balanced.T / lever[:, None] * lever)
+    stopped = np.concatenate([touching, u + flow.stick])
+    if len(stopped):
+        inverse = flow.inverse if len(kept) == len(stopped) else np.linalg.pinv(rows[stopped], rcond=SINGULAR)
+        own = inverse if len(touching) == len(stopped) else np.linalg.pinv(rows[touching], rcond=SINGULAR)
+        stop_rows[:, stopped], close_gaps[:, touching] = inverse / root[:, None], own / root[:, None]
+    return {
+        "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": flow.held,
+        "holds": len(stopped) > 0,
+    }  # fmt: skip
 
 
 def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     """Return the entries of Flows for the states (u,), of as many modes as there are."""
     e, size, sliders = len(system.frequency), len(system.mass), len(system.tangential)
-    contacts = _Contacts(system, state)
-    root, rows, pressed, push = contacts.root, contacts.rows, contacts.pressed, contacts.push
-    constraints = rows[contacts.kept]
-    holds, follows = (np.flatnonzero((state[len(state) - sliders :] == STICK) == rests) for rests in (True, False))
-    applied = contacts.known @ contacts.drawn[contacts.slides]
-    carried, oblique = _forces(constraints, contacts.wrench)
-    stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
-    spring, dashpot = (part[pressed, None] * rows[pressed] for part in (system.spring, system.dashpot))
-    stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
+    flow = StateFlow(system, state)
+    if flow.left > LOST:
+        raise IllConditioned("its friction forces have no solution")
+    root, pressed, push, holds = flow.root, flow.pressed, flow.push, flow.holds
+    stiffness, damping, oblique, preload = flow.stiffness, flow.damping, flow.oblique, flow.preload
+    constraints = flow.rows[flow.kept]
     if len(holds):
-        stretch = system.elongation[holds] / root
-        mobility = (stretch[:, : size - sliders] ** 2).sum(axis=1)
+        mobility = ((system.elongation[holds] / root)[:, : size - sliders] ** 2).sum(axis=1)
         if (system.tangential[holds] * mobility).max() > (STIFFEST * system.frequency[0]) ** 2:
             raise IllConditioned("the spring of a friction damper is as good as rigid")
-        stiffness = stiffness + stretch.T @ (system.tangential[holds, None] * stretch)
     basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
@@ -267,37 +220,31 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
     inner[:, size - sliders :] = 0.0  # sliders rest, or follow
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
-    preload = system.spring[pressed] * system.rest[pressed]
-    weight = system.weight / root + applied
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
     rate = np.concatenate([1j * system.frequency, eigenvalue])
     # constant part, of loads and of displacements that constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
+    weight = flow.weight
     rest, rest_held = still @ weight, -still @ stiffness @ held
     if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
         rest = rest - np.linalg.solve(own, inner @ oblique @ push @ preload)
         weight = weight - push @ preload
-    load = system.load / root
     wave = np.zeros((k, e), complex)
     for h, omega in enumerate(system.frequency):
-        wave[:, h] = np.linalg.solve(own - omega**2 * np.eye(k) + 1j * omega * loss, inner @ oblique @ load[h])
+        wave[:, h] = np.linalg.solve(own - omega**2 * np.eye(k) + 1j * omega * loss, inner @ oblique @ flow.load[h])
     eta = np.hstack([wave, shape[:k]])
     net = -(stiffness @ inner.T @ eta + damping @ inner.T @ (eta * rate))
-    net[:, :e] += load.T
+    net[:, :e] += flow.load.T
     net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
     motion = (oblique @ net) / rate**2
     bend, bend_held = oblique @ net_constant, oblique @ net_held
     if len(pressed) or len(holds):  # forces of stiff springs nearly cancel: their stretches are more accurate
         motion += inner.T @ (eta - inner @ motion)
         bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
-    for a, row in zip(size - sliders + follows, system.elongation[follows] / root, strict=True):
-        for part in (motion, bend, bend_held):
-            part[a] = root[a] * (row[:-sliders] @ part[:-sliders])
-    # a coordinate that constraints hold is at rest, not at round-off
-    motion[np.abs(motion) <= HELD_ROUND_OFF * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
-    motion = motion / root[:, None]
+    motion = flow.settled(motion, net / rate**2) / root[:, None]
+    bend, bend_held = flow.followed(bend), flow.followed(bend_held)
     both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
     free, full = project @ np.vstack(both), np.vstack([wave, 1j * system.frequency * wave])
     free[:, :size] -= project[:, :k] @ rest_held * root
@@ -307,8 +254,8 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
     def after_harmonics(values: np.ndarray) -> np.ndarray:
         return np.concatenate([np.zeros((e, *values.shape[1:])), values])
 
-    force_constant = contacts.spread(carried @ net_constant, -preload - spring @ inner.T @ rest)
-    force_constant[len(state) + contacts.slides] = contacts.known
+    force_constant = flow.spread(flow.carried @ net_constant, -preload - flow.spring @ inner.T @ rest)
+    force_constant[flow.u + flow.slides] = flow.known
     return {
         "key": state, "modes": len(rate), "coalescing": coalesce(eigenvalue, shape, project),
         "eigenvalue": rate, "inverse": 1 / rate, "size": np.abs(rate),
@@ -317,54 +264,11 @@ def _flow(system: System, state: np.ndarray) -> dict[str, Any]:
         "in_quadrature": after_harmonics(-(project @ full.imag)),
         "motion": motion, "velocity": motion * rate, "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
         "bend": bend / root, "bend_held": bend_held / root[:, None] * root,
-        "force": contacts.spread(carried @ net, -spring @ strained - dashpot @ (strained * rate)),
+        "force": flow.spread(flow.carried @ net, -flow.spring @ strained - flow.dashpot @ (strained * rate)),
         "force_constant": force_constant,
-        "force_held": contacts.spread(carried @ net_held * root, -spring @ (held + inner.T @ rest_held) * root),
+        "force_held": flow.spread(flow.carried @ net_held * root, -flow.spring @ (held + inner.T @ rest_held) * root),
         "growth": max(eigenvalue.real.max(initial=0.0), 0.0), "fastest": (np.abs(rate.real) + np.abs(rate.imag)).max(),
-    } | contacts.projectors()  # fmt: skip
-
-
-def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the forces of the kept rows (k, N) and accelerations (N, N) by the loads. Raises IllConditioned."""
-    size = constraints.shape[1]
-    if not len(constraints):
-        return np.zeros((0, size)), np.eye(size)
-    mobility = constraints @ wrench
-    scale = 1 / np.linalg.norm(constraints, axis=1)
-    inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=SINGULAR) * scale * scale[:, None]
-    carried = -inverse @ constraints
-    oblique = np.eye(size) + wrench @ carried
-    if _yielding(constraints, oblique, scale) > SQUARED:
-        carried, oblique = _forces_of_near_dependent(constraints, wrench, scale, carried, oblique)
-        if _yielding(constraints, oblique, scale) > LOST:
-            raise IllConditioned("its friction forces have no solution")
-    return carried, oblique
-
-
-def _yielding(constraints: np.ndarray, oblique: np.ndarray, scale: np.ndarray) -> float:
-    """Return the largest acceleration that is left in a row that is to have none, per unit of load and length."""
-    return float(np.abs((constraints @ oblique) * scale[:, None]).max())
-
-
-def _forces_of_near_dependent(
-    constraints: np.ndarray, wrench: np.ndarray, scale: np.ndarray, carried: np.ndarray, oblique: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return forces and accelerations as `_forces` does, for rows that nearly depend on each other.
-
-    The mobility of a block that stands wedged on two corners, one almost above the other, has the square of their
-    constraints' condition. Not so the projector N (Y^T N)^-1 Y^T on the motions N that the constraints leave, along the
-    wrenches, to which Y is normal. Where there is none, as wrenches and constraints differ in rank, those given are
-    returned.
-    """
-    wrench = wrench * scale
-    free = null_space(constraints * scale[:, None], rcond=SINGULAR)
-    normal = null_space(wrench.T, rcond=SINGULAR)
-    meeting = normal.T @ free  # cosines
-    if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < SINGULAR:
-        return carried, oblique
-    oblique = free @ np.linalg.solve(meeting, normal.T)
-    carried = np.linalg.pinv(wrench, rcond=SINGULAR) @ (oblique - np.eye(len(oblique))) * scale[:, None]
-    return carried, oblique
+    } | _projectors(flow)  # fmt: skip
 
 
 def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

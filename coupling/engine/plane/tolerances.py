@@ -45,14 +45,7 @@ FRICTION_EDGE = 1e-9
 #: least size of the problem of a short step, times the motion: round-off is below the resolution of a pivot then
 STEP_SCALE = 1e-4
 
-# --- constraints and modes (subsystem_assembly)
-#: singular values, times the largest, below which rows or wrenches depend on each other
-SINGULAR = 1e-9
-#: acceleration left in constraints per unit load, beyond which forces are computed without the square of the rows'
-#: condition number
-SQUARED = 1e-13
-#: coordinates held by constraints, and accelerations of modes, times their terms: smaller values are zero
-HELD_ROUND_OFF = 1e-15
+# --- modes (subsystem_assembly; of constraints in system.flow)
 #: rank of the rows of stiffness and damping: singular values times the largest
 RANK = 1e-12
 #: frequencies of modes, times the excitation's, outside of which runs are rejected: displacements would be quotients of

@@ -24,7 +24,6 @@ from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.sweep.worker import OF_A_POINT
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.files.store import frozen
 from vanedamp.studies.commands.support.budget import RUN
 from vanedamp.studies.sweep_steps import compile_engine
@@ -111,7 +110,7 @@ def _near_steady(scene: Scene) -> RestartState | None:
         return None
     system, frequency = assemble(scene), np.array([scene.frequency])
     free, fixed = linear_responses(scene, system)
-    wave = steady_motion(free.stiffness, free.damping, free.mass, free.load[0], 2 * np.pi * frequency)[0]
+    wave = free.motion(scene.frequency)[0]
     amplitudes = [float(response.amplitude(frequency)[0]) for response in (free, fixed)]
     wave = wave * min(amplitudes[1] / amplitudes[0], 1.0) if amplitudes[0] else wave
     start = start_of(scene, system)

@@ -12,7 +12,7 @@ from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.segment import Walk
-from vanedamp.coupling.system.unit_laws import EVENTS, contacts_of, possible_events, presses, signals_of, ways
+from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, presses, signals_of, ways
 
 ROOT = Path(__file__).parents[3]
 #: sliders with stick and slip, with impacts, with springs, Jenkins elements; planar bodies of several laws

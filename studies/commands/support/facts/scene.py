@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points, base_scene, grid
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import glued_mass, linear_amplitudes, linear_responses
+from vanedamp.coupling.system.linear_response import fixed_mass, linear_amplitudes, linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
@@ -150,7 +150,7 @@ def _of_bodies(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
     masses = [damper.mass for damper in scene.damper]
     if resonance is not None:
         system = assemble(scene)
-        squares = eigh(np.diag(system.of_structure.stiffness), glued_mass(system), eigvals_only=True)
+        squares = eigh(np.diag(system.of_structure.stiffness), fixed_mass(system), eigvals_only=True)
         yield Fact("mass_ratio", sum(masses) / resonance.mass, "", "of all bodies to the modal mass")
         yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies fixed")
         if scene.excitation.signal is None:
