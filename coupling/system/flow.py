@@ -34,12 +34,14 @@ def attached(system: System, held: np.ndarray, moving: np.ndarray | None = None,
     By the modes (n,), then by the positions of bodies `moving` (b,), none of which is held. across: whether bodies that
     are held follow their floors across the cavity and in its rotation, too.
     """
-    n, alone = system.modes, np.zeros(0, int) if moving is None else np.flatnonzero(moving)
+    n = system.modes
+    alone: list[int] = [] if moving is None else np.flatnonzero(moving).tolist()
     motions = np.zeros((len(system.mass), n + len(alone)))
     motions[:n, :n] = np.eye(n)
     motions[system.along, :n] = held[:, None] * system.floor[:, :n]
-    motions[system.along[alone], np.arange(n, n + len(alone))] = 1.0
-    for b in np.flatnonzero(across & held & (system.tilt >= 0)):
+    for k, b in enumerate(alone):
+        motions[system.along[b], n + k] = 1.0
+    for b in np.flatnonzero(held & (system.tilt >= 0)) if across else ():
         x = system.along[b]
         motions[x + 1, :n], motions[x + 2, :n] = system.rise[b, :n], system.turn[b, :n]
     return motions

@@ -99,7 +99,7 @@ def _system(
     stuck: sliders of Jenkins elements hold.
     """
     basis = attached(system, held, moving)
-    for b in np.flatnonzero(moving & _rolling(scene)):
+    for b in np.flatnonzero(moving & _rolling(scene)) if moving.any() else ():
         basis[system.tilt[b]] = (basis[system.along[b]] - system.floor[b] @ basis) / scene.damper[b].half_extent[0]
     mass, damping, stiffness = matrices(system, basis)
     if stuck:
