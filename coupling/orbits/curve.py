@@ -174,11 +174,10 @@ def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Poi
 def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
     """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
 
-    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence; with a condition,
-    whose slopes are learnt on the way, a shorter step is better.
+    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence.
     """
     point = corrected(head, step)
-    if known and head.given is None and (point is None or point.passage.sequence != head.passage.sequence):
+    if known and (point is None or point.passage.sequence != head.passage.sequence):
         other = corrected(head, step, known)
         point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
@@ -313,8 +312,13 @@ class Path:
             self._end(why, point)
 
     def _onward(self, point: Point) -> None:
-        """Add the next point of a smooth piece."""
-        trail = [*self.trail[-1:], self.head.y]
+        """Add the next point of a smooth piece.
+
+        Shorter steps are better with a condition, whose slopes are learnt on the way, and where a body may rest
+        anywhere, which would creep along a wall: then nothing is predicted from points before.
+        """
+        alone = point.given is not None or point.orbit.neutral
+        trail = [] if alone else [*self.trail[-1:], self.head.y]
         self._add(self.head, point)
         self.trail = trail
 
@@ -334,7 +338,8 @@ class Path:
     def _last(self, head: Point, step: float) -> tuple[Point, Point | None, bool]:
         """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
 
-        And whether it is Newton's method that comes no further from the head, for nothing vanishes there.
+        And whether it is Newton's method that comes no further from the head, for nothing vanishes there: of orbits
+        that may not be moved, since others come to walls that nothing tells of.
 
         Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
         where to look; bisection makes it sure.
@@ -358,8 +363,8 @@ class Path:
             else:
                 high, beyond = at, point
         end, least = forecast([(where, point.passage) for where, point in seen[-2:]]), self.table.min_step
-        lost = low > least and (end is None or end - low > least) and regular(seen[-1][1]) is not None
-        return seen[-1][1], beyond, lost
+        lost = low > least and (end is None or end - low > least) and not head.orbit.neutral
+        return seen[-1][1], beyond, lost and regular(seen[-1][1]) is not None
 
     def _note(self, point: Point, kind: str, note: str) -> None:
         y = point.exact
