@@ -1,4 +1,4 @@
-"""The table of events against motions of both engines, whose compiled functions do not read it; and where laws stand."""
+"""The table of events against motions of both engines, whose functions do not read it; and where laws stand."""
 
 import ast
 from collections import Counter
@@ -12,7 +12,7 @@ from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.observers import EVENT_LIST
 from vanedamp.coupling.response.segment import Walk
-from vanedamp.coupling.system.unit_laws import EVENTS, contacts_of, possible_events, presses, signals_of, ways
+from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, presses, signals_of, ways
 
 ROOT = Path(__file__).parents[3]
 #: sliders with stick and slip, with impacts, with springs, Jenkins elements; planar bodies of several laws
@@ -22,16 +22,15 @@ SHORT = 1e-4
 
 
 def value(event, unit, segment, t):
-    """An event function a time after a segment's start, and the sizes of its terms."""
+    """An event function a time after a segment's start, and the size that its round-off is relative to."""
     system, (q, v), u = segment.system, segment.at(t), len(segment.system.rest)
-    signals = signals_of(
-        unit, (system.rest + system.J[:u] @ q)[:, None], (system.J @ v)[:, None], segment.forces(t)[:, None], np.ones(1)
-    )
+    gap, speed, force = system.rest + system.J[:u] @ q, system.J @ v, segment.forces(t)
+    signals = signals_of(unit, gap[:, None], speed[:, None], force[:, None], np.ones(1))
     factors = event.factors(system, unit, ways(segment.state)[unit])
-    terms = [abs(factor * signals[name][0]) for factor, (name, _) in zip(factors, event.terms, strict=True)]
-    own = {"gap": system.play[unit], "slip": segment.speed, "rate": segment.speed}
-    sizes = [factor * own.get(name, 0.0) for factor, (name, _) in zip(factors, event.terms, strict=True)]
-    return event.function(factors, signals)[0], max(map(abs, terms + sizes + list(segment.forces(t)[[unit, u + unit]])))
+    swing = (np.abs(segment.force) + np.abs(segment.force_shape) @ np.abs(segment.amplitude)).max()
+    own = {"gap": system.play[unit], "one": 1.0, "push": swing, "drag": swing}
+    sizes = [abs(factor) * own.get(name, segment.speed) for factor, (name, _) in zip(factors, event.terms, strict=True)]
+    return event.function(factors, signals)[0], max(sizes)
 
 
 def test_events_of_runs_are_those_of_the_table(tmp_path):
@@ -39,7 +38,7 @@ def test_events_of_runs_are_those_of_the_table(tmp_path):
     met = Counter()
     for seed in SEEDS:
         scene = scene_of(seed, tmp_path)[1].replace({"time.periods": 4})
-        before = None
+        before, unit = None, -1
         for segment in Walk(run_of(scene, [EVENT_LIST]), 4):
             system, event, end = segment.system, segment.event, segment.duration
             possible = {(r, int(each.code)) for r, each in possible_events(system, segment.state)}
@@ -112,7 +111,9 @@ def named(tree):
             return node.attr
         return node.id if isinstance(node, ast.Name) and node.id in imported else ""
 
-    compared = [part for node in ast.walk(tree) if isinstance(node, ast.Compare) for part in (node.left, *node.comparators)]
+    compared = [
+        part for node in ast.walk(tree) if isinstance(node, ast.Compare) for part in (node.left, *node.comparators)
+    ]
     return sum(name_of(node) in events for node in ast.walk(tree)) + sum(name_of(part) in slips for part in compared)
 
 
