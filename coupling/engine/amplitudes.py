@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from vanedamp.coupling.numerics.codes import ACTIVE, FLOW
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import (
@@ -14,23 +12,6 @@ from vanedamp.coupling.numerics.exponentials import (
     secular,
     whole_vectors,
 )
-
-
-@inlined
-def begin_period(system, st):
-    """Set time, times of the last impacts and phases to the start of the next period."""
-    st.time[0] = 0.0
-    for r in range(len(st.last_impact)):
-        st.last_impact[r] -= system.period
-    set_phases(system, st)
-
-
-@inlined
-def set_phases(system, st):
-    """Set the phases of the harmonics exactly from the time."""
-    for h in range(len(system.frequency)):
-        angle = system.frequency[h] * st.time[0]
-        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
 
 
 @inlined

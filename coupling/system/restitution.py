@@ -8,7 +8,6 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.function_address import address_of, call
 from vanedamp.coupling.numerics.compiler.jit import inlined
-from vanedamp.coupling.numerics.tolerances import COLLAPSE
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
 from vanedamp.files.toml_input import InputError
 
@@ -54,21 +53,6 @@ def restitution_at(system, r, approach):
     if system.restitution_at == 0:
         return system.restitution[r]
     return call(system.restitution_at, max(approach, 0.0), system.restitution[r])
-
-
-@inlined
-def collapses(system, st, r):
-    """Whether the last impact of contact r was at this instant: those of an inelastic collapse end without rebound."""
-    return st.time[0] - st.last_impact[r] < COLLAPSE * system.period
-
-
-@inlined
-def last_flight(restitution):
-    """Return the fraction of the rest of a chatter that its next flight takes.
-
-    An elastic contact has no chatter of its own, but the losses of other contacts may shorten its flights without end.
-    """
-    return max(1.0 - restitution, 0.1)
 
 
 def restitutions_at(system: Contacts, contacts: np.ndarray, approach: np.ndarray) -> np.ndarray:

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.codes import OPEN
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import inlined
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
-from vanedamp.coupling.system.unit_laws import slip_after, slip_towards, slips
-
-# system.unit_laws, compiled
-is_slip, slips_after, slips_towards = map(inlined, (slips, slip_after, slip_towards))
 
 
 @inlined
@@ -60,9 +56,9 @@ def has_friction(system, unit):
 
 
 @inlined
-def impulse_work(impulse, before, after):
-    """Return the work of an impulse on a row with these speeds before and after it, J."""
-    return 0.5 * impulse * (before + after)
+def is_slip(state):
+    """Whether a unit in this state slips; its state is the direction then, as a factor."""
+    return state == SLIP_RIGHT or state == SLIP_LEFT
 
 
 @inlined

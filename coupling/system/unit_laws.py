@@ -2,8 +2,7 @@
 
 A unit is a contact, with friction or without, or a friction element. A contact is open; or closed, with a force of its
 own (its state says what its friction does) or while others carry its force; or it leaves: its spring has ended at zero
-force, before its gap is open. Everything here is plain data and plain functions; compiled functions have the predicates
-as the same text (system.unit_kinematics).
+force, before its gap is open. Plain data and plain functions, for uncompiled code.
 """
 
 from __future__ import annotations

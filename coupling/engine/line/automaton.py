@@ -8,7 +8,9 @@ every period's start, where the section of the response is recorded.
 
 from __future__ import annotations
 
-from vanedamp.coupling.engine.amplitudes import amplitude_changes, begin_period, row_change, set_phases
+import math
+
+from vanedamp.coupling.engine.amplitudes import amplitude_changes, row_change
 from vanedamp.coupling.engine.line.compliant_contacts import begin_contact, change_contact, spring_force
 from vanedamp.coupling.engine.line.contact_states import (
     add_force,
@@ -57,6 +59,8 @@ from vanedamp.coupling.numerics.codes import (
     POSITION,
     RECLOSES,
     SEARCHING,
+    SLIP_LEFT,
+    SLIP_RIGHT,
     SPRUNG,
     STATES_GO_ON,
     STATES_OPEN,
@@ -68,7 +72,6 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import comparing, inlined, kernel, summing
 from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
 from vanedamp.coupling.response.records import FRICTION
-from vanedamp.coupling.system.unit_kinematics import slips_towards
 
 #: segments after which a run returns to Python, which sees interrupts
 SLICE = 4096
@@ -114,7 +117,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
-        set_phases(system, st)
+        _set_phases(system, st)
         outcome = _handle_event(
             system, flows, st, rec, scratch, watched.row[event, side], watched.order[event],
             watched.meaning[event, side],
@@ -159,7 +162,10 @@ def _end_period(system, flows, st, watched, rec, scratch, tau):
     carry_over_period(system, st, watched, tau)
     account_spell(system, flows, st, rec, scratch)
     st.counters[PERIOD] += 1
-    begin_period(system, st)
+    st.time[0] = 0.0
+    for r in range(len(st.last_impact)):
+        st.last_impact[r] -= system.period
+    _set_phases(system, st)
     _select_active_modes(flows, st)
     record_start(system, flows, st, rec, scratch)
     align_gaps(system, st, scratch.coordinates)
@@ -196,7 +202,7 @@ def _jenkins_state(system, st, r):
     """Return the state of a Jenkins element with its elongation: its spring holds, or it slides on at its bound."""
     at_bound = abs(system.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * system.limit[r]
     if at_bound and st.displacement[r] * st.velocity[r] > 0.0:
-        return slips_towards(st.velocity[r])
+        return SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
     return SPRUNG
 
 
@@ -224,6 +230,14 @@ def _find_flow(flows, active_set):
         if same:
             return s
     return -1
+
+
+@inlined
+def _set_phases(system, st):
+    """Set the phases of the harmonics exactly from the time."""
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * st.time[0]
+        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
 
 
 @inlined

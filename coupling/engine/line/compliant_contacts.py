@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from vanedamp.coupling.engine.line.gap_kinematics import rigid, spring_energy
 from vanedamp.coupling.engine.line.recording import log_event, log_impact
-from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, COAST, LEAVING, OPEN, OPENS, RECLOSES, SLIP_RIGHT, SPRUNG
+from vanedamp.coupling.numerics.codes import (
+    AT_HIGH,
+    AT_LOW,
+    COAST,
+    LEAVING,
+    OPEN,
+    OPENS,
+    RECLOSES,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+)
 from vanedamp.coupling.numerics.compiler.jit import kernel
 from vanedamp.coupling.response.records import CONTACT, DETACHES
-from vanedamp.coupling.system.unit_kinematics import is_slip, slips_after
 
 
 @kernel
@@ -24,14 +34,14 @@ def slide_or_hold(system, st, scratch, r):
         st.state[r] = COAST
     elif scratch.forced[r] > 0:
         # at its low bound the force opposes motion to the right
-        st.state[r] = slips_after(scratch.forced[r])
+        st.state[r] = SLIP_RIGHT if scratch.forced[r] == AT_LOW else SLIP_LEFT
         st.applied_force[r] = -st.state[r] * limit
         st.displacement[r] = -st.applied_force[r] / system.spring[r]
         scratch.forced[r] = 0
-    elif is_slip(state) and state * st.velocity[r] > 0.0:
+    elif (state == SLIP_LEFT or state == SLIP_RIGHT) and state * st.velocity[r] > 0.0:
         st.applied_force[r] = -state * limit
     else:
-        if st.velocity[r] == 0.0 and is_slip(state):
+        if st.velocity[r] == 0.0 and (state == SLIP_LEFT or state == SLIP_RIGHT):
             # the spring takes over at its bound, to come away from it with the acceleration
             st.released[r] = -AT_LOW if state == SLIP_RIGHT else -AT_HIGH
         else:

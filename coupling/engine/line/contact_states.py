@@ -26,6 +26,8 @@ from vanedamp.coupling.numerics.codes import (
     HELD,
     OPEN,
     SEARCHING,
+    SLIP_LEFT,
+    SLIP_RIGHT,
     SPRUNG,
     STICK,
     TOUCHING,
@@ -33,7 +35,6 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.complementarity import solve_box
 from vanedamp.coupling.numerics.tolerances import FORCE_ROUND_OFF
-from vanedamp.coupling.system.unit_kinematics import is_slip, slips_after, slips_towards
 
 
 @inlined
@@ -56,7 +57,7 @@ def resolve_contact_states(system, st, rec, scratch):
             continue
         k = _list_candidate(st, scratch, r, COAST, system.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
         if system.limit[r] > 0.0 and st.velocity[r] != 0.0:
-            st.state[r] = slips_towards(st.velocity[r])
+            st.state[r] = SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
             st.applied_force[r] = -st.state[r] * system.limit[r]
     if not _decide(system, st, rec, scratch, k):
         return False
@@ -77,7 +78,7 @@ def stop_attached_bodies(system, flows, st):
     """
     s, stopped = st.counters[FLOW], False
     for r in range(system.friction_rows):
-        if is_slip(st.state[r]) and st.free_acceleration[r] == 0.0:
+        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.free_acceleration[r] == 0.0:
             still = True
             for j in range(flows.modes[s]):
                 still = still and flows.motion[s, r, j] == 0.0
@@ -147,7 +148,7 @@ def _decide(system, st, rec, scratch, k):
         if state == DEPENDENT:
             st.state[r] = HELD if r < friction else TOUCHING
         elif r < friction:
-            st.state[r] = slips_after(state)
+            st.state[r] = SLIP_RIGHT if state == AT_LOW else SLIP_LEFT
     close_pressed_contacts(system, st, rec, scratch, FORCE_ROUND_OFF * scale)
     return True
 

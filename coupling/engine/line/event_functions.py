@@ -42,7 +42,6 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import secular_bound
 from vanedamp.coupling.numerics.tolerances import AT_START, CHATTER, RESOLUTION
-from vanedamp.coupling.system.unit_kinematics import is_slip
 
 #: in periods: what is known without a root at a period's start is left out from here on, at the price of exponentials
 _AHEAD = 0.02
@@ -132,7 +131,7 @@ def _list_functions(system, flows, st, watched, s):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
             count = _add_force_bounds(system, flows, st, watched, s, r, system.limit[r], True, count)
-        elif is_slip(state):
+        elif state == SLIP_LEFT or state == SLIP_RIGHT:
             count = _add_motion(system, flows, st, watched, s, r, VELOCITY, float(state), STOPS, False, count)
     r = system.friction_rows
     while r < len(st.state):

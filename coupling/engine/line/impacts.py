@@ -13,10 +13,9 @@ from vanedamp.coupling.engine.line.tolerances import JUMP
 from vanedamp.coupling.numerics.codes import AT_LOW, CLOSED, COAST, DEPENDENT, FREE, OPEN, SPRUNG, STICK
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
-from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
+from vanedamp.coupling.numerics.tolerances import COLLAPSE, SIMULTANEOUS
 from vanedamp.coupling.response.records import IMPACT_LOSS
-from vanedamp.coupling.system.restitution import collapses, last_flight, restitution_at
-from vanedamp.coupling.system.unit_kinematics import impulse_work
+from vanedamp.coupling.system.restitution import restitution_at
 
 
 @inlined
@@ -27,7 +26,7 @@ def single_impact(system, st, rec, scratch, r):
     """
     friction, speed = system.friction_rows, st.velocity[r]
     restitution = restitution_at(system, r, -speed)
-    last = collapses(system, st, r)
+    last = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
     if not rigid(system, r) or not system.moves_with_floor[r] or last or -speed * restitution <= st.capture_speed[r]:
         return False
     if -speed <= slowest(system, st):
@@ -81,7 +80,8 @@ def simultaneous_impacts(system, st, rec, scratch):
         # kept before the jump, for the ledger and the log
         scratch.jerk[p], scratch.acceleration[p] = speed, min(speed, 0.0)
         restitution = restitution_at(system, r, -speed)
-        if collapses(system, st, r) or -speed * restitution < last_flight(restitution) * st.capture_speed[r]:
+        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
+        if collapsed or -speed * restitution < _flight_part(restitution) * st.capture_speed[r]:
             restitution = 0.0
         problem.restitution[p] = restitution
         # a contact that separates already may not be driven together: its law starts from zero
@@ -100,10 +100,19 @@ def simultaneous_impacts(system, st, rec, scratch):
         after = st.velocity[r]
         if impulse != 0.0 or problem.state[p] == DEPENDENT:
             after = -problem.restitution[p] * before
-        st.ledger[IMPACT_LOSS] -= impulse_work(impulse, scratch.jerk[p], after)
+        st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (scratch.jerk[p] + after)
         if before < 0.0:
             _record_impact(system, st, rec, r, before, after, max(impulse, scratch.reaction[p]))
     return True
+
+
+@inlined
+def _flight_part(restitution):
+    """Return the fraction of the rest of a chatter that its next flight takes.
+
+    An elastic contact has no chatter of its own, but the losses of other contacts may shorten its flights without end.
+    """
+    return max(1.0 - restitution, 0.1)
 
 
 @kernel
@@ -114,7 +123,7 @@ def _mark_slow_departures(system, st, scratch, k):
         r = scratch.listed[p]
         scratch.bound[p] = problem.restitution[p] == 0.0 or scratch.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * scratch.acceleration[p]
-        if problem.state[p] == AT_LOW and after < last_flight(restitution_at(system, r, after)) * st.capture_speed[r]:
+        if problem.state[p] == AT_LOW and after < _flight_part(restitution_at(system, r, after)) * st.capture_speed[r]:
             scratch.bound[p], found = True, True
     return found
 

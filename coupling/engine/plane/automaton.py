@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.amplitudes import begin_period, set_phases
 from vanedamp.coupling.engine.plane.contact_states import decide, move_sliders
 from vanedamp.coupling.engine.plane.energy_balance import account, move, response_at
 from vanedamp.coupling.engine.plane.event_functions import next_event
@@ -41,6 +40,7 @@ from vanedamp.coupling.numerics.codes import (
     PAUSED,
     PERIOD,
     RECLOSES,
+    SLIP_LEFT,
     SLIP_RIGHT,
     STATES_GO_ON,
     STATES_OPEN,
@@ -63,7 +63,6 @@ from vanedamp.coupling.system.unit_kinematics import (
     is_slip,
     least_force,
     row_speed,
-    slips_after,
     speed_scale,
     spring_force,
 )
@@ -82,7 +81,7 @@ _TINY = 1e-150
 @entry
 def begin(system, st, rec, log, scratch):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
-    set_phases(system, st)
+    _set_phases(system, st)
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
     if _approaches(system, st) and not collide(system, st, rec, log, scratch):
         return False
@@ -119,7 +118,7 @@ def advance(system, flows, st, watched, rec, log, scratch, periods, max_events):
             _end_period(system, flows, st, rec)
             continue
         st.time[0] += tau
-        set_phases(system, st)
+        _set_phases(system, st)
         if who == -2:
             segments = _SLICE
             continue
@@ -182,7 +181,10 @@ def _move(system, flows, st, rec, scratch, tau):
 def _end_period(system, flows, st, rec):
     """Begin the next period and record its section."""
     st.counters[PERIOD] += 1
-    begin_period(system, st)
+    st.time[0] = 0.0
+    for r in range(len(st.last_impact)):
+        st.last_impact[r] -= system.period
+    _set_phases(system, st)
     _project(system, flows, st, st.counters[FLOW])
     record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
 
@@ -276,7 +278,7 @@ def _handle_event(system, flows, st, rec, log, scratch, r, what):
     own = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
     if own and (what == AT_LOW or what == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
         # again and again: the decision's force is short of its known bound by round-off, that of the motion is not
-        st.state[r] = slips_after(what)
+        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT
         st.other[r] = st.state[r]
     for i in range(len(system.rest)):
         changed = scratch.before[i] != st.state[i] or st.other[i] != st.state[i]
@@ -301,7 +303,7 @@ def _change_unit(system, st, log, r, what):
         st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
     elif r >= elements and at_bound:
-        st.state[r] = slips_after(what)  # decided next: its spring is at its bound
+        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
     elif what == STOPS and r < elements:
         # what the resolution of time leaves of its slip is rest
         st.scale[0] = max(st.scale[0], abs(row_speed(system, len(system.rest) + r, st.v)) / AT_REST)
@@ -511,6 +513,13 @@ def _violates(system, flows, st, r, on_normal, on_slip):
         rate += (part * flows.eigenvalue[s, j]).real
         size += abs(part.real) + abs(part.imag)
     return room < -BEYOND * size or (room <= BEYOND * size and rate < 0.0)
+
+
+@inlined
+def _set_phases(system, st):
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * st.time[0]
+        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
 
 
 @kernel

@@ -29,10 +29,10 @@ from vanedamp.coupling.engine.plane.tolerances import (
 )
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
-from vanedamp.coupling.numerics.tolerances import CHATTER, SPEED_ROUND_OFF
+from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE, SPEED_ROUND_OFF
 from vanedamp.coupling.response.recorder import note_impact
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
-from vanedamp.coupling.system.restitution import collapses, last_flight, restitution_at
+from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.unit_kinematics import (
     has_friction,
     is_closed,
@@ -44,6 +44,8 @@ from vanedamp.coupling.system.unit_kinematics import (
 
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
+#: least length of a flight that is not ended, times CHATTER, however elastic it is
+_SHORTEST_FLIGHT = 0.1
 #: what a closed contact does in a short step: it pushes, or its slip turns without
 _PUSHES, _TURNS = 1, 2
 #: how much more than the loads the forces of other contacts may press
@@ -150,7 +152,7 @@ def _expand(system, st, scratch, count, factor, tiny):
 @inlined
 def _restitution(system, st, scratch, r):
     """Coefficient of a contact at its speed of approach; an impact at the end of a collapse is plastic."""
-    if collapses(system, st, r):
+    if st.time[0] - st.last_impact[r] < COLLAPSE * system.period:
         return 0.0
     return restitution_at(system, r, -scratch.before_impact[r])
 
@@ -241,7 +243,10 @@ def _complete_chatter(system, st, scratch, count, tiny):
     for p in range(count):
         speed = row_speed(system, scratch.listed[p], st.v)
         if tiny < speed < slow:
-            near, flight = True, min(flight, last_flight(restitution_at(system, scratch.listed[p], speed)))
+            near, flight = (
+                True,
+                min(flight, max(1.0 - restitution_at(system, scratch.listed[p], speed), _SHORTEST_FLIGHT)),
+            )
     if not near:
         return True
     if not _short_step(system, st, scratch, count, flight):
