@@ -393,6 +393,7 @@ def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, mo
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("everywhere")
 
+    monkeypatch.setattr(worker, "kind_of", lambda *_: None)  # points run one by one
     monkeypatch.setattr(worker, "simulate", broken)
     sweep(validate(Scene, OSCILLATOR | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
