@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,12 @@ from vanedamp.coupling.orbits.border import BorderPoint
 from vanedamp.coupling.orbits.conditions import Condition, Counts
 from vanedamp.coupling.orbits.curve import Path, Point, beginning, located, near, regular
 from vanedamp.coupling.orbits.multipliers import multipliers
-from vanedamp.coupling.orbits.other_side import changed, jumped
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: largest derivative of the map, scaled: it goes as one over the speed of an impact that comes to graze
 _STEEP = 1e5
-#: scaled distances from an end at which the other side is sought
-_BEYOND = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+#: scaled distances from an end at which the other side is sought, and how much farther a state is that has jumped
+_BEYOND, _FARTHER = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 1e3
 #: points where a pair of multipliers becomes real: the border has no Neimark-Sacker points beyond
 _LAST = {"1:1 resonance", "1:2 resonance"}
 
@@ -86,7 +85,7 @@ class BorderPath(Path):
             if self.end:
                 return
         head, after = self.head, None
-        for start, passage in (*changed(head, _BEYOND), *jumped(head)):
+        for start, passage in self._beyond(head):
             after = after or passage
             beside = regular(beginning(self.problem, start, head.tangent, head.condition))
             point = beside and regular(near(beside, start, head.tangent, 2 * max(_BEYOND)))
@@ -107,6 +106,29 @@ class BorderPath(Path):
         # grazing is of codimension two
         self._note(head, f"{_condition(head).kind}-grazing" if kind == "grazing" else kind, note)
         return note
+
+    def _beyond(self, head: Point) -> Iterator[tuple[np.ndarray, Passage]]:
+        """Yield states of another sequence next to the last one, along the border, and where the state has jumped.
+
+        It jumps where an event passes the start of the period; the state beyond is how a passage ends that begins next
+        to the last one, with the event at both of its ends (orbits.other_side).
+        """
+        sequence = head.passage.sequence
+        for size in _BEYOND:
+            y = head.y + size * head.tangent
+            passage = self.problem.passage(y)
+            if passage is not None and passage.sequence != sequence:
+                yield y, passage
+        for size in _BEYOND[:2]:
+            for direction in (*np.eye(len(head.y))[:-2], *-np.eye(len(head.y))[:-2]):
+                y = head.y + size * (direction + head.tangent)
+                passage = self.problem.passage(y)
+                if passage is None:
+                    continue
+                image = np.append(passage.state / self.problem.weight, y[-2:])
+                beyond = self.problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
+                if beyond is not None:
+                    yield image, beyond
 
 
 def _condition(point: Point) -> Condition:

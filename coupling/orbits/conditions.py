@@ -136,9 +136,11 @@ class Singular(Condition):
         M = self.problem.derivative(passage)
         for step in _NORMAL_FORM * np.array(_SHRINKS):
             sides = [self.problem.passage(y + way * step * np.append(right, (0.0, 0.0))) for way in (1, -1)]
-            same = [self.problem.derivative(side) for side in sides if side and side.sequence == passage.sequence]
-            if len(same) == 2 and np.abs(same[0] - same[1]).max() < _CHANGE * np.abs(M).max():
-                up, down = same
+            up, down = (
+                self.problem.derivative(side) if side and side.sequence == passage.sequence else np.full(M.shape, np.nan)
+                for side in sides
+            )
+            if np.abs(up - down).max() < _CHANGE * np.abs(M).max():
                 break
         else:
             return np.nan
@@ -239,7 +241,7 @@ class Clearance(Condition):
 
     @classmethod
     def of(cls, problem: Problem, y: np.ndarray, passage: Passage) -> Clearance:
-        """Return the condition that nearly holds at a point: of a clearance, or of the two nearest events."""
+        """Return the condition that nearly holds at a point: of a clearance, or of the two events next to each other."""
         apart = np.diff(problem.at(y).times(passage))
         return cls(problem, 0, None if np.isfinite(passage.clearance[0]) or not len(apart) else int(apart.argmin()))
 

@@ -98,7 +98,7 @@ class Continuation(Path):
         if (centred := self._other_side.centred(last)) is not None:
             point, how = centred, CENTRED
         elif (passed := self._other_side.past_the_start(last)) is not None:
-            point, how = passed, " at the start of the period"
+            point, how = passed[0], " at the start of the period"
         elif lost:
             self.step = max(step / 4, self.table.min_step)
             return self._onward(last)
@@ -111,7 +111,7 @@ class Continuation(Path):
         self._note(last, kind, f"{what}{how}")
         if point is None:
             self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last)
-        else:
+        elif passed is None or not self._ends_on(passed[1]):
             self._add(last if passed is None else point, point)  # at the start of the period the state jumps
             self.step = max(self.table.step / 8, self.table.min_step)
 

@@ -2,19 +2,22 @@
 
 An orbit of another sequence is sought where the branch would continue, at the root of the distance along it where a
 new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
-event does, while the orbit continues as if nothing had happened.
+event does, while the orbit continues as if nothing had happened. It is followed past that place by states at another
+moment of the period.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from bisect import bisect
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage
-from vanedamp.coupling.orbits.curve import Point, beginning, corrected, near
+from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
+from vanedamp.coupling.orbits.curve import Point, beginning, corrected, near, reached
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import least_squares
 from vanedamp.coupling.orbits.problem import Problem
@@ -25,36 +28,8 @@ CENTRED = ": a body that may rest anywhere is moved to the middle of where it do
 _FARTHEST = 10.0
 #: how often the search for the place of a new event is widened
 _WIDENINGS = 6
-#: periods from the start of one within which an event passes it; scaled distances of states beside it, and how much
-#: farther one is that has jumped
-_AT_START, _NEXT, _FARTHER = 1e-3, (1e-7, 1e-6), 1e3
-
-
-def changed(head: Point, distances: Iterable[float]) -> Iterator[tuple[np.ndarray, Passage]]:
-    """Yield states and numbers at distances along the tangent, and their passages, that have another sequence."""
-    for distance in distances:
-        y = head.y + distance * head.tangent
-        passage = head.problem.passage(y)
-        if passage is not None and passage.sequence != head.passage.sequence:
-            yield y, passage
-
-
-def jumped(head: Point) -> Iterator[tuple[np.ndarray, Passage]]:
-    """Yield states and numbers, and their passages, next to where an orbit has jumped as an event passes the start.
-
-    That is how a passage ends that begins next to the orbit, with the event at both of its ends.
-    """
-    problem = head.problem
-    for size in _NEXT:
-        for direction in np.eye(problem.size, len(head.y)):
-            for way in (size, -size):
-                y = head.y + size * head.tangent + way * direction
-                if (passage := problem.passage(y)) is None:
-                    continue
-                image = np.append(passage.state / problem.weight, y[problem.size :])
-                beyond = problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
-                if beyond is not None:
-                    yield image, beyond
+#: periods from the start of one within which an event passes it; steps past it; scaled distance of a state behind
+_AT_START, _STEPS, _BEHIND = 1e-3, 12, 1e-6
 
 
 class OtherSide:
@@ -65,30 +40,61 @@ class OtherSide:
 
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
-        for y, passage in changed(last, self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0)):
-            if (point := self._beside(last, y, passage)) is not None:
-                return replace(point, row=(point.y - last.y) / np.linalg.norm(point.y - last.y)), ""
+        for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
+            y = last.y + size * last.tangent
+            passage = self.problem.passage(y)
+            if passage is not None and passage.sequence != last.passage.sequence:
+                point = self._beside(last, y, passage)
+                if point is not None:
+                    return replace(point, row=(point.y - last.y) / np.linalg.norm(point.y - last.y)), ""
         for factor in (1.0, 2.0, 4.0):
             point = corrected(last, factor * step)
             if point is not None:
                 return point, f", stepped over by {factor * step:.2g}"
         return None, ""
 
-    def past_the_start(self, last: Point) -> Point | None:
-        """Return the orbit beyond the last one where an event passes the start; None where none does."""
+    def past_the_start(self, last: Point) -> tuple[Point, list[Located]] | None:
+        """Return an orbit beyond the last one, where an event passes the start, and the bifurcations on the way.
+
+        The branch is followed from where no event is near, to the end of the range at most. None where no event passes
+        the start.
+        """
         times = self.problem.at(last.y).times(last.passage)
-        if not times or min(times[0], self.problem.map.length - times[-1]) > _AT_START:
+        if not times or min(times[0], (length := self.problem.map.length) - times[-1]) > _AT_START:
             return None
-        for y, _ in jumped(last):
-            beside = beginning(self.problem, y, last.tangent)
-            point = beside and near(beside, y, last.tangent, 1e-2 * self.step)
-            if point is not None:  # the number goes on, wherever the state has jumped
-                return replace(point, row=np.copysign(1.0, last.tangent[-1]) * self.problem.row())
+        apart = np.diff([*times, times[0] + length])
+        later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % length
+        begin = (self.problem.map.begin + later) % min(length, 1.0)
+        there = replace(self.problem, map=replace(self.problem.map, begin=begin, _earlier=[]), _maps={}, _passages={})
+        head = _moved(last, there, later)
+        if head is None:
+            return None
+        found, step = list[Located](), self.step
+        for _ in range(_STEPS):
+            point = reached(head, step)
+            if point is None:
+                step /= 4
+                continue
+            for each in bifurcations(head, point):
+                y = _later(there, each.point.y, length - later)
+                if y is not None:
+                    own = replace(each.point, problem=self.problem, zero=each.point.zero._replace(y=y))
+                    found.append(each._replace(point=own))
+            before = (bisect(there.at(each.y).times(each.passage), length - later) for each in (head, point))
+            passed = len(set(before)) > 1
+            head = point
+            if passed or not 0.0 < point.y[-1] < 1.0:
+                back = _moved(point, self.problem, length - later)
+                return None if back is None else (back, found)
         return None
 
     def passage(self, last: Point) -> Passage | None:
         """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
-        return next((passage for _, passage in changed(last, self.step * 10.0 ** np.arange(-6.0, 0.0))), None)
+        for size in self.step * 10.0 ** np.arange(-6.0, 0.0):
+            passage = self.problem.passage(last.y + size * last.tangent)
+            if passage is not None and passage.sequence != last.passage.sequence:
+                return passage
+        return None
 
     def centred(self, last: Point) -> Point | None:
         """Return the orbit with its neutral coordinates centred in its sequence's range; None if they already are.
@@ -174,6 +180,20 @@ class OtherSide:
                     return None
             distance *= 10
         return None
+
+
+def _moved(point: Point, other: Problem, later: float) -> Point | None:
+    """Return a point as one of another problem, whose section is some periods later; None if it is lost."""
+    y, before = (_later(point.problem, at, later) for at in (point.y, point.y - _BEHIND * point.tangent))
+    if y is None or before is None:
+        return None
+    return beginning(other, y, (y - before) / np.linalg.norm(y - before))
+
+
+def _later(problem: Problem, y: np.ndarray, later: float) -> np.ndarray | None:
+    """Return state and number (k + 1,) some periods later on the motion from y (k + 1,)."""
+    found = problem.at(y).later(problem.state(y), later)
+    return None if found is None else problem.pack(found[1], *problem.numbers(y))
 
 
 def _reach(stays: Callable[[float], bool], sign: float) -> float:
