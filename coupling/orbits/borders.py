@@ -42,8 +42,9 @@ class _Candidate(NamedTuple):
 class Borders:
     """The borders of some branches, found one after the other.
 
-    period_map: of one excitation period, or of waves; table: with the second number; origin, span: (2,) values of the two numbers at
-    which the scaled ones are 0, and their ranges; second: its value on the branches; notes: what could not be done.
+    period_map: of one excitation period, or of waves; table: with the second number; origin, span: (2,) values of the
+    two numbers at which the scaled ones are 0, and their ranges; second: its value on the branches; notes: what could
+    not be done.
     """
 
     def __init__(

@@ -137,7 +137,9 @@ class Singular(Condition):
         for step in _NORMAL_FORM * np.array(_SHRINKS):
             sides = [self.problem.passage(y + way * step * np.append(right, (0.0, 0.0))) for way in (1, -1)]
             up, down = (
-                self.problem.derivative(side) if side and side.sequence == passage.sequence else np.full(M.shape, np.nan)
+                self.problem.derivative(side)
+                if side and side.sequence == passage.sequence
+                else np.full(M.shape, np.nan)
                 for side in sides
             )
             if np.abs(up - down).max() < _CHANGE * np.abs(M).max():
@@ -241,7 +243,7 @@ class Clearance(Condition):
 
     @classmethod
     def of(cls, problem: Problem, y: np.ndarray, passage: Passage) -> Clearance:
-        """Return the condition that nearly holds at a point: of a clearance, or of the two events next to each other."""
+        """Return the condition that nearly holds: of a clearance, or of the two events next to each other."""
         apart = np.diff(problem.at(y).times(passage))
         return cls(problem, 0, None if np.isfinite(passage.clearance[0]) or not len(apart) else int(apart.argmin()))
 

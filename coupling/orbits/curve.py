@@ -260,8 +260,9 @@ def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) ->
 class Path:
     """A curve while it is followed from a point one way, within the ranges of its numbers.
 
-    head: the last point; trail: y (k + m,) of some of its sequence before it; points: what is kept of all; special: its named points;
-    step: the next one; end: why it is not followed further, "" while it is. What a curve watches, keeps and does where its sequence ends is said by its kind.
+    head: the last point; trail: y (k + m,) of some of its sequence before it; points: what is kept of all; special: its
+    named points; step: the next one; end: why it is not followed further, "" while it is. What a curve watches, keeps
+    and does where its sequence ends is said by its kind.
     """
 
     #: record of a named point; why a path ends at the end of a range, and where it began

@@ -110,7 +110,7 @@ class Problem:
         return passage.scaled(self.map.scale)
 
     def amplitude(self, y: np.ndarray, passage: Passage) -> float:
-        """Return the mean over whole periods of the largest displacement, m; the passage of a wave has a part of one."""
+        """Return the mean over whole periods of the largest displacement, m; a passage of a wave has a part of one."""
         if self.map.wave:
             passage = replace(self.at(y), wave=False, _earlier=[])(self.state(y), False)
         return float(passage.peaks.mean())

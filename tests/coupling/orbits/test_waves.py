@@ -214,7 +214,11 @@ def test_a_border_of_waves_is_that_of_orbits_of_whole_periods(tmp_path):
     (border,) = orbits(scene).borders
     assert border.second[0] == 25.0 < border.second[1] and (border.stable_orbits == 1).all()
     whole = period_map(scene, second="excitation.force")
-    paths, origin, span = ("excitation.frequency", "excitation.force"), np.array([low, 25.0]), np.array([high - low, 0.1])
+    paths, origin, span = (
+        ("excitation.frequency", "excitation.force"),
+        np.array([low, 25.0]),
+        np.array([high - low, 0.1]),
+    )
     problem = Problem(whole, paths, origin, span)
     y = problem.pack(border.state[1], float(border.parameter[1]), float(border.second[1]))
     found = first_point(Peak(problem, 0, np.eye(problem.size + 1)[-1]), y + 1e-3 * problem.row(-2))
