@@ -170,7 +170,7 @@ class Flow:
     """
 
     def __init__(self, dynamics: Dynamics, state: np.ndarray, open_force: np.ndarray) -> None:
-        self.dynamics, self.state, self.solved = dynamics, state, StateFlow(dynamics.system, state)
+        self.dynamics, self.state, self.solved = dynamics, state, StateFlow(dynamics.system, state, 0.0)
         solved, per = self.solved, dynamics.per
         self.rubs, self.way, self.stuck, self.slips_held = solved.rubs, solved.way, solved.stuck, solved.held
         free = solved.free(open_force)

@@ -72,9 +72,10 @@ class StateFlow:
     load: (e, N). oblique: (N, N) accelerations by loads; carried: (k, N) forces of the kept rows by loads, the least
     where these depend on each other; left: largest acceleration of a kept row per unit of load and length: forces that
     have no solution leave more than round-off.
+    squared: what may be left before forces are computed without the square of the rows' condition number.
     """
 
-    def __init__(self, system: System, state: np.ndarray) -> None:
+    def __init__(self, system: System, state: np.ndarray, squared: float = _SQUARED) -> None:
         u, yields = len(state), np.isfinite(system.spring)
         self.system, self.state, self.u, self.sliders = system, state, u, len(system.tangential)
         self.root = root = np.sqrt(system.mass)
@@ -102,7 +103,7 @@ class StateFlow:
             self.stiffness = self.stiffness + stretch.T @ (system.tangential[self.holds, None] * stretch)
         self.weight = system.weight / root + self.known @ self.drawn[u + self.slides]
         self.load = system.load / root
-        self.carried, self.oblique, self.left = _forces(rows[self.kept], self.wrench)
+        self.carried, self.oblique, self.left = _forces(rows[self.kept], self.wrench, squared)
 
     @property
     def stuck(self) -> np.ndarray:
@@ -173,7 +174,7 @@ class StateFlow:
         return X
 
 
-def _forces(rows: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _forces(rows: np.ndarray, wrench: np.ndarray, squared: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the forces of kept rows (k, N), accelerations (N, N), both by loads, and what is left (StateFlow.left)."""
     size = rows.shape[1]
     if not len(rows):
@@ -184,7 +185,7 @@ def _forces(rows: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarra
     carried = -inverse @ rows
     oblique = np.eye(size) + wrench @ carried
     left = _left(rows, oblique, scale)
-    if left > _SQUARED:
+    if left >= squared:
         carried, oblique = _forces_of_near_dependent(rows, wrench, scale, carried, oblique)
         left = _left(rows, oblique, scale)
     return carried, oblique, left
