@@ -119,6 +119,7 @@ def numbers_of(
     numbers. Raises InputError for a path that names no number of the equations, and NotSmooth where the equations
     have a kink.
     """
+    names = tuple(path.name if isinstance(path, MatrixDirection) else path for path in paths)
     turned, moves, sizes = _turned(scene, paths, dynamics, derived)
     same = derived(scene) is scene
     with numbers(len(paths)):
@@ -130,16 +131,13 @@ def numbers_of(
             start = zeros(len(frame.to_state)) if begins is None else begins(turned, frame)
             made = Parts.of(Dynamics(frame, dynamics.scale, dynamics), start)
         except NotSmooth:
-            names = ", ".join(f"{name} = {value:g}" for name, value in _named(scene, paths))
-            raise NotSmooth(f"{names}: the equations of motion have a kink there") from None
+            at = [0.0 if isinstance(path, MatrixDirection) else scene.number(path) for path in paths]
+            told = ", ".join(f"{name} = {value:g}" for name, value in zip(names, at, strict=True))
+            raise NotSmooth(f"{told}: the equations of motion have a kink there") from None
     parts = Parts(*(_turns(part, len(paths)) for part in made))
     if not all(np.all(np.isfinite(part)) for part in parts):
         raise NotSmooth("the equations of motion have a kink there")
-    return Numbers(tuple(name for name, _ in _named(scene, paths)), sizes, parts, dynamics.system.frequency, moving)
-
-
-def _named(scene: Scene, paths: Sequence[str | MatrixDirection]) -> list[tuple[str, float]]:
-    return [(path.name, 0.0) if isinstance(path, MatrixDirection) else (path, scene.number(path)) for path in paths]
+    return Numbers(names, sizes, parts, dynamics.system.frequency, moving)
 
 
 def _turns(part: Any, count: int) -> np.ndarray:

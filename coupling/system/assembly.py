@@ -108,8 +108,7 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
     spring = array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])
     jenkins = np.flatnonzero((grip > 0.0) & np.isfinite(spring))
     casing = zeros((len(rows), first + len(jenkins)))
-    for own, row in zip(casing, rows, strict=True):
-        own[: len(row)] = row
+    casing[:, : len(basis.stiffness)] = array(rows).reshape(len(rows), len(basis.stiffness))
     elongation = casing[jenkins].copy()
     elongation[:, first:] = -np.eye(len(jenkins))
     return {
@@ -123,9 +122,7 @@ def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:
     ring, name = ring_in_file(scene.structure), forced_label(scene).partition("@")[0]
     sectors = range(0 if ring is None else ring.sectors)
     rows = [interface_row(basis, f"{name}@{sector}", "excitation.at") for sector in sectors]
-    found = zeros((len(rows), len(basis.stiffness)))
-    for own, row in zip(found, rows, strict=True):
-        own[:] = row
+    found: np.ndarray = array(rows).reshape(len(rows), len(basis.stiffness))
     return found
 
 

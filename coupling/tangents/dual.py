@@ -92,7 +92,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         return Dual(self.value[place], self.turns[_of_turns(place)])
 
     def __setitem__(self, place: Any, given: Any) -> None:
-        self.value[place] = _value(given)
+        self.value[place] = values(given)
         self.turns[_of_turns(place)] = given.turns if isinstance(given, Dual) else 0.0
 
     def __iter__(self) -> Iterator[Dual]:
@@ -159,8 +159,8 @@ def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
     """Return a function of numbers, some of which have derivatives."""
     if ufunc is np.matmul:
         return _product(*inputs)
-    values = [_value(one) for one in inputs]
-    value = ufunc(*values)
+    plain = [values(one) for one in inputs]
+    value = ufunc(*plain)
     if ufunc in _COMPARE or ufunc in (np.maximum, np.minimum):
         if _ACTIVE.count is not None:
             _check_apart(*inputs)
@@ -175,7 +175,7 @@ def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
     if ufunc not in _SLOPES:
         return NotImplemented
     turns: Any = 0.0
-    for one, slope in zip(inputs, _SLOPES[ufunc](*values), strict=True):
+    for one, slope in zip(inputs, _SLOPES[ufunc](*plain), strict=True):
         if isinstance(one, Dual):
             turns = turns + np.asarray(slope)[..., None] * one.turns
     shape = (*np.shape(value), count)
@@ -191,7 +191,7 @@ def _of_size(one: Dual, size: Any) -> Any:
 
 def _check_apart(one: Any, other: Any) -> None:
     """Raise NotSmooth where equal values turn apart."""
-    equal = np.asarray(_value(one) == _value(other))
+    equal = np.asarray(values(one) == values(other))
     if equal.any():
         apart = [np.broadcast_to(_turns(each), (*equal.shape, _turns(each).shape[-1])) for each in (one, other)]
         if (equal & (apart[0] != apart[1]).any(axis=-1)).any():
@@ -200,7 +200,7 @@ def _check_apart(one: Any, other: Any) -> None:
 
 def _product(one: Any, other: Any) -> Dual:
     """Return a product of matrices or vectors."""
-    a, b = _value(one), _value(other)
+    a, b = values(one), values(other)
     turns: Any = 0.0
     if isinstance(one, Dual):
         turns = np.moveaxis(np.matmul(np.moveaxis(one.turns, -1, 0), b), 0, -1)
@@ -220,17 +220,13 @@ def _of_turns(place: Any) -> Any:
     return (*steps, slice(None)) if any(step is Ellipsis for step in steps) else place
 
 
-def _value(one: Any) -> Any:
+def values(one: Any) -> Any:
+    """Return numbers without their derivatives."""
     return one.value if isinstance(one, Dual) else one
 
 
 def _turns(one: Any) -> Any:
     return one.turns if isinstance(one, Dual) else np.zeros(1)
-
-
-def values(one: Any) -> Any:
-    """Return numbers without their derivatives."""
-    return _value(one)
 
 
 def _like(parts: Sequence[Any]) -> list[Dual]:
@@ -246,7 +242,7 @@ def _joined(join: Any, parts: Sequence[Any], axis: int = 0) -> Dual:
 
 
 def _where(chosen: np.ndarray, *both: Any) -> Dual:
-    return Dual(np.where(chosen, *map(_value, both)), np.where(chosen[..., None], *map(_turns, both)))
+    return Dual(np.where(chosen, *map(values, both)), np.where(chosen[..., None], *map(_turns, both)))
 
 
 def _diag(one: Dual) -> Dual:
@@ -295,7 +291,7 @@ def array(given: Any, dtype: type = float) -> Any:
 
 
 def _plain(given: Any) -> Any:
-    return [_plain(one) for one in given] if isinstance(given, list | tuple) else _value(given)
+    return [_plain(one) for one in given] if isinstance(given, list | tuple) else values(given)
 
 
 def _numbers_in(given: Any, place: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Dual]]:
@@ -313,12 +309,12 @@ def scalar(one: Any) -> Any:
 
 def vanishes(one: Any) -> bool:
     """Return whether a number is zero and stays so."""
-    return bool(_value(one) == 0.0) and not (isinstance(one, Dual) and one.turns.any())
+    return bool(values(one) == 0.0) and not (isinstance(one, Dual) and one.turns.any())
 
 
 def inverse(matrix: Any) -> Any:
     """Return the inverse (n, n) of a matrix."""
-    found = np.linalg.inv(_value(matrix))
+    found = np.linalg.inv(values(matrix))
     return (
         Dual(found, -(found @ (Dual(matrix.value, matrix.turns) @ found)).turns) if isinstance(matrix, Dual) else found
     )
@@ -326,11 +322,11 @@ def inverse(matrix: Any) -> Any:
 
 def solve(matrix: Any, right: Any) -> Any:
     """Return the solution (n,) of a system of equations."""
-    found = np.linalg.solve(_value(matrix), _value(right))
+    found = np.linalg.solve(values(matrix), values(right))
     if not isinstance(matrix, Dual) and not isinstance(right, Dual):
         return found
     left = right - matrix @ found
-    return Dual(found, np.linalg.solve(_value(matrix), left.turns))
+    return Dual(found, np.linalg.solve(values(matrix), left.turns))
 
 
 def _scalar(function: Callable[[float], float], slope: Callable[[float], float]) -> Callable[[Any], Any]:

@@ -59,7 +59,11 @@ def _mapped(thing: Any, change: Callable[[Any], Any], wanted: Callable[[Any], bo
 
 def plain(thing: Any) -> Any:
     """Return nested records without derivatives."""
-    return _mapped(thing, lambda one: _number(one.value), lambda one: isinstance(one, Dual))
+    return _mapped(thing, lambda one: _number(one.value), _is_dual)
+
+
+def _is_dual(thing: Any) -> bool:
+    return isinstance(thing, Dual)
 
 
 def _number(value: np.ndarray) -> Any:
@@ -93,8 +97,10 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
     nan there, and judged by each number in place of the largest of an array.
     """
     count, turned = dual.active(), list[Dual]()
-    _mapped(arguments, turned.append, lambda one: isinstance(one, Dual))
-    ways = [] if count is None else [p for p in range(count) if any(one.turns[..., p].any() for one in turned)]
+    if count is None:
+        return function(*arguments)
+    _mapped(arguments, turned.append, _is_dual)
+    ways = [p for p in range(count) if any(one.turns[..., p].any() for one in turned)]
     with dual.numbers(None):
         found = function(*plain(arguments))
         here = _flat(found) if ways else []
@@ -104,15 +110,11 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
         scale = np.concatenate([np.full(len(one), np.abs(one).max(initial=0.0)) for one in here])
         scale = np.abs(flat) if unknown else scale
         scale = np.where(scale > 0.0, scale, 1.0)
-        turns = np.zeros((len(flat), count or 0))
+        turns = np.zeros((len(flat), count))
         for p in ways:
 
             def at(amount: float, p: int = p) -> np.ndarray:
-                moved = _mapped(
-                    arguments,
-                    lambda one: _number(one.value + amount * one.turns[..., p]),
-                    lambda one: isinstance(one, Dual),
-                )
+                moved = _mapped(arguments, lambda one: _number(one.value + amount * one.turns[..., p]), _is_dual)
                 values = _flat(function(*moved))
                 if [len(one) for one in values] != [len(one) for one in here]:
                     raise NotSmooth
