@@ -180,6 +180,12 @@ class Flow:
         self.forces = self.known + solved.spread(self.carried)
 
     @cached_property
+    def possible_forces(self) -> np.ndarray:
+        """The largest forces (2u,) that hold, by loads as large as those of a typical motion in any direction."""
+        loads = np.linalg.norm(np.abs(self.free) @ self.dynamics.typical)
+        return np.asarray(np.abs(self.solved.spread(np.linalg.norm(self.solved.carried, axis=1) * loads)))
+
+    @cached_property
     def named(self) -> np.ndarray:
         """The states (u,) without slips that constraints hold."""
         return np.where(self.slips_held & (self.way != 0.0) & self.rubs, codes.STICK, self.state)

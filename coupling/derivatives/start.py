@@ -16,8 +16,8 @@ from vanedamp.coupling.system.unit_laws import contacts_of, presses
 
 #: gaps this close are closed, relative to the free travel; speeds this slow count as zero, relative to the fastest
 _SHUT, _STILL = 1e-12, 1e-12
-#: a force this close to its bound, relative to its terms, is at it
-_NEAR = 1e-9
+#: a force this close to its bound is at it: relative to its terms, and to what all loads together could make of it
+_NEAR, _ROUND_OFF = 1e-9, 1e-13
 
 
 class Start:
@@ -144,7 +144,7 @@ class Start:
         """
         system, units, unit = self.system, len(segment.state), np.arange(len(segment.state))
         force = flow.forces @ z
-        noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical
+        noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical + _ROUND_OFF * flow.possible_forces
         closed = contacts_of(system) & np.isinf(system.spring) & presses(segment.state)
         touched = system.J[:units, system.along] != 0.0  # (u, bodies)
         floors = (unit >= system.contacts) & (system.surface == FLOOR)

@@ -263,10 +263,12 @@ def _set_start(system, st, watched, columns, k):
     p, p_rate = st.coordinates[:n], st.coordinates[n:]
     for r in range(len(st.state)):
         st.state[r] = COAST if r < friction else OPEN
-        place, moved, speed = system.rest[r], 0.0, 0.0
+        place, moved, speed, terms = system.rest[r], 0.0, 0.0, 0.0
         for i in range(n):
             moved += system.J[r, i] * p[i]
             speed += system.J[r, i] * p_rate[i]
+            terms += abs(system.J[r, i] * p_rate[i])
+        st.largest_speed[0] = max(st.largest_speed[0], terms)  # a body at rest in its cavity meets no wall by round-off
         for body in range(b):
             on_floor, rate = 0.0, 0.0
             for i in range(n):
