@@ -123,10 +123,7 @@ class EventDrivenRun(ABC):
         """Advance to the end of `periods`. Return the code of numerics.codes."""
         while True:
             code = self._advance(periods, max_events)
-            if self.keep and self.counters[LOGGED]:
-                self.chunks.append(self.log[: self.counters[LOGGED]].copy())
-            self.listed += int(self.counters[LOGGED])
-            self.counters[LOGGED] = 0
+            self._keep_log()
             if code == NEEDS_FLOW:
                 try:
                     self._add_flow()
@@ -134,6 +131,13 @@ class EventDrivenRun(ABC):
                     return ILL_CONDITIONED
             elif code != PAUSED:
                 return int(code)
+
+    def _keep_log(self) -> None:
+        """Take the entries of the log since the last call, if it is kept."""
+        if self.keep and self.counters[LOGGED]:
+            self.chunks.append(self.log[: self.counters[LOGGED]].copy())
+        self.listed += int(self.counters[LOGGED])
+        self.counters[LOGGED] = 0
 
     def advance_to(self, periods: int) -> Status:
         """Advance to the end of `periods`, from the decision of the initial state. Return how that ended."""

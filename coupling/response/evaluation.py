@@ -31,9 +31,7 @@ from vanedamp.coupling.response.plane import Plane
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.static_deflection import about_mean
-from vanedamp.coupling.response.steadiness import judge, run_ends
-from vanedamp.coupling.response.steady_state import transient_length
+from vanedamp.coupling.response.steadiness import LOOK, judge, known_after, run_ends
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.system import System
@@ -59,6 +57,7 @@ STATUS_OF = {
     codes.DIVERGED: Status.DIVERGED,
     codes.PENETRATION: Status.PENETRATION,
     codes.NOT_STEADY: Status.NOT_STEADY,
+    codes.UNCERTAIN: Status.UNCERTAIN,
 }
 
 
@@ -191,24 +190,15 @@ def _run_until_known(
     observers: Sequence[Observer],
 ) -> Ended:
     """Run until the mean amplitude is known well enough, at most some periods."""
-    tolerance, ended = transient.scene.time.tolerance, Ended(Status.NOT_STEADY, transient.scene.time.dropped)
-    for done in [*range(_CHUNK, periods, _CHUNK), periods]:
+    ended = Ended(Status.NOT_STEADY, transient.scene.time.dropped)
+    for done in [*range(LOOK, periods, LOOK), periods]:
         status = _advanced(run, done, periods, progress, observers, None)
         if status is not Status.OK:
             return Ended(status, ended.transient)
-        outcome = run.outcome()
-        records, (_, peaks) = outcome.records, about_mean(outcome.records, 0, done, outcome.system.period)
-        dropped = transient_length(peaks)
-        if dropped is None:
-            ended = Ended(Status.NOT_STEADY, transient.scene.time.dropped)
-            continue
-        found = judge(transient, records, dropped, done)
-        if found.confidence is not None and found.confidence <= tolerance * peaks[dropped:].mean():
-            if found.steady or not dropped:
-                return Ended(Status.OK, dropped, found.confidence)
-            ended = Ended(Status.NOT_STEADY, dropped, found.confidence)
-        else:
-            ended = Ended(Status.UNCERTAIN, dropped, found.confidence)
+        code, dropped, confidence = known_after(*transient.numbers, run.outcome().records, done, np.empty(done))
+        ended = Ended(STATUS_OF[int(code)], int(dropped), None if np.isnan(confidence) else float(confidence))
+        if ended.status is Status.OK:
+            break
     return ended
 
 

@@ -81,8 +81,9 @@ def _struck(run: Outcome) -> np.ndarray:
     """Return the sums (periods + 1, rows) of the energies of impacts to the power of [wear], J^n."""
     struck, exponent = run.records.struck.copy(), float(run.records.exponent[0])
     struck[:, np.flatnonzero(np.isfinite(run.rows.spring))] = 0.0  # known only as a contact ends
-    period, row, energy = impact_energies(run.rows, run.log, run.system.period)
-    np.add.at(struck, (np.minimum(period, len(struck) - 1), row), energy**exponent)
+    if run.log:
+        period, row, energy = impact_energies(run.rows, run.log, run.system.period)
+        np.add.at(struck, (np.minimum(period, len(struck) - 1), row), energy**exponent)
     return struck
 
 

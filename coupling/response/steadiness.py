@@ -12,11 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.codes import DONE, LONGER, NOT_STEADY
+from vanedamp.coupling.numerics.codes import DONE, LONGER, NOT_STEADY, UNCERTAIN
 from vanedamp.coupling.numerics.compiler.jit import ZERO, strict, strict_entry
 from vanedamp.coupling.response.records import CONTACT, FRICTION, IMPACT_LOSS, STORED, VISCOUS, Records
 from vanedamp.coupling.response.static_deflection import peaks_about_mean
-from vanedamp.coupling.response.steady_state import batch_deviation, confidence_of, lag_correlation, mean_of
+from vanedamp.coupling.response.steady_state import (
+    batch_deviation,
+    confidence_of,
+    lag_correlation,
+    mean_of,
+    transient_length,
+)
 from vanedamp.coupling.system.transient import Transient, remainder, slowest
 
 #: batches of each half of a window with impacts, their fewest periods, and standard errors beyond which the halves'
@@ -32,6 +38,8 @@ _SLOW = 0.7
 _LONGEST = 16
 #: relaxations within the longest run below which an open one ends
 _HOPELESS = 3.0
+#: periods between two looks at whether the mean is known (steady = "auto")
+LOOK = 100
 #: smallest fraction of a decay
 _TINY = float(np.finfo(float).tiny)
 
@@ -95,6 +103,24 @@ def run_ends(steady, rate, dropped, periods, most):
     if steady or dropped == 0:
         return DONE
     return NOT_STEADY if 2 * periods > most or rate * most < _HOPELESS else LONGER
+
+
+@strict_entry
+def known_after(setup, free, stuck, records, done, peaks):
+    """Return whether the mean of a run with steady = "auto" is known after its periods.
+
+    DONE, NOT_STEADY or UNCERTAIN, the periods that are left out, and the confidence of the others' mean, nan: unknown.
+    setup, free, stuck: Transient.numbers; peaks: room for (done,).
+    """
+    peaks_about_mean(records, ZERO, done, setup.clock[1], peaks)
+    dropped = transient_length(peaks, done)
+    if dropped < 0:
+        return NOT_STEADY, setup.dropped, np.nan
+    mean = mean_of(peaks, dropped, done)
+    steady, _, confidence = judged(setup, free, stuck, records, dropped, done, peaks[: done - dropped])
+    if not confidence <= setup.tolerance * mean:
+        return UNCERTAIN, dropped, confidence
+    return DONE if steady or dropped == 0 else NOT_STEADY, dropped, confidence
 
 
 @strict

@@ -28,27 +28,31 @@ _QUANTILE = np.array([
 ])  # fmt: skip
 
 
-def transient_length(series: np.ndarray) -> int | None:
-    """Return how many entries of a series (n,) precede its steady-state part; None if the series is too short.
+@strict_entry
+def transient_length(series, n):
+    """Return how many of n entries of a series precede its steady-state part; -1 if the series is too short.
 
     The marginal standard error rule MSER (White 1997): the truncation after which the squared standard error of the
     mean is smallest. A minimum in the second half of the series means that its end is not in sight, unless that half is
     constant: a periodic response.
     """
-    n = len(series)
     if n < 4 * _BATCHES:
-        return None
-    half = series[n // 2 :]
-    if np.ptp(half) <= _CONSTANT * np.abs(half).max():
-        return n // 2
-    left = np.arange(n, 0, -1)
-    deviation = series - half.mean()
-    total = np.cumsum(deviation[::-1])[::-1]
-    square = np.cumsum((deviation**2)[::-1])[::-1]
-    error = (square - total**2 / left) / left**2
-    # the last few entries have no variance to speak of
-    cut = int(np.argmin(error[: n - 2 * _BATCHES]))
-    return cut if cut <= _LONGEST_TRANSIENT * n else None
+        return -1
+    half, least, most, size = n // 2, np.inf, -np.inf, 0.0
+    for i in range(half, n):
+        least, most, size = min(least, series[i]), max(most, series[i]), max(size, abs(series[i]))
+    if most - least <= _CONSTANT * size:
+        return half
+    middle, total, square, smallest, cut = mean_of(series, half, n), 0.0, 0.0, np.inf, n
+    for i in range(n - 1, -1, -1):
+        deviation, left = series[i] - middle, n - i
+        total += deviation
+        square += deviation * deviation
+        error = (square - total * total / left) / left**2
+        # the last few entries have no variance to speak of
+        if left > 2 * _BATCHES and error <= smallest:
+            smallest, cut = error, i
+    return cut if cut <= _LONGEST_TRANSIENT * n else -1
 
 
 def mean_confidence(series: np.ndarray) -> float | None:

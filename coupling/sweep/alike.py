@@ -11,6 +11,7 @@ import pickle
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,20 @@ from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, colum
 from vanedamp.coupling.engine.line.event_driven import EngineRun
 from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, LEFT, PLACE, STAGE, Job, new_job
 from vanedamp.coupling.methods.registry import run_of
-from vanedamp.coupling.numerics.codes import OUTSIDE, PERIOD
+from vanedamp.coupling.numerics.codes import OUTSIDE
+from vanedamp.coupling.quantities.sums import ENERGIES, SUMS
 from vanedamp.coupling.response.figures import measured_of
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.paths import with_numbers
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.sweep.grid import Points, PointTable
-from vanedamp.coupling.sweep.row import Row
+from vanedamp.coupling.sweep.row import PARTS, Row
 from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient, most_periods
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
@@ -38,8 +43,8 @@ _OF_STARTS = ("initial.", ".position", ".velocity")
 
 #: runs point k of a group by itself, from a state; returns the state that it leaves, None if it broke off
 Alone = Callable[[int, RestartState | None], RestartState | None]
-#: takes the sections (p, s) of the evaluated periods of point k
-Keep = Callable[[int, np.ndarray], None]
+#: takes what is kept of point k beside its sums: its sections, and what observers have, by name
+Keep = Callable[[int, Mapping[str, Any]], None]
 
 
 class Kind:
@@ -47,11 +52,12 @@ class Kind:
 
     def __init__(self, scene: Scene) -> None:
         """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
-        run = run_of(scene)
+        self.observers = parts_of(scene)
+        run = run_of(scene, self.observers)
         if not isinstance(run, EngineRun) or scene.contact.parallel:
             raise ValueError("not a scene of the engine for sliders, or one whose contacts begin at several gaps")
         run.check()
-        self.scene, self.run, self.start = scene, run, start_of(scene, run.whole)
+        self.scene, self.run, self.start, self._data = scene, run, start_of(scene, run.whole), scene.to_dict()
         transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)
         (setup, free, stuck), (loose, held) = transient.numbers, transient.parts
         # compiled code writes the numbers of each scene into these: none is an array of the first one's records
@@ -73,7 +79,7 @@ class Kind:
         """
         run, size = self.run, len(next(iter(values.values())))
         table, fits = self._columns(values, start, size, linked)
-        job = new_job(size, most_periods(self.scene), linked)
+        job = new_job(size, most_periods(self.scene), linked, run.keep)
         for count in [size] if keep is None else range(1, size + 1):
             job.at[COUNT] = count
             while not fits or run.run_many(job, table, self.statistics) == OUTSIDE:
@@ -86,14 +92,34 @@ class Kind:
                 job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
                 job.at[LEFT] = job.at[LEFT] if left is None else place + 1
             if keep is not None and job.codes[count - 1]:
-                keep(count - 1, self._section(job))
+                keep(count - 1, self._parts(job, table, values, count - 1))
         return job, self._linear(table, values), self._left(job, size, start) if linked else start
 
-    def _section(self, job: Job) -> np.ndarray:
-        """Return the sections (p, s) of the evaluated periods of the run that has just ended."""
-        done = int(self.run.counters[PERIOD])
-        first = min(int(job.at[DROPPED]), max(done - 1, 0))
-        return np.delete(self.run.records.section[first : done + 1], 2, axis=1)
+    def _parts(self, job: Job, table: Columns, values: Mapping[str, np.ndarray], k: int) -> dict[str, Any]:
+        """Return what is kept of the run of scene k, which has just ended, by name."""
+        run = self.run.outcome()
+        first, b = min(int(job.at[DROPPED]), max(run.periods - 1, 0)), self.run.system.bodies
+        section, found = run.records.section[first : run.periods + 1], dict[str, Any](transient=0)
+        found |= {"section": section[:, :2], "slip": section[:, 3 : 3 + b], "slip_velocity": section[:, 3 + b :]}
+        if self.observers:
+            scene = with_numbers(self.scene, self._data, {path: float(numbers[k]) for path, numbers in values.items()})
+            run, known = replace(run, system=self._whole(table, k)), dict[str, Any](transient=first)
+            known["energy"] = {name: float(job.sums[k, SUMS.index(name)]) for name in ENERGIES}
+            found |= dict.fromkeys(PARTS)
+            for observer in self.observers:
+                found |= observer.fields(scene, run, known)
+        return found
+
+    def _whole(self, table: Columns, k: int) -> System:
+        """Return the system of scene k."""
+        whole, line = self.run.whole, self.run.system
+        rest, play, load, contacts = whole.rest.copy(), whole.play.copy(), whole.load.copy(), whole.contacts
+        rest[:contacts], play[:contacts] = (part[k, line.friction_rows :] for part in (table.rest, table.free_travel))
+        load[:, : table.load.shape[2]] = table.load[k]
+        return whole._replace(
+            omega=float(table.omega[k]), period=float(table.period[k]), frequency=table.frequency[k], rest=rest,
+            play=play, load=load,
+        )  # fmt: skip
 
     def _columns(
         self, values: Mapping[str, np.ndarray], start: RestartState | None, size: int, linked: bool
@@ -102,15 +128,12 @@ class Kind:
 
         And whether the start fits the first scene as it is: otherwise Python moves it.
         """
-        whole, line = self.run.whole, self.run.system
         if linked:
             values = {path: np.append(numbers, numbers[-1]) for path, numbers in values.items()}
-        table = columns(self.scene, whole, line, self.start, values)
+        table = columns(self.scene, self.run.whole, self.run.system, self.start, values)
         fits = True
         if start is not None:
-            rest, play, contacts = whole.rest.copy(), whole.play.copy(), slice(line.friction_rows, None)
-            rest[: whole.contacts], play[: whole.contacts] = table.rest[0, contacts], table.free_travel[0, contacts]
-            moved = start_of(self.scene, whole._replace(rest=rest, play=play), start)
+            moved = start_of(self.scene, self._whole(table, 0), start)
             for name in STARTS:
                 getattr(table, name)[0] = getattr(start, name)
             fits = all(np.array_equal(getattr(start, name), getattr(moved, name)) for name in STARTS)
@@ -159,8 +182,8 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind |
         _LAST.key, _LAST.kind = key, None
         with suppress(InputError, ValueError):  # its own run says what is wrong
             chosen = maker.chosen(point)
-            settled = chosen.start is None and chosen.scene.time.steady is None
-            if settled and columned(chosen.scene, paths) == paths:  # other values may be in the way of a column
+            # other values may be in the way of a column
+            if chosen.start is None and columned(chosen.scene, paths) == paths:
                 _LAST.kind = Kind(chosen.scene)
     return _LAST.kind
 

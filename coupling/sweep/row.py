@@ -22,6 +22,8 @@ NOT_IN_SWEEPS: dict[str, str] = {}
 #: texts of every point
 TEXTS = ("status", "classification")
 _SECTION = "section"
+#: what observers of runs in compiled code keep (simulation.parts_of)
+PARTS = ("wear", "sectors", "contacts")
 
 
 class Row:
@@ -42,7 +44,7 @@ class Row:
             ("stress",): bool(self._sizes["hot_spot"]), ("sectors",): ring is not None, ("contacts",): wanted(base),
         }  # fmt: skip
         known = {name for names, there in parts.items() if there for name in names}.union(OF_MOTION)
-        self.quantities = dict[str, Quantity]()
+        self.quantities, self._had = dict[str, Quantity](), dict[frozenset[str], list[str]]()
         self.places, self.width = dict[str, slice](), 0
         self.texts = list(TEXTS)
         for name, one in table().items():
@@ -59,9 +61,14 @@ class Row:
 
     @property
     def alone(self) -> bool:
-        """Whether a run has to be one of its own, because quantities need more than sums and sections."""
-        known = OF_MOTION + OF_SECTIONS
+        """Whether a run has to be one of its own, because quantities need more than compiled code keeps."""
+        known = OF_MOTION + OF_SECTIONS + PARTS
         return len(self.texts) > len(TEXTS) or not all(one.exists(known) for one in self.quantities.values())
+
+    @property
+    def keeps(self) -> bool:
+        """Whether quantities need more of a run than its sums."""
+        return not all(one.exists(OF_MOTION) for one in self.quantities.values())
 
     def put(self, row: np.ndarray, response: Response, more: Mapping[str, Any]) -> tuple[str, ...]:
         """Put the quantities of a run into a row (width,); return its texts. more: what runs have no part for."""
@@ -74,9 +81,14 @@ class Row:
 
     def put_parts(self, row: np.ndarray, parts: Mapping[str, Any]) -> None:
         """Put the quantities of a run into a row (width,) that come from some of its parts."""
-        for name, one in self.quantities.items():
-            if one.exists(parts):
-                self._set(row[None], name, np.asarray(one.of(parts), float)[None])
+        for name in self._had_by(frozenset(parts)):
+            self._set(row[None], name, np.asarray(self.quantities[name].of(parts), float)[None])
+
+    def _had_by(self, sources: frozenset[str]) -> list[str]:
+        """Return the names of the quantities that some sources have."""
+        if sources not in self._had:
+            self._had[sources] = [name for name, one in self.quantities.items() if one.exists(sources)]
+        return self._had[sources]
 
     def _set(self, rows: np.ndarray, name: str, values: np.ndarray) -> None:
         """Put a quantity of k runs (k, ...) into rows (k, width); of sections the last, the first places stay free."""
@@ -90,9 +102,8 @@ class Row:
     def put_many(self, rows: np.ndarray, sources: Mapping[str, Any]) -> None:
         """Put the quantities of k runs into rows (k, width), by what they need, (k,) each."""
         with np.errstate(all="ignore"):
-            for name, one in self.quantities.items():
-                if one.exists(sources):
-                    self._set(rows, name, np.asarray(one.of(sources)))
+            for name in self._had_by(frozenset(sources)):
+                self._set(rows, name, np.asarray(self.quantities[name].of(sources)))
 
     def value(self, rows: np.ndarray, name: str) -> np.ndarray:
         """Return a quantity of rows (..., width); nan where points have none."""

@@ -80,10 +80,8 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
             final, texts[place] = _run(maker, points[place], start, values[place], own)
             return final
 
-        def keep(place: int, section: np.ndarray, places: Sequence[int] = places) -> None:
-            b = (section.shape[1] - 2) // 2
-            parts = {"section": section[:, :2], "slip": section[:, 2 : 2 + b], "slip_velocity": section[:, 2 + b :]}
-            own.put_parts(values[places[place]], parts | {"transient": 0})
+        def keep(place: int, parts: Mapping[str, Any], places: Sequence[int] = places) -> None:
+            own.put_parts(values[places[place]], parts)
 
         numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
         first = points[places[0]]
@@ -91,7 +89,7 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
         found = None
         if kind is not None:
             with suppress(InputError):  # a start that does not fit: the runs say so
-                found = kind.run_all(numbers, state, task.linked, alone, keep if "sections" in base.kept else None)
+                found = kind.run_all(numbers, state, task.linked, alone, keep if own.keeps else None)
         if found is None:
             for place in range(len(places)):
                 final = alone(place, state)

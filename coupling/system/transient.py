@@ -70,6 +70,7 @@ class Setup(NamedTuple):
     rigid: bool  # whether friction dampers stick without a spring
     tolerance: float
     open: bool  # whether the length of the run is
+    auto: bool  # whether the run ends as soon as its mean is known
     suited: bool  # whether the transient decides on it
     dropped: int  # periods that are left out unless it does
     simulated: int
@@ -94,7 +95,7 @@ class Transient:
             driven=prescribed or scene.excitation.signal is not None, apart=len(systems) > 1,
             free=np.array([False, *(not damper.sprung for damper in scene.damper)]), weight_energy=loose.weight_energy,
             rigid=any(damper.stiffness is None for damper in scene.friction_damper), tolerance=float(time.tolerance),
-            open=time.open, suited=time.open and not prescribed, dropped=time.dropped, simulated=time.simulated,
+            open=time.open, auto=time.steady is not None, suited=time.open and not prescribed, dropped=time.dropped, simulated=time.simulated,
             most=0 if time.steady and not prescribed else most_periods(scene),
         )  # fmt: skip
         self.numbers, self.parts = (setup, free, stuck), (loose, held)

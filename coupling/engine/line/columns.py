@@ -198,4 +198,6 @@ def columned(scene: Scene, paths: Iterable[str]) -> list[str]:
     """Return those of some paths whose numbers have columns in scenes like this one."""
     if scene.planar or scene.excitation.signal is not None:
         return []
-    return [path for path in paths if entries_of(scene, path) is not None]
+    own = [path for path in paths if entries_of(scene, path) is not None]
+    # a number of a body or a cavity is one of each sector's, which may scatter about it
+    return [path for path in own if path.startswith("excitation.")] if scene.repeats else own

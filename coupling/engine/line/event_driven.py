@@ -195,9 +195,10 @@ class EngineRun(EventDrivenRun):
         columns: with a row more than scenes where these are linked; statistics: Setup, LinearParts and LinearModes of
         the loose and the held system, Measured.
         """
-        self.job, self.columns, self.statistics = job, columns, statistics
+        self.job, self.columns, self.statistics, self.chunks = job, columns, statistics, []
         while True:
             code = self._advance(0, self.max_events)
+            self._keep_log()
             if code == NEEDS_FLOW:
                 try:
                     self._add_flow()

@@ -34,7 +34,7 @@ from vanedamp.coupling.numerics.compiler.record import changed, record_with, roo
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.quantities.sums import SUMS
 from vanedamp.coupling.response.figures import Measured, measure
-from vanedamp.coupling.response.steadiness import judged, run_ends
+from vanedamp.coupling.response.steadiness import LOOK, judged, known_after, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
 from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
 
@@ -43,8 +43,9 @@ _SEGMENTS = 8 * SLICE
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
 # those left out and the longest run; the code that ends it; segments since Python has seen it; whether a scene begins
-# with the state that the one before has left; the number of the last scene that has left one, from 1, 0: none
-COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SEGMENTS, LINKED, LEFT = range(10)
+# with the state that the one before has left; the number of the last scene that has left one, from 1, 0: none;
+# whether Python keeps the log
+COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SEGMENTS, LINKED, LEFT, LOGS = range(11)
 #: what comes next with a scene: it begins, goes on, or leaves its state in its columns
 BEGINS, RUNS, LEAVES = range(3)
 
@@ -60,10 +61,10 @@ class Job(NamedTuple):
     peaks: Annotated[np.ndarray, "periods"]  # room to judge a run
 
 
-def new_job(scenes: int = 0, periods: int = 0, linked: bool = False) -> Job:
+def new_job(scenes: int = 0, periods: int = 0, linked: bool = False, logs: bool = False) -> Job:
     """Return the job of many scenes, of at most so many periods; or of one run that the caller judges."""
-    job = room(Job, {"numbers": 10, "k": scenes, "sums": len(SUMS), "periods": periods})
-    job.at[COUNT], job.at[LINKED] = scenes, linked
+    job = room(Job, {"numbers": 11, "k": scenes, "sums": len(SUMS), "periods": periods})
+    job.at[COUNT], job.at[LINKED], job.at[LOGS] = scenes, linked, logs
     return job
 
 
@@ -107,6 +108,9 @@ def run(
                     return OUTSIDE
                 begin_transient(setup, loose, held, free, stuck)
                 at[DROPPED], at[GOAL], at[MOST] = run_length(setup, free, stuck)
+                rec.counted[0] = at[DROPPED]
+                if setup.auto:
+                    at[MOST], at[GOAL], rec.counted[0] = at[GOAL], min(LOOK, at[GOAL]), 0
                 goal = at[GOAL]
             at[STAGE] = RUNS
             code = DONE if begin(system, st, rec, scratch) else UNDECIDED
@@ -120,6 +124,8 @@ def run(
         if at[COUNT] == 0 or code == NEEDS_FLOW:
             return code
         if code == PAUSED:
+            if at[LOGS]:
+                return PAUSED
             st.counters[LOGGED] = 0
             at[SEGMENTS] += SLICE
         elif _end(job, setup, free, stuck, measured, rec, st.counters[PERIOD], code):
@@ -140,11 +146,16 @@ def run(
 def _end(job, setup, free, stuck, measured, rec, done, code):
     """Judge and measure the present scene, which has ended with a code. Returns False where it is to be longer."""
     at, confidence = job.at, math.nan
-    if code == DONE:
+    if code == DONE and setup.auto:
+        code, at[DROPPED], confidence = known_after(setup, free, stuck, rec, done, job.peaks[:done])
+        if code != DONE and done < at[MOST]:
+            at[GOAL] = min(done + LOOK, at[MOST])
+            return False
+    elif code == DONE:
         steady, rate, confidence = judged(setup, free, stuck, rec, at[DROPPED], done, job.peaks[: done - at[DROPPED]])
         code = run_ends(steady, rate, at[DROPPED], done, at[MOST])
         if code == LONGER:
-            at[DROPPED], at[GOAL] = done, 2 * done
+            at[DROPPED], at[GOAL], rec.counted[0] = done, 2 * done, done
             return False
     k, first = at[PLACE], min(at[DROPPED], max(done - 1, 0))
     job.codes[k] = code
@@ -217,6 +228,10 @@ def _clear(rec, done):
     rec.peak[:last], rec.square[:last], rec.collided[:last], rec.impacts[:last] = 0.0, 0.0, 0.0, 0
     rec.harmonic[:last], rec.momentum[:last] = 0.0, 0.0
     rec.section[0, :], rec.ledger[0, :], rec.parts[0, :] = 0.0, 0.0, 0.0
+    if rec.worn.shape[1] > 0:
+        rec.worn[:last], rec.struck[:last], rec.hits[:last] = 0.0, 0.0, 0.0
+    if rec.outputs.shape[1] > 0:
+        rec.outputs[:last, :, 0], rec.outputs[:last, :, 1], rec.outputs[:last, :, 2] = -math.inf, math.inf, 0.0
     for i in range(min(last, len(rec.swing))):
         rec.swing[i, 0], rec.swing[i, 1], rec.swing[i, 2] = -math.inf, math.inf, 0.0
 

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from tests.tools.rings import Chain
 from vanedamp.coupling.model_order.choices import NOTHING
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep import alike, worker
@@ -60,6 +61,23 @@ _POINTS = {
         _ONE | {"damper": [{"cavity": "c", "mass": 0.02, "friction": 0.1, "restitution": 0.6}] * 3},
         [{"cavity.c.gap": g, "damper.1.position": x} for g in (2e-3, 4.1e-3, 6e-3) for x in (-7e-4, 0.0, 3e-4)],
     ),
+    "until the mean is known": (
+        _ONE | {"time": {"periods": 700, "steady": "auto", "tolerance": 0.003}},
+        [{"excitation.frequency": f, "cavity.c.gap": g} for f in (15.0, 15.9, 16.4) for g in (1e-3, 3e-3)],
+    ),
+    "worn": (
+        _RIGID | {"wear": {"rate": 1e-13, "impact_rate": 1e-12, "impact_exponent": 1.2, "area": 1e-6}},
+        [{"excitation.frequency": f, "damper.friction": m} for f in (15.2, 15.9, 16.3) for m in (0.0, 0.2, 0.3)],
+    ),
+    "worn, on springs": (
+        _RIGID | {"wear": {"rate": 1e-13, "impact_rate": 1e-12},
+                  "contact": {"law": "compliant", "stiffness": 1e5}},
+        [{"excitation.frequency": f, "cavity.gap": g} for f in (15.2, 16.3) for g in (2e-3, 4e-3)],
+    ),
+    "rounded contacts": (
+        _RIGID | {"contact": {"law": "newton", "pair": {"radius": 5e-2, "young": 2e11, "poisson": 0.3, "yield_strength": 9e8}}},
+        [{"excitation.frequency": f, "damper.1.restitution": e} for f in (15.2, 15.9) for e in (0.2, 0.8)],
+    ),
     "pulled along": (
         _RIGID | {"gravity": {"orientation_deg": 60.0}}, [{"cavity.c.gap": g} for g in (2e-3, 4e-3, 6e-3)],
     ),
@@ -89,6 +107,25 @@ def test_points_run_as_one_are_those_run_one_by_one(name, linked, kept, monkeypa
     assert (found.final is None) == (one_by_one.final is None) == (not linked or name == "few events")
     if found.final is not None:
         assert found.final.to_list() == one_by_one.final.to_list()
+
+
+def test_points_of_a_ring_are_those_run_one_by_one(tmp_path, monkeypatch):
+    chain = Chain(sectors=6, damping_ratio=0.01)
+    resonance = float(np.sqrt(chain.squares([2])[0]) / (2 * np.pi))
+    tables = {
+        "structure": {"model": "ring", "file": chain.saved(tmp_path), "mistuning": {"stiffness": {"std": 0.02}}},
+        "excitation": {"frequency": resonance, "force": 25.0, "at": "tip", "wave": 2},
+        "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all"}],
+        "damper": [{"cavity": "c", "mass": 0.01, "friction": 0.2, "restitution": 0.6}],
+        "time": {"periods": 60, "transient": 20},
+    }
+    points = [{"excitation.frequency": f * resonance, "cavity.c.gap": g} for g in (5e-5, 1e-4) for f in (0.98, 1.01)]
+    scene, task, runs, run = validate(Scene, tables, "scene"), Task(range(len(points))), [], worker.simulate
+    one_by_one = _alone(monkeypatch, scene, points, task)
+    monkeypatch.setattr(worker, "simulate", lambda *args, **options: runs.append(1) or run(*args, **options))
+    found = run_points(scene, NOTHING, points, task)
+    np.testing.assert_array_equal(found.values, one_by_one.values)
+    assert found.texts == one_by_one.texts and not runs
 
 
 def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
