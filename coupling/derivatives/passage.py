@@ -78,6 +78,11 @@ class Passage(NamedTuple):
         """Names of the events in order."""
         return tuple(crossing.name for crossing in self.crossings)
 
+    @property
+    def impacts(self) -> tuple[Crossing, ...]:
+        """The impacts in order, one for those at one instant."""
+        return tuple(crossing for crossing in self.crossings if "impact " in crossing.name)
+
     @classmethod
     def stopped(cls, state: np.ndarray, periods: int, numbers: int = 0) -> Passage:
         """Return a passage that ends with its start (k,): nothing of it is known."""

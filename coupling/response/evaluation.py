@@ -248,7 +248,7 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
         "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
         "energy": energy, "periods": done, "transient": first, "counters": run.counters,
         "quantities": evaluated(
-            linear_parts(scene, system, sums | {"overlap": run.penetration}), partial(_known, status)
+            linear_parts(scene, system, sums | {"overlap": run.penetration}), partial(known_value, status)
         ),
         "peak": records.peak[:done].copy(), "section": section[:, :2].copy(),
         "slip": section[:, 3 : 3 + b].copy(), "slip_velocity": section[:, 3 + b :].copy(), "warnings": (),
@@ -295,7 +295,7 @@ def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str,
     return found if system is None or len(system.mass) <= _LARGE else dict(found)
 
 
-def _known(status: Status, value: Any) -> Any:
+def known_value(status: Status, value: Any) -> Any:
     """Return a quantity as plain data, None for what is not known of a motion; of one that has diverged, nan."""
     if np.ndim(value):
         return frozen(value)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import pickle
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -18,11 +18,14 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
 from vanedamp.coupling.engine.line.event_driven import EngineRun
-from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, LEFT, PLACE, STAGE, Job, new_job
+from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, LEAVES, LEFT, PLACE, STAGE, Job, new_job
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import OUTSIDE
+from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.quantities.sums import ENERGIES, SUMS
+from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status
 from vanedamp.coupling.response.figures import measured_of
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.paths import with_numbers
@@ -40,6 +43,8 @@ from vanedamp.files.toml_input import InputError
 
 #: numbers with which a run begins: of linked runs only the first
 _OF_STARTS = ("initial.", ".position", ".velocity")
+#: kinds that a thread keeps
+_MOST = 4
 
 #: runs point k of a group by itself, from a state; returns the state that it leaves, None if it broke off
 Alone = Callable[[int, RestartState | None], RestartState | None]
@@ -94,6 +99,12 @@ class Kind:
             if keep is not None and job.codes[count - 1]:
                 keep(count - 1, self._parts(job, table, values, count - 1))
         return job, self._linear(table, values), self._left(job, size, start) if linked else start
+
+    def end(self, job: Job) -> RestartState:
+        """Return the state that the only scene of a job has left, which is not linked."""
+        job.at[PLACE], job.at[STAGE] = 0, LEAVES
+        self.run.run_many(job, self.run.columns, self.statistics)
+        return marked_with_speed(self.scene, self.run.start_in(0, 0))
 
     def _parts(self, job: Job, table: Columns, values: Mapping[str, np.ndarray], k: int) -> dict[str, Any]:
         """Return what is kept of the run of scene k, which has just ended, by name."""
@@ -156,36 +167,54 @@ class Kind:
         return np.transpose(found)
 
 
+def ended_as(job: Job, k: int) -> tuple[Status, str]:
+    """Return how scene k of a job has ended, and the class of its motion."""
+    unbalanced, made = (float(job.sums[k, SUMS.index(name)]) for name in ("unbalanced", "made"))
+    return closed_status(STATUS_OF[int(job.codes[k])], unbalanced, made, OPEN_LEDGER), class_name(int(job.kinds[k]))
+
+
 def _own(record: Any) -> Any:
     """Return a record of compiled functions with arrays of its own."""
     return record._make(value.copy() if isinstance(value, np.ndarray) else value for value in record)
 
 
-class _Last(threading.local):
-    """The kind that ran last in a thread, and what it was made of."""
+class _Kept(threading.local):
+    """The kinds that ran last in a thread, by what they were made of, the last one behind."""
 
-    key = b""
-    kind: Kind | None = None
-
-
-_LAST = _Last()
+    def __init__(self) -> None:
+        self.kinds: dict[bytes, Kind | None] = {}
 
 
-def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str]) -> Kind | None:
-    """Return the kind of a point's scene; None where it has to be run by itself. The last one is kept."""
-    slow = {path: value for path, value in point.items() if path not in paths}
+_KEPT = _Kept()
+
+
+def made_of(maker: Points) -> bytes:
+    """Return what the kinds of a maker's points have in common."""
     structure = maker.base.structure
     stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
+    return pickle.dumps((maker.base, maker.choices, stamp))
+
+
+def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: bytes = b"") -> Kind | None:
+    """Return the kind of a point's scene; None where it has to be run by itself. The last ones are kept.
+
+    common: made_of(maker), where it is known.
+    """
+    slow = {path: value for path, value in point.items() if path not in paths}
     above = [point[path] > 0.0 for path in paths if tells(path)]
-    key = pickle.dumps((maker.base, maker.choices, slow, paths, stamp, above))
-    if key != _LAST.key:
-        _LAST.key, _LAST.kind = key, None
-        with suppress(InputError, ValueError):  # its own run says what is wrong
-            chosen = maker.chosen(point)
-            # other values may be in the way of a column
-            if chosen.start is None and columned(chosen.scene, paths) == paths:
-                _LAST.kind = Kind(chosen.scene)
-    return _LAST.kind
+    key, kinds = (common or made_of(maker)) + pickle.dumps((slow, paths, above)), _KEPT.kinds
+    if key in kinds:
+        kinds[key] = kinds.pop(key)
+        return kinds[key]
+    kinds[key] = None
+    with suppress(InputError, ValueError):  # its own run says what is wrong
+        chosen = maker.chosen(point)
+        # other values may be in the way of a column
+        if chosen.start is None and columned(chosen.scene, paths) == paths:
+            kinds[key] = Kind(chosen.scene)
+    if len(kinds) > _MOST:
+        del kinds[next(iter(kinds))]
+    return kinds[key]
 
 
 def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np.ndarray]) -> bool:
@@ -202,12 +231,16 @@ def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np
     return True
 
 
+def without_starts(paths: Iterable[str]) -> list[str]:
+    """Return the paths that say more than how a run begins."""
+    return [path for path in paths if not any(part in path for part in _OF_STARTS)]
+
+
 def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list[str], list[int]]]:
     """Yield the paths with columns, and the places of points that differ only in these; linked ones in turn."""
     kept = points.columns
     paths = [path for path in columned(base, kept) if all(isinstance(value, int | float) for value in kept[path])]
-    if linked:
-        paths = [path for path in paths if not any(part in path for part in _OF_STARTS)]
+    paths = without_starts(paths) if linked else paths
     telling = [values for path, values in kept.items() if path not in paths]
     telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
     keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)

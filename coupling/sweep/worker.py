@@ -14,13 +14,12 @@ from numpy.linalg import LinAlgError
 
 from vanedamp.coupling.exponents.lyapunov import NO_EXPONENT, lyapunov
 from vanedamp.coupling.numerics.compiler.jit import CacheError
-from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.quantities.sums import sources_of
-from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status, linear_parts
+from vanedamp.coupling.response.evaluation import linear_parts
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
+from vanedamp.coupling.sweep.alike import are_scenes, ended_as, groups, kind_of
 from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
 from vanedamp.coupling.sweep.row import TEXTS, Row
 from vanedamp.files.errors import VanedampError
@@ -106,10 +105,9 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
         rows = values[at]
         own.put_many(rows, sums | {"undamped": undamped, "fixed": fixed, "overlap": np.zeros(len(ran))})
         values[at] = rows
-        ended = zip(at, job.codes[ran], job.kinds[ran], sums["unbalanced"], sums["made"], strict=True)
-        for place, code, motion, unbalanced, made in ended:
-            status = closed_status(STATUS_OF[int(code)], unbalanced, made, OPEN_LEDGER)
-            texts[place] = status.value, class_name(int(motion))
+        for place, k in zip(at, ran, strict=True):
+            status, motion = ended_as(job, k)
+            texts[place] = status.value, motion
     return TaskResult(values, texts, state, time.perf_counter() - started)
 
 

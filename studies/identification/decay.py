@@ -48,7 +48,7 @@ class Decay(Model):
 
     def _released(self, values: np.ndarray) -> RingDown | None:
         """Return the ring-down with values (P,) of the numbers; None where there is none."""
-        scene = self.scene(values)
+        scene = self.runs.scene(self.numbers(values))
         if scene is None:
             return None
         self.count["runs"] += 1

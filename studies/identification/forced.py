@@ -11,7 +11,6 @@ import numpy as np
 from vanedamp.coupling.quantities.amplitude import phase
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
 from vanedamp.studies.identification.steady import Follower, Steady, run
@@ -32,15 +31,14 @@ class Forced(Model):
         super().__init__(study, measured, count)
         names, scene = [measured.measure, phase.name][: len(measured.channels)], study.base.replace(measured.changes)
         self._measures = [Measure.of_runs(scene, name, "measure") for name in names]
-        self.followers = [Follower(study.paths, count) for _ in measured.at]
+        self.followers = [Follower(self.runs, study.paths, count) for _ in measured.at]
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs; those that go up or down begin with the state of their neighbour."""
         motions: list[Steady | None] = [None] * len(self.followers)
         before: RestartState | None = None
         for place, linked in self._order():
-            scene = self._at(values, place)
-            motions[place] = None if scene is None else run(scene, before if linked else None, self.count)
+            motions[place] = run(self.runs, self._at(values, place), before if linked else None, self.count)
             before = _end(motions[place])
         return self._predicted(motions)
 
@@ -95,9 +93,9 @@ class Forced(Model):
         """Return the measured quantities (c,) with values (P,) of the numbers near those of a motion."""
         return self._figures(self.followers[place].beside(self._at(moved, place)) or motion)[0]
 
-    def _at(self, values: np.ndarray, place: int) -> Scene | None:
+    def _at(self, values: np.ndarray, place: int) -> dict[str, float]:
         levels = {path: float(each[place]) for path, each in self.measured.levels.items()}
-        return self.scene(values, levels | {FREQUENCY: float(self.measured.at[place])})
+        return self.numbers(values) | levels | {FREQUENCY: float(self.measured.at[place])}
 
     def _figures(self, steady: Steady) -> tuple[np.ndarray, float]:
         """Return the measured quantities (c,) of a motion, and the relative error, taken as that of the amplitude."""

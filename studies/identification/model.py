@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.grid import Points
-from vanedamp.files.toml_input import InputError
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.sweep.runs import Runs
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.steady import Follower
 from vanedamp.studies.identification.study import IdentificationStudy
@@ -39,14 +38,12 @@ class Model(ABC):
         self.measured, self.paths, self.count = measured, study.paths, count
         self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
         self.followers: list[Follower] = []
-        self._points = Points(study.base.replace(measured.changes))
+        further = (*measured.levels, FREQUENCY) if measured.kind == "forced" else ()
+        self.runs = Runs(study.base.replace(measured.changes), (*study.paths, *further))
 
-    def scene(self, values: np.ndarray, further: Mapping[str, float] | None = None) -> Scene | None:
-        """Return the scene with values (P,) of the numbers; None where they make no scene."""
-        try:
-            return self._points.scene(dict(zip(self.paths, map(float, values), strict=True)) | dict(further or {}))
-        except InputError:
-            return None
+    def numbers(self, values: np.ndarray) -> dict[str, float]:
+        """Return values (P,) of the numbers by their paths."""
+        return dict(zip(self.paths, map(float, values), strict=True))
 
     @abstractmethod
     def quick(self, values: np.ndarray) -> Predicted:

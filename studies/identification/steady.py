@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,21 +14,20 @@ from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.sensitivity import sensitivity
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity
-from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.sweep.runs import Ran, Runs
 
 #: ends of runs whose figures count, with their confidence interval
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
 
 class Steady(NamedTuple):
-    """A steady motion: an orbit, or else the response of a run."""
+    """A steady motion of a scene with some numbers, by their paths: an orbit, or else what a run has."""
 
-    scene: Scene
+    numbers: Mapping[str, float]
     orbit: Orbit | None
-    response: Response | None
+    response: Ran | Response | None
 
     @property
     def restart(self) -> RestartState | None:
@@ -45,25 +45,25 @@ class Steady(NamedTuple):
 class Follower:
     """The steady motion of a scene, followed as numbers of it change.
 
-    paths: of the numbers; motion: the last one found, None before and where there is none; leader: the motion that runs
-    begin with, if any; count: of engine runs.
+    runs: of the scene; paths: of the numbers; motion: the last one found, None before and where there is none; leader:
+    the motion that runs begin with, if any; count: of engine runs.
     Runs are followed rather than orbits: a passage of the period map, which has derivatives, takes about as long as
     a thousand periods without.
     """
 
-    def __init__(self, paths: tuple[str, ...], count: Counter[str]) -> None:
-        self.paths, self._count = paths, count
+    def __init__(self, runs: Runs, paths: tuple[str, ...], count: Counter[str]) -> None:
+        self._runs, self.paths, self._count = runs, paths, count
         self.motion: Steady | None = None
         self.leader: Steady | None = None
 
-    def follow(self, scene: Scene | None, before: RestartState | None = None) -> Steady | None:
-        """Return the motion of a scene: a run from one that repeats, or else from a state or the scene's own start.
+    def follow(self, numbers: Mapping[str, float], before: RestartState | None = None) -> Steady | None:
+        """Return the motion with numbers: a run from one that repeats, or else from a state or the scene's own start.
 
         That one changes with `lead` and `sensitivity`, and where a run from it has no end, such as in a narrower gap.
         """
-        self.motion = None if self.leader is None else self.beside(scene)
-        if self.motion is None and scene is not None:
-            self.motion = settled(run(scene, before, self._count), self._count)
+        self.motion = None if self.leader is None else self.beside(numbers)
+        if self.motion is None:
+            self.motion = settled(self._runs, run(self._runs, numbers, before, self._count), self._count)
             self.lead()
         return self.motion
 
@@ -71,37 +71,43 @@ class Follower:
         """Let runs begin with the last motion from now on, if it repeats."""
         self.leader = self.motion if self.motion is not None and self.motion.repeats else None
 
+    def orbit(self) -> Orbit | None:
+        """Return the last motion as an orbit, which leads; None where it is none."""
+        self.motion = settled(self._runs, self.motion, self._count)
+        self.lead()
+        return None if self.motion is None else self.motion.orbit
+
     def sensitivity(self) -> Sensitivity | None:
         """Return the derivatives of the last motion, as an orbit, which leads; None where it has none."""
-        self.motion = settled(self.motion, self._count)
-        self.lead()
-        if self.motion is None or self.motion.orbit is None:
+        if (orbit := self.orbit()) is None:
             return None
         self._count["derivatives"] += 1
-        found = sensitivity(self.motion.orbit, self.paths)
+        found = sensitivity(orbit, self.paths)
         return found if found.complete else None
 
-    def beside(self, scene: Scene | None) -> Steady | None:
-        """Return the motion of a scene that differs little from the last one, which stays the last one."""
+    def beside(self, numbers: Mapping[str, float]) -> Steady | None:
+        """Return the motion with numbers that differ little from those of the last one, which stays the last one."""
         leader = self.leader or self.motion
-        return None if scene is None or leader is None else run(scene, leader.restart, self._count)
+        return None if leader is None else run(self._runs, numbers, leader.restart, self._count)
 
 
-def run(scene: Scene, start: RestartState | None, count: Counter[str]) -> Steady | None:
+def run(runs: Runs, numbers: Mapping[str, float], start: RestartState | None, count: Counter[str]) -> Steady | None:
     """Return the motion in which a run ends, from a start or the scene's own; None if it has no end."""
     count["runs"] += 1
-    response = simulate(scene, start=start)
-    return Steady(scene, None, response) if response.status in _USABLE else None
+    response = runs.run(numbers, start)
+    return Steady(numbers, None, response) if response is not None and response.status in _USABLE else None
 
 
-def settled(steady: Steady | None, count: Counter[str]) -> Steady | None:
+def settled(runs: Runs, steady: Steady | None, count: Counter[str]) -> Steady | None:
     """Return the orbit in which a run has ended; the run itself if its motion does not repeat."""
     response = None if steady is None else steady.response
     periods = None if response is None else periods_of(response.classification)
     if steady is None or response is None or response.final is None or periods is None:
         return steady
-    passages = map_along(replace(steady.scene, orbit=Table(periods=periods)))
+    scene = runs.scene(steady.numbers)
+    assert scene is not None
+    passages = map_along(replace(scene, orbit=Table(periods=periods)))
     orbit = newton.find_orbit(passages, passages.state_of(response.final))
     count["passages"] += orbit.iterations + 1
     good = orbit.status is OrbitStatus.OK and (orbit.undetermined or orbit.stable)
-    return Steady(steady.scene, orbit, None) if good else steady
+    return Steady(steady.numbers, orbit, None) if good else steady

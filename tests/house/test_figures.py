@@ -66,7 +66,7 @@ def test_a_run_assembles_once(scene: Scene) -> None:
 
 @pytest.mark.parametrize("points", [4, 400])
 def test_a_sweep_assembles_once_a_kind_and_for_its_references(scene: Scene, points: int) -> None:
-    alike._LAST.key = b""
+    alike._KEPT.kinds.clear()
     swept = dataclasses.replace(scene, sweep={"excitation.frequency": list(np.linspace(2300.0, 2360.0, points))})
     assert _assemblies(lambda: vd.sweep(swept)) == FIGURES["assemblies"][f"sweep_of_{points}"]
 
