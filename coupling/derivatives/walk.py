@@ -17,10 +17,11 @@ from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStat
 from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
-from vanedamp.coupling.response.segment import EventRun, Segment, Walk
+from vanedamp.coupling.response.segment import Event, EventRun, Segment, Walk
 
 #: events per period after which a walk gives up: each is a step of Python
 EVENTS_PER_PERIOD = 2000
@@ -139,7 +140,7 @@ class PassageWalk:
             guards = made.guards(before, segment) if self._whole else []
             name = self._names.event(before.flow.named, flow.named, before.event.struck)
             if name and (before.event.impulse.any() or not begins(segment)):
-                speed = guards[0].rate if guards else np.nan
+                speed = guards[0].rate if guards else _met(before.event)
                 self._crossings.append(Crossing(segment.start, name, speed, before.event.loss))
         if not self._whole:
             return self._dynamics.from_state
@@ -156,3 +157,9 @@ class PassageWalk:
         if before is not None and self._watch is not None:
             self._watch.event(before, segment, M, made.shift[len(self._dynamics.scale) :])
         return M
+
+
+def _met(event: Event) -> float:
+    """Return the speed at which the gap of an event closes, m/s, nan for other events."""
+    met = event.before[event.struck == event.unit]
+    return float(met[0]) if event.what == codes.CLOSES and len(met) else np.nan

@@ -95,8 +95,8 @@ class PeriodMap:
     def __call__(self, state: np.ndarray, derivative: bool = True) -> Passage:
         """Return the passage that begins with a state (k,).
 
-        Without the derivative, in less than half of the time, the derivative, the speeds of crossings and the clearance
-        are unknown, and the status is OK or STOPPED.
+        Without the derivative, in less than half of the time, the derivative, the clearance and the speeds of crossings
+        are unknown, but for impacts, and the status is OK or STOPPED.
         """
         if self.wave:
             return self._shared(self.travelling, state, derivative, True)

@@ -1,7 +1,7 @@
-"""Runs of one scene with other numbers, of which each is wanted before the next: in compiled code where they have columns.
+"""Runs of one scene with other numbers, one after the other: in compiled code where the numbers have columns.
 
-A search runs a scene some thousand times. Made, assembled and evaluated by Python, a run of a few hundred periods takes
-five times as long as its motion.
+A search runs a scene some thousand times. A run of a few hundred periods that Python makes, assembles and evaluates
+takes several times as long as its motion.
 """
 
 from __future__ import annotations

@@ -95,8 +95,8 @@ class Transient:
             driven=prescribed or scene.excitation.signal is not None, apart=len(systems) > 1,
             free=np.array([False, *(not damper.sprung for damper in scene.damper)]), weight_energy=loose.weight_energy,
             rigid=any(damper.stiffness is None for damper in scene.friction_damper), tolerance=float(time.tolerance),
-            open=time.open, auto=time.steady is not None, suited=time.open and not prescribed, dropped=time.dropped, simulated=time.simulated,
-            most=0 if time.steady and not prescribed else most_periods(scene),
+            open=time.open, auto=time.steady is not None, suited=time.open and not prescribed, dropped=time.dropped,
+            simulated=time.simulated, most=0 if time.steady and not prescribed else most_periods(scene),
         )  # fmt: skip
         self.numbers, self.parts = (setup, free, stuck), (loose, held)
         begin_transient(setup, loose, held, free, stuck)

@@ -7,9 +7,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.orbits import map_along
+from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -98,16 +101,21 @@ def run(runs: Runs, numbers: Mapping[str, float], start: RestartState | None, co
     return Steady(numbers, None, response) if response is not None and response.status in _USABLE else None
 
 
+def map_of(runs: Runs, steady: Steady) -> tuple[PeriodMap, np.ndarray] | None:
+    """Return the period map of the motion in which a run has ended, and its state (k,); None if it does not repeat."""
+    response, scene = steady.response, runs.scene(steady.numbers)
+    periods = None if response is None else periods_of(response.classification)
+    if response is None or response.final is None or periods is None or scene is None:
+        return None
+    passages = map_along(replace(scene, orbit=Table(periods=periods)))
+    return passages, passages.state_of(response.final)
+
+
 def settled(runs: Runs, steady: Steady | None, count: Counter[str]) -> Steady | None:
     """Return the orbit in which a run has ended; the run itself if its motion does not repeat."""
-    response = None if steady is None else steady.response
-    periods = None if response is None else periods_of(response.classification)
-    if steady is None or response is None or response.final is None or periods is None:
+    if steady is None or steady.orbit is not None or (passages := map_of(runs, steady)) is None:
         return steady
-    scene = runs.scene(steady.numbers)
-    assert scene is not None
-    passages = map_along(replace(scene, orbit=Table(periods=periods)))
-    orbit = newton.find_orbit(passages, passages.state_of(response.final))
+    orbit = newton.find_orbit(*passages)
     count["passages"] += orbit.iterations + 1
     good = orbit.status is OrbitStatus.OK and (orbit.undetermined or orbit.stable)
     return Steady(steady.numbers, orbit, None) if good else steady

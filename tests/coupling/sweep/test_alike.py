@@ -26,6 +26,7 @@ _RIGID = {
     "time": {"periods": 60, "transient": 20},
 }
 _ONE = _RIGID | {"cavity": _RIGID["cavity"][:1], "damper": _RIGID["damper"][:1]}
+_STEEL = {"radius": 5e-2, "young": 2e11, "poisson": 0.3, "yield_strength": 9e8}
 _RNG = np.random.default_rng(3)
 _POINTS = {
     "frequencies": (_ONE, [{"excitation.frequency": f} for f in np.linspace(14.0, 18.0, 12)]),
@@ -75,7 +76,7 @@ _POINTS = {
         [{"excitation.frequency": f, "cavity.gap": g} for f in (15.2, 16.3) for g in (2e-3, 4e-3)],
     ),
     "rounded contacts": (
-        _RIGID | {"contact": {"law": "newton", "pair": {"radius": 5e-2, "young": 2e11, "poisson": 0.3, "yield_strength": 9e8}}},
+        _RIGID | {"contact": {"law": "newton", "pair": _STEEL}},
         [{"excitation.frequency": f, "damper.1.restitution": e} for f in (15.2, 15.9) for e in (0.2, 0.8)],
     ),
     "pulled along": (
