@@ -35,6 +35,7 @@ def random_sweep(seed: int) -> RandomSweep:
     """Return a sweep of some 12 points over one to four numbers that have columns."""
     rng = np.random.default_rng([seed, 49])
     tables, linked = _tables(rng), bool(rng.random() < 0.4)
+    tables |= _kept(np.random.default_rng([seed, 50]), tables)
     scene = validate(Scene, tables, f"random sweep {seed}")
     drawn = dict(_axes(rng, scene))
     paths = rng.permutation(list(drawn))[: rng.integers(1, 5)].tolist()
@@ -87,6 +88,22 @@ def _tables(rng: np.random.Generator) -> dict[str, Any]:
     if rng.random() < 0.3:
         tables["contact"] = {"law": "compliant", "stiffness": 100.0}
     return tables
+
+
+def _kept(rng: np.random.Generator, tables: dict[str, Any]) -> dict[str, Any]:
+    """Return tables, in half of the sweeps, of what is kept of a run, and of how it ends."""
+    found: dict[str, Any] = {}
+    if rng.random() < 0.15:
+        found["wear"] = {"rate": 1e-3, "impact_rate": 1e-3, "impact_exponent": rng.choice([1.0, 1.3]), "area": 1.0}
+    if rng.random() < 0.15 and "contact" not in tables:
+        pair = {"radius": 1.0, "young": 1e4, "poisson": 0.3, "yield_strength": 100.0}
+        found["contact"] = {"law": "newton", "pair": pair}
+    if rng.random() < 0.15:
+        tolerance = float(rng.choice([1e-3, 0.05, 0.3]))
+        found["time"] = {"periods": int(rng.choice([90, 250])), "steady": "auto", "tolerance": tolerance}
+    if rng.random() < 0.15:
+        found["sweep"] = {"sections": int(rng.integers(1, 12))}
+    return found
 
 
 def _axes(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[str, Any]]:
