@@ -44,13 +44,23 @@ def test_students_quantile_is_that_of_the_incomplete_beta_function():
 def test_transient_of_a_decay_is_found():
     rng = np.random.default_rng(2)
     decay = 50.0 * np.exp(-np.arange(2000) / 60.0)
-    cut = transient_length(10.0 + decay + autoregressive(rng, 2000, 0.3))
+    cut = transient_length(10.0 + decay + autoregressive(rng, 2000, 0.3), 2000)
     assert 120 < cut < 700
 
 
 def test_a_drift_has_no_steady_state():
-    assert transient_length(np.linspace(0.0, 1.0, 500) ** 2) is None
-    assert transient_length(np.ones(10)) is None
+    assert transient_length(np.linspace(0.0, 1.0, 500) ** 2, 500) == -1
+    assert transient_length(np.ones(10), 10) == -1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_cut_has_the_least_standard_error(seed):
+    """By the rule as it is written: the variance of what is left over its length."""
+    rng, n = np.random.default_rng([seed, 3]), 300
+    series = 1.0 + 3.0 * np.exp(-np.arange(n) / rng.uniform(5.0, 60.0)) + autoregressive(rng, n, 0.4)
+    errors = [np.var(series[cut:]) / (n - cut) for cut in range(n - 20)]
+    least = int(np.argmin(errors))
+    assert transient_length(np.append(series, np.nan), n) == (least if least <= n // 2 else -1)
 
 
 @pytest.mark.parametrize(("frequency_ratio", "tolerance"), [(0.96, 0.01), (0.985, 0.01), (1.0, 0.06)])
