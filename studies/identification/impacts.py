@@ -12,7 +12,7 @@ from vanedamp.coupling.derivatives.passage import Crossing
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Follower, map_of, run
+from vanedamp.studies.identification.steady import Follower, Steady, map_of, run
 from vanedamp.studies.identification.study import IdentificationStudy
 
 
@@ -25,19 +25,20 @@ class Impacts(Model):
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by the motion in which a run from the scene's own start ends."""
-        motion = run(self.runs, self.numbers(values), None, self.count)
+        return self._of(run(self.runs, self.numbers(values), None, self.count))
+
+    def predict(self, values: np.ndarray) -> Predicted:
+        """Return the prediction by the motion near the last one, or that of the scene's own start."""
+        return self._of(self.followers[0].follow(self.numbers(values)))
+
+    def _of(self, motion: Steady | None) -> Predicted:
+        """Return the prediction by a motion."""
+        if motion is not None and motion.orbit is not None and motion.orbit.map is not None:
+            return self._predicted(motion.orbit.passage.impacts, _length(motion.orbit.map))
         if motion is None or (passages := map_of(self.runs, motion)) is None:
             return self._predicted((), math.nan)
         self.count["passages"] += 1
         return self._predicted(passages[0](passages[1], False).impacts, _length(passages[0]))
-
-    def predict(self, values: np.ndarray) -> Predicted:
-        """Return the prediction by the orbit near the last one, or by a run."""
-        self.followers[0].follow(self.numbers(values))
-        orbit = self.followers[0].orbit()
-        if orbit is None or orbit.map is None:
-            return self._predicted((), math.nan)
-        return self._predicted(orbit.passage.impacts, _length(orbit.map))
 
     def _predicted(self, struck: Sequence[Crossing], period: float) -> Predicted:
         """Return the prediction by the impacts of a motion that repeats after a period, s."""

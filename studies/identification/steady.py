@@ -23,6 +23,8 @@ from vanedamp.coupling.sweep.runs import Ran, Runs
 
 #: ends of runs whose figures count, with their confidence interval
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
+#: runs until a motion repeats itself, amplitudes that tell it, and their difference, relative, that is none
+_MORE, _REPEATED, _SAME = 8, ("amplitude_mean", "amplitude_max", "amplitude_harmonic"), 1e-12
 
 
 class Steady(NamedTuple):
@@ -66,7 +68,7 @@ class Follower:
         """
         self.motion = None if self.leader is None else self.beside(numbers)
         if self.motion is None:
-            self.motion = settled(self._runs, run(self._runs, numbers, before, self._count), self._count)
+            self.motion = repeated(self._runs, run(self._runs, numbers, before, self._count), self._count)
             self.lead()
         return self.motion
 
@@ -99,6 +101,28 @@ def run(runs: Runs, numbers: Mapping[str, float], start: RestartState | None, co
     count["runs"] += 1
     response = runs.run(numbers, start)
     return Steady(numbers, None, response) if response is not None and response.status in _USABLE else None
+
+
+def repeated(runs: Runs, steady: Steady | None, count: Counter[str]) -> Steady | None:
+    """Return the motion in which a run has ended, after more runs until these repeat it; its orbit where they do not.
+
+    A thousand periods take less than one passage of Newton's method.
+    """
+    for _ in range(_MORE):
+        if steady is None or steady.response is None or not steady.repeats or steady.response.final is None:
+            return steady
+        again = run(runs, steady.numbers, steady.response.final, count)
+        if again is None or again.response is None or not again.repeats:
+            break
+        same = all(
+            abs(getattr(again.response, name) - getattr(steady.response, name))
+            <= _SAME * abs(again.response.amplitude_max)
+            for name in _REPEATED
+        )
+        steady = again
+        if same:
+            return steady
+    return settled(runs, steady, count)
 
 
 def map_of(runs: Runs, steady: Steady) -> tuple[PeriodMap, np.ndarray] | None:
