@@ -97,6 +97,8 @@ _FILES = (
     ("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"),
     *(("structure", "mistuning", name, "file") for name in DEVIATIONS),
 )  # fmt: skip
+#: paths of these keys
+FILE_PATHS = tuple(map(".".join, _FILES))
 #: fewest periods that tell Lyapunov exponents
 LEAST_EXPONENTS = 32
 #: keys of the [sweep] table that are no axes: their least values, and what they mean
@@ -560,7 +562,7 @@ class Scene(OpenRecord, Displayed):
     def files(self) -> list[str]:
         """The files that the scene and its sweep name."""
         own = [table[key] for table, key in _named_files(self.to_dict())]
-        swept = [self.axes.get(".".join(place), ()) for place in _FILES]
+        swept = [self.axes.get(path, ()) for path in FILE_PATHS]
         return own + [str(file) for files in swept if not isinstance(files, Range) for file in files]
 
     @property

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ from vanedamp.coupling.response.restart import marked_with_speed, start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.paths import with_numbers
 from vanedamp.coupling.scene.rotation import FREQUENCY
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.scene.scene import FILE_PATHS, Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import PARTS, Row
@@ -80,7 +79,7 @@ class Kind:
         """Run scenes (k,). Return the job with their results, linear amplitudes (k, 2), and the state they leave.
 
         values: of all paths; start: of the first of linked scenes; alone: runs scenes that compiled code refuses, whose
-        codes stay 0; keep: takes the sections of every other one, before the next begins.
+        codes stay 0; keep: takes what is kept of every other one, before the next begins.
         """
         run, size = self.run, len(next(iter(values.values())))
         table, fits = self._columns(values, start, size, linked)
@@ -188,21 +187,29 @@ class _Kept(threading.local):
 _KEPT = _Kept()
 
 
-def made_of(maker: Points) -> bytes:
-    """Return what the kinds of a maker's points have in common."""
-    structure = maker.base.structure
-    stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
-    return pickle.dumps((maker.base, maker.choices, stamp))
+class Common(NamedTuple):
+    """What the kinds of a maker's points have in common: scene and choices as bytes, and the files that it names."""
+
+    made_of: bytes
+    files: list[str]
+
+    @classmethod
+    def of(cls, maker: Points) -> Common:
+        """Return that of a maker."""
+        return cls(pickle.dumps((maker.base, maker.choices)), maker.base.files)
 
 
-def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: bytes = b"") -> Kind | None:
+def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: Common | None = None) -> Kind | None:
     """Return the kind of a point's scene; None where it has to be run by itself. The last ones are kept.
 
-    common: made_of(maker), where it is known.
+    common: of the maker, where it is known.
     """
+    common = common or Common.of(maker)
     slow = {path: value for path, value in point.items() if path not in paths}
     above = [point[path] > 0.0 for path in paths if tells(path)]
-    key, kinds = (common or made_of(maker)) + pickle.dumps((slow, paths, above)), _KEPT.kinds
+    files = [*common.files, *(value for path, value in slow.items() if path in FILE_PATHS)]
+    key = common.made_of + pickle.dumps((slow, paths, above, [file_stamp(file) for file in files]))
+    kinds = _KEPT.kinds
     if key in kinds:
         kinds[key] = kinds.pop(key)
         return kinds[key]

@@ -23,7 +23,7 @@ from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import Kind, ended_as, kind_of, made_of, without_starts
+from vanedamp.coupling.sweep.alike import Common, Kind, ended_as, kind_of, without_starts
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import InputError
@@ -51,7 +51,7 @@ class Runs:
 
     def __init__(self, base: Scene, paths: Iterable[str]) -> None:
         self._maker, self._paths = Points(base), without_starts(columned(base, paths))
-        self._common, self._whole = made_of(self._maker), not Row(base).keeps
+        self._common, self._whole = Common.of(self._maker), not Row(base).keeps
 
     def scene(self, numbers: Mapping[str, float]) -> Scene | None:
         """Return the scene with numbers; None where they make none."""

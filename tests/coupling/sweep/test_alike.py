@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -127,6 +128,28 @@ def test_points_of_a_ring_are_those_run_one_by_one(tmp_path, monkeypatch):
     found = run_points(scene, NOTHING, points, task)
     np.testing.assert_array_equal(found.values, one_by_one.values)
     assert found.texts == one_by_one.texts and not runs
+
+
+def test_files_that_have_changed_are_read_again(tmp_path, monkeypatch):
+    """A model, and the deviations of its sectors, under the names that they had."""
+    file, deviations = Chain(sectors=6, damping_ratio=0.01).saved(tmp_path), tmp_path / "deviations.csv"
+    tables = {
+        "structure": {"model": "ring", "file": file, "mistuning": {"stiffness": {"file": str(deviations)}}},
+        "excitation": {"frequency": 5.0, "force": 25.0, "at": "tip", "wave": 2},
+        "cavity": [{"name": "c", "gap": 1e-4, "floor": "tip", "sectors": "all"}],
+        "damper": [{"cavity": "c", "mass": 0.01, "friction": 0.2, "restitution": 0.6}],
+        "time": {"periods": 30, "transient": 20},
+    }
+    points, found = [{"excitation.frequency": f} for f in (5.0, 5.2)], []
+    for size, stiffness in ((0.01, 1.0), (0.02, 1.0), (0.02, 1.1)):
+        rows = [f"{sector},{size * (-1) ** sector}" for sector in range(6)]
+        deviations.write_text("\n".join(["sector,deviation", *rows]), encoding="utf-8")
+        chain = Chain(sectors=6, damping_ratio=0.01)
+        dataclasses.replace(chain, stiffness=stiffness * chain.stiffness).saved(tmp_path)
+        scene = validate(Scene, tables, "scene")
+        found.append(run_points(scene, NOTHING, points, Task(range(2))).values)
+        np.testing.assert_array_equal(found[-1], _alone(monkeypatch, scene, points, Task(range(2))).values)
+    assert not np.array_equal(found[0], found[1]) and not np.array_equal(found[1], found[2])
 
 
 def test_a_point_beyond_a_wall_is_refused_as_by_itself(monkeypatch):
