@@ -74,14 +74,15 @@ class PeriodMap:
         return Frame(self.scene, self.speed, begin=self.begin)
 
     @cached_property
-    def _dynamics(self) -> Dynamics:
+    def dynamics(self) -> Dynamics:
+        """The flows of the scene that runs."""
         return Dynamics(self._frame, self.scale)
 
     @cached_property
     def _numbers(self) -> Numbers | None:
         if not self.numbers:
             return None
-        return numbers_of(self.given, self.numbers, self._dynamics, derived=self.made)
+        return numbers_of(self.given, self.numbers, self.dynamics, derived=self.made)
 
     @cached_property
     def _event_names(self) -> EventNames:
@@ -118,7 +119,7 @@ class PeriodMap:
             reuse_subsystems(run, earlier)
         self._earlier[:] = [run]
         numbers = self._numbers if derivative else None
-        walk = PassageWalk(self._dynamics, self._event_names, state, derivative, numbers, part=part, short=short)
+        walk = PassageWalk(self.dynamics, self._event_names, state, derivative, numbers, part=part, short=short)
         return walk.passage(run, periods), walk.reached
 
     def at(self, value: float) -> PeriodMap:
@@ -131,7 +132,17 @@ class PeriodMap:
 
     def over(self, periods: int) -> PeriodMap:
         """Return the map of the same scene over another number of periods."""
-        return replace(self, periods=periods)
+        return self._with_equations(periods=periods)
+
+    def by(self, numbers: tuple[str, ...]) -> PeriodMap:
+        """Return the same map, whose passages have derivatives by numbers of the scene, by their paths."""
+        return self._with_equations(numbers=numbers)
+
+    def _with_equations(self, **changes: Any) -> PeriodMap:
+        """Return the map with fields changed that its equations do not depend on."""
+        found = replace(self, **changes)
+        found.__dict__.update({name: getattr(self, name) for name in ("scene", "_frame", "dynamics", "_event_names")})
+        return found
 
     @property
     def length(self) -> float:

@@ -123,7 +123,7 @@ class Problem:
         """Return the derivative (k, n) of the residual by the first scaled numbers, or all; nan where it is unknown."""
         paths = self.paths[:count]
         try:
-            passage = self._walked(replace(self.at(y), numbers=paths), y, True)
+            passage = self._walked(self.at(y).by(paths), y, True)
         except (InputError, NotSmooth):
             return np.full((self.size, len(paths)), np.nan)
         return np.asarray(passage.by_number / self.weight[:, None] * self.span[:count])

@@ -53,19 +53,19 @@ class Motion:
     """A motion of a scene from a state (k,), to be passed with its derivatives.
 
     derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
-    (numbers.StartOf); speed, scale, begin: as in PeriodMap. Raises InputError, and NotSmooth.
+    (numbers.StartOf); speed: as in Frame; dynamics: of the scene that runs, where they are known. Raises InputError,
+    and NotSmooth.
     """
 
     def __init__(
         self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
-        begins: StartOf | None = None, speed: float | None = None, scale: np.ndarray | None = None, begin: float = 0.0,
+        begins: StartOf | None = None, speed: float | None = None, dynamics: Dynamics | None = None,
     ) -> None:  # fmt: skip
-        self.scene = derived(scene)
-        self.frame = Frame(self.scene, speed, begin=begin)
-        if scale is None:
-            scale = self._sizes(None if begins is None else begins(scene, self.frame))
-        self.dynamics = Dynamics(self.frame, scale)
-        self.completed = False
+        self.frame = Frame(derived(scene), speed) if dynamics is None else dynamics.frame
+        self.scene, self.completed = self.frame.scene, False
+        if dynamics is None:
+            dynamics = Dynamics(self.frame, self._sizes(None if begins is None else begins(scene, self.frame)))
+        self.dynamics = dynamics
         self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, begins, derived)
 
     def _sizes(self, start: np.ndarray | None) -> np.ndarray:

@@ -40,7 +40,7 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     if orbit.status is not OrbitStatus.OK or orbit.map is None:
         raise NoDerivative(SensitivityStatus.STOPPED, f"no orbit was found: {orbit.status.value}")
     assert orbit.section.map is not None
-    motion = _motion(orbit.section.map, paths, orbit.scale)
+    motion = _motion(orbit.section.map, paths)
     turns, known, neutral = _moved(orbit, motion)
     found = _followed(orbit, motion, turns, paths, options, known)
     count, others = len(motion.numbers), list[Sensitivity]()
@@ -66,7 +66,7 @@ def _followed(
         left = periods - section.later
         rest = motion.passed(state, turns, math.ceil(left), part=left)
         state, turns = orbit.state, rest.by_number
-        motion = _motion(orbit.map, paths, orbit.scale)
+        motion = _motion(orbit.map, paths)
     measures = Measures(motion.dynamics, motion.numbers, 0, **options)
     # of the motions beside this one only those by the numbers count
     passage = motion.passed(state, turns, periods, measures, True)
@@ -108,10 +108,9 @@ def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.nd
     )  # fmt: skip
 
 
-def _motion(period_map: PeriodMap, paths: Paths, scale: np.ndarray) -> Motion:
+def _motion(period_map: PeriodMap, paths: Paths) -> Motion:
     """Return the motion of a period map's scene from its section."""
-    moved = period_map.made, None, period_map.speed, scale, period_map.begin
-    return Motion(period_map.given, paths, *moved)
+    return Motion(period_map.given, paths, period_map.made, dynamics=period_map.dynamics)
 
 
 def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:
