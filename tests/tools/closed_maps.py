@@ -74,6 +74,9 @@ class ClosedMap:
             raise InputError(f"scene: value: {self.lowest:g} is the least")
         return replace(self, value=(first, *more) if more else first)
 
+    def by(self, numbers: tuple[str, ...]) -> ClosedMap:
+        return replace(self, numbers=numbers)
+
     def over(self, periods: int) -> ClosedMap:
         return replace(self, periods=periods)
 
@@ -167,6 +170,9 @@ class ImpactOscillator:
 
     def with_numbers(self, values: dict[str, float]) -> ImpactOscillator:
         return replace(self, value=values[self.parameter])
+
+    def by(self, numbers: tuple[str, ...]) -> ImpactOscillator:
+        return replace(self, numbers=numbers)
 
     def over(self, periods: int) -> ImpactOscillator:
         return replace(self, periods=periods)

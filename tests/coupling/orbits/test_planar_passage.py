@@ -123,7 +123,7 @@ def test_matches_a_fixed_sequence_in_40_digits(case):
 
 def directions(found, x):
     """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
-    frame, dynamics = found._frame, found._dynamics
+    frame, dynamics = found._frame, found.dynamics
     start = found.restart_of(x)
     segment = next(iter(Walk(engine_run(frame.system, start, new_records(frame.system, 1, 0), True, 100), 1)))
     u = np.zeros(len(dynamics.turn))
