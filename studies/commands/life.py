@@ -6,7 +6,6 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_life
 from vanedamp.studies.commands.support.messages import write_result
@@ -34,8 +33,6 @@ def run(arguments: Namespace) -> None:
     # times are not kept in the result, which is the same however it came about
     data = record.to_json() | {"wall_time_s": seconds}
     write_result(arguments, data, _summary(record, seconds), output=record.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
 
 
 def _summary(record: LifeRecord, seconds: float) -> Iterator[str]:

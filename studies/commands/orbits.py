@@ -9,9 +9,7 @@ from collections.abc import Iterator
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.commands.support.budget import check_run
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
@@ -31,9 +29,6 @@ def run(arguments: Namespace, scene: Scene) -> None:
     # times are not kept in the result, which is the same however it came about
     data = result.to_json() | {"wall_time_s": seconds} | resonance
     write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
-        clear_leftovers(arguments.output)
 
 
 def _summary(result: Branches, seconds: float) -> Iterator[str]:

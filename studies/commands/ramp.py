@@ -10,7 +10,6 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
@@ -30,8 +29,6 @@ def run(arguments: Namespace, scene: Scene) -> None:
     # times are not kept in the result, which is the same however it came about
     data = result.to_json() | {"wall_time_s": seconds} | resonance
     write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
 
 
 def _summary(result: Ramp, seconds: float) -> Iterator[str]:

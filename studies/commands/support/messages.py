@@ -8,7 +8,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from vanedamp.coupling.response.response import Response
-from vanedamp.files.store import finite, json_text, together, write_json
+from vanedamp.files.checkpoint_file import clear
+from vanedamp.files.store import clear_leftovers, finite, json_text, together, write_json
 from vanedamp.studies.headline import without_round_off
 
 
@@ -19,7 +20,7 @@ def write_result(
     warnings: Collection[str] = (),
     **files: Callable[[str], object],
 ) -> None:
-    """Write the results of a command. All files appear together, or none.
+    """Write the results of a command. All files appear together, or none; then its checkpoint has served.
 
     result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
     lines: for people, on standard output
@@ -41,6 +42,9 @@ def write_result(
     if target != "-":
         for line in lines:
             print(line)
+    if getattr(arguments, "checkpoint", None) is not None:
+        clear(arguments.checkpoint)
+        clear_leftovers(arguments.output)
 
 
 def print_note(source: str, message: str) -> None:
