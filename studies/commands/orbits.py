@@ -11,7 +11,7 @@ from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.messages import write_timed
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
@@ -25,10 +25,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     compile_engine([scene])
     with progress("orbits") as report:
         result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
-    seconds = time.perf_counter() - started
-    # times are not kept in the result, which is the same however it came about
-    data = result.to_json() | {"wall_time_s": seconds} | resonance
-    write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
+    write_timed(arguments, result, started, _summary, result.warnings, resonance)
 
 
 def _summary(result: Branches, seconds: float) -> Iterator[str]:

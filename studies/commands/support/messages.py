@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+import time
 from argparse import Namespace
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from vanedamp.coupling.response.response import Response
@@ -45,6 +47,19 @@ def write_result(
     if getattr(arguments, "checkpoint", None) is not None:
         clear(arguments.checkpoint)
         clear_leftovers(arguments.output)
+
+
+def write_timed(
+    arguments: Namespace, record: Any, started: float, summary: Callable[[Any, float], Iterable[str]],
+    warnings: Collection[str] = (), more: Mapping[str, Any] = MappingProxyType({}),
+) -> None:  # fmt: skip
+    """Write the results of a command that has worked on a record since `started` (time.perf_counter).
+
+    summary: lines of the record and the seconds, which the record does not keep: it is the same however it came about.
+    """
+    seconds = time.perf_counter() - started
+    data = record.to_json() | {"wall_time_s": seconds} | dict(more)
+    write_result(arguments, data, summary(record, seconds), warnings, output=record.save)
 
 
 def print_note(source: str, message: str) -> None:
