@@ -18,9 +18,7 @@ from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, Points, grid
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep, warm_up
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import clear_leftovers
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.terminal import progress, stage
@@ -131,10 +129,3 @@ def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable
     response.save(path, {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()})
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
     note(f"--peak: {path} is the run at {at}")
-
-
-def finish(prepared: Prepared, output: str | Path | None) -> None:
-    """Remove the checkpoint of a sweep whose result is safe."""
-    if prepared.checkpoint is not None and output is not None:
-        clear(prepared.checkpoint)
-        clear_leftovers(output)

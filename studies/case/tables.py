@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -74,6 +74,13 @@ class MeshFile:
 class _Generated:
     """Base of meshes by a generator, whose parameters are keys of [mesh], as its own are."""
 
+    generator: Any
+    parameters: Any
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what `build` of its generator in meshes raises."""
+        return _BUILD[self.generator](self.parameters, path)
+
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         made = handler(schema)
@@ -94,10 +101,6 @@ class VaneClusterMesh(_Generated):
     degree: Degree = 2
     """polynomial degree of the displacements"""
 
-    def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises what meshes.vane_cluster.build raises."""
-        return vane_cluster.build(self.parameters, path)
-
 
 @dataclass(frozen=True, config=STRICT)
 class BlockMesh(_Generated):
@@ -109,10 +112,6 @@ class BlockMesh(_Generated):
     degree: Degree = 2
     """polynomial degree of the displacements"""
 
-    def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises what meshes.benchmarks.build raises."""
-        return benchmarks.build(self.parameters, path)
-
 
 @dataclass(frozen=True, config=STRICT)
 class SectorMesh(_Generated):
@@ -123,10 +122,6 @@ class SectorMesh(_Generated):
     parameters: Sector
     degree: Degree = 2
     """polynomial degree of the displacements"""
-
-    def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises what meshes.sector.build raises."""
-        return sector.build(self.parameters, path)
 
 
 #: keys that name a file: the mesh, and measurements
@@ -141,6 +136,11 @@ FILES = (
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block, "sector": Sector}
+_BUILD: dict[str, Callable[[Any, str | Path], Path]] = {
+    "vane_cluster": vane_cluster.build,
+    "block": benchmarks.build,
+    "sector": sector.build,
+}
 
 
 def _kind(table: Any) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
 from vanedamp.studies.case.calibration import calibrate
 from vanedamp.studies.case.tables import Case
@@ -24,8 +23,6 @@ def run(arguments: Namespace, case: Case) -> None:
         case=partial(save_tuned_case, arguments.input, calibration),
         scene=partial(save_rigid_scene, arguments.input, calibration),
     )  # fmt: skip
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:

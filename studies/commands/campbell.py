@@ -7,7 +7,6 @@ from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
@@ -35,8 +34,6 @@ def run(arguments: Namespace, case: Case) -> None:
 
     result = diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}
     write_result(arguments, result, _summary(diagram, seconds), warnings, output=diagram.save, picture=picture)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
 
 
 def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:

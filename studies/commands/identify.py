@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import partial
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import write_csv
 from vanedamp.files.toml_input import InputError, read_toml
@@ -37,10 +36,10 @@ def run(arguments: Namespace) -> None:
             found = identify(
                 study, pool, report, {"versions": versions()}, arguments.checkpoint, budget=arguments.budget
             )
+    if found.status is IdentificationStatus.BUDGET:
+        arguments.checkpoint = None  # stays, to be resumed from
     lines = _summary(found)
     write_result(arguments, found.to_json(), lines, found.notes, output=found.save, scene=found.save_scene)
-    if arguments.checkpoint is not None and found.status is not IdentificationStatus.BUDGET:
-        clear(arguments.checkpoint)
 
 
 def _deviations(arguments: Namespace) -> None:

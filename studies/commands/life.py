@@ -6,10 +6,9 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_life
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.messages import write_timed
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.life.life import life
 from vanedamp.studies.life.record import LifeRecord
@@ -30,12 +29,7 @@ def run(arguments: Namespace) -> None:
         compile_engine([study.scene], pool)
         with progress("life") as report:
             record = life(study, pool, report, {"versions": versions()}, arguments.checkpoint)
-    seconds = time.perf_counter() - started
-    # times are not kept in the result, which is the same however it came about
-    data = record.to_json() | {"wall_time_s": seconds}
-    write_result(arguments, data, _summary(record, seconds), output=record.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
+    write_timed(arguments, record, started, _summary)
 
 
 def _summary(record: LifeRecord, seconds: float) -> Iterator[str]:

@@ -6,10 +6,9 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.studies.commands.support.budget import check_optimise
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.messages import write_timed
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
@@ -32,12 +31,7 @@ def run(arguments: Namespace) -> None:
         )
         with progress("optimise") as report:
             optimisation = optimise(study, pool, report, {"versions": versions()}, arguments.checkpoint)
-    seconds = time.perf_counter() - started
-    # times are not kept in the result, which is the same however it came about
-    data = optimisation.to_json() | {"wall_time_s": seconds}
-    write_result(arguments, data, _summary(optimisation, seconds), study.doubts, output=optimisation.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
+    write_timed(arguments, optimisation, started, _summary, study.doubts)
 
 
 def _summary(optimisation: Optimisation, seconds: float) -> Iterator[str]:

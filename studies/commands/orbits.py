@@ -9,11 +9,9 @@ from collections.abc import Iterator
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.messages import write_timed
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.sweep_steps import compile_engine
 from vanedamp.studies.terminal import progress
@@ -27,13 +25,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     compile_engine([scene])
     with progress("orbits") as report:
         result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
-    seconds = time.perf_counter() - started
-    # times are not kept in the result, which is the same however it came about
-    data = result.to_json() | {"wall_time_s": seconds} | resonance
-    write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
-        clear_leftovers(arguments.output)
+    write_timed(arguments, result, started, _summary, result.warnings, resonance)
 
 
 def _summary(result: Branches, seconds: float) -> Iterator[str]:

@@ -10,9 +10,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.messages import write_timed
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.sweep_steps import compile_engine
@@ -26,12 +25,7 @@ def run(arguments: Namespace, scene: Scene) -> None:
     compile_engine([ramped(scene)])
     with progress("ramp") as report:
         result = ramp(scene, report, {"versions": versions()}, arguments.checkpoint)
-    seconds = time.perf_counter() - started
-    # times are not kept in the result, which is the same however it came about
-    data = result.to_json() | {"wall_time_s": seconds} | resonance
-    write_result(arguments, data, _summary(result, seconds), result.warnings, output=result.save)
-    if arguments.checkpoint is not None:
-        clear(arguments.checkpoint)
+    write_timed(arguments, result, started, _summary, result.warnings, resonance)
 
 
 def _summary(result: Ramp, seconds: float) -> Iterator[str]:

@@ -16,7 +16,7 @@ from vanedamp.studies.commands.support.scenes import print_choices, print_resona
 from vanedamp.studies.report.designs import Design, designs
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.sector_charts import ring_sentence
-from vanedamp.studies.sweep_steps import PEAK_SAMPLES, doubts, finish, prepare, run_peak, run_points
+from vanedamp.studies.sweep_steps import PEAK_SAMPLES, doubts, prepare, run_peak, run_points
 from vanedamp.studies.workers import available_cores, workers
 
 #: designs whose headlines are printed
@@ -55,7 +55,6 @@ def run(arguments: Namespace, scene: Scene) -> None:
     ]
     found = [warning for warning in result.provenance.get("warnings", ()) if warning not in points.warnings]
     write_result(arguments, result.to_json() | speed | resonance | told, lines, found)
-    finish(prepared, arguments.output)
 
 
 def _summary(result: Sweep, judged: Sequence[Design]) -> Iterator[str]:

@@ -14,10 +14,10 @@ from vanedamp.studies.report.charts import COLOURS
 GREY, DARK = "#94a3b8", "#475569"
 
 
-def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linear: str | None = None) -> None:
-    """Draw forced responses by their labels, with the undamped and fixed curves of one (default: the first)."""
+def responses_picture(curves: Mapping[str, Curve], title: str, path: Path) -> None:
+    """Draw forced responses by their labels, with the undamped and fixed curves of the first."""
     figure, axes = subplots(size=(9.5, 5.2))
-    draw_linear(axes, curves[linear or next(iter(curves))])
+    draw_linear(axes, next(iter(curves.values())))
     for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
         draw_damped(axes, curve, label, colour)
     finish(axes, title)

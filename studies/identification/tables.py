@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
@@ -59,6 +59,10 @@ class MeasuredTable:
     """standard deviation of an amplitude, a speed or a quantity, relative (default, without `deviation`: from the
     residuals) [-]"""
 
+    def __post_init__(self) -> None:
+        if self.noise is not None and getattr(self, "deviation", None) is not None:
+            raise ValueError("give one of noise (relative) and deviation")
+
 
 @dataclass(frozen=True, config=STRICT)
 class ForcedTable(MeasuredTable):
@@ -74,9 +78,6 @@ class ForcedTable(MeasuredTable):
     """standard deviation of the amplitude or quantity in place of a relative one [its unit]"""
     phase_deviation: Positive | None = None
     """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
-
-    def __post_init__(self) -> None:
-        _one_noise(self)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -95,9 +96,6 @@ class SineSweepTable(MeasuredTable):
     phase_deviation: Positive | None = None
     """standard deviation of a phase (default: as the relative one of the amplitude) [rad]"""
 
-    def __post_init__(self) -> None:
-        _one_noise(self)
-
 
 @dataclass(frozen=True, config=STRICT)
 class DecayTable(MeasuredTable):
@@ -106,9 +104,6 @@ class DecayTable(MeasuredTable):
 
     deviation: Positive | None = None
     """standard deviation of an amplitude in place of a relative one, or of a history [unit of the column]"""
-
-    def __post_init__(self) -> None:
-        _one_noise(self)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -119,14 +114,6 @@ class ImpactsTable(MeasuredTable):
     """standard deviation of a speed in place of a relative one [m/s]"""
     time_deviation: Positive | None = None
     """standard deviation of a time (default: from the residuals) [s]"""
-
-    def __post_init__(self) -> None:
-        _one_noise(self)
-
-
-def _one_noise(table: Any) -> None:
-    if table.noise is not None and table.deviation is not None:
-        raise ValueError("give one of noise (relative) and deviation")
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -11,8 +11,9 @@ A kind is a folder named like the attribute `kind` of its HDF5 files (with _ for
 and whose `page.py`, which draws, has
 
     load(path)                read a file; returns a studies.report.results.Result. Without: by `load` of RECORD
-    section(results, page)    the data of page.html; results: of the kind, by the path of their file, page: a
+    shown(file, record, page) what page.html shows of a result, of which its `section` is the list; page: a
                               studies.report.page.Page, which makes the charts
+    section(results, page)    in place of it, of all results of the kind by the path of their file
     ORDER                     place on the page
     figure(record)            what `vanedamp.plot` shows of the record that `load` read, or that a command returns
 

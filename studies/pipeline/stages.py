@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import digest, load
+from vanedamp.files.store import clear_leftovers, digest, load
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.case.tables import Case, check_interface, without_strengths
 from vanedamp.studies.hot_spots import level_warnings
@@ -228,7 +228,7 @@ class Identify(Stage):
     def _named(self) -> list[Path]:
         """Return the files that the study names."""
         tables = read_toml(self.file)
-        measured = [entry for kind in ("forced", "decay", "impacts") for entry in tables.get(kind, ())]
+        measured = [entry for table in tables.values() if isinstance(table, list) for entry in table]
         return [self.file.parent / name for name in (tables["scene"], *(entry["file"] for entry in measured))]
 
     def inputs(self) -> dict[str, Any]:
@@ -295,7 +295,7 @@ class Sweep(Stage):
         from vanedamp.files.checkpoint_file import clear
         from vanedamp.studies.report.designs import designs
         from vanedamp.studies.report.forced_response import forced_responses
-        from vanedamp.studies.sweep_steps import doubts, finish, prepare, run_peak, run_points
+        from vanedamp.studies.sweep_steps import doubts, prepare, run_peak, run_points
 
         scene = self._scene()
         assert scene is not None
@@ -313,7 +313,8 @@ class Sweep(Stage):
         if self.table.peak:
             peak = self.outputs[1]
             run_peak(prepared, result, peak, lambda text: tools.note(text.replace(str(peak), peak.name)))
-        finish(prepared, self.outputs[0])
+        clear(checkpoint)
+        clear_leftovers(self.outputs[0])
         bad = int((result.status != "ok").sum())
         told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
         best = [design for design in designs(forced_responses(result)) if design.worst.reference > 0]

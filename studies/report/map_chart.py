@@ -55,11 +55,11 @@ def map_figure(sweep: Sweep) -> go.Figure:
     return figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
 
 
-def map_panels(sweep: Sweep) -> list[Panel]:
-    """Return the panels of a sweep's map."""
+def map_panels(sweep: Sweep, two: tuple[str, str] | None = None) -> list[Panel]:
+    """Return the panels of a sweep's map, over its own axes or two others."""
     tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
     relative = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
-    return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep))
+    return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), two or map_axes(sweep))
 
 
 #: name, values of the horizontal and vertical axes, and of the map (vertical, horizontal)

@@ -174,7 +174,7 @@ def motion_of(
     plane = plane.cut(frames)
     time, forms, half = time[frames], _forms(scene, plane), _half_extents(scene)
     factor = _factor(scene, half)
-    widths = [sum(2 * half[k][0] for k in _inside(scene, cavity)) for cavity in scene.cavity]
+    widths = [sum(2 * half[k][0] for k in scene.bodies_in(cavity)) for cavity in scene.cavity]
     swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
     draw = _Drawing(scene, plane, along[frames], forms, half, factor, swing, _WIDTH / max(widths))
     light = np.where(plane.contact_closed, CLOSED, OPEN)
@@ -182,7 +182,7 @@ def motion_of(
         recent = (time >= moment) & (time < moment + _FLASH * period)
         struck = np.array([other == place for other in plane.contacts])
         light[recent[:, None] & struck] = HIT
-    cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if _inside(scene, cavity)]
+    cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if scene.bodies_in(cavity)]
     return Motion(
         time / period, sampled // stride, displacement[frames], factor, swing, draw.scale, cavities, sampled,
     )  # fmt: skip
@@ -203,7 +203,7 @@ class _Drawing:
 
     def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityMotion:
         """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
-        inside = _inside(self.scene, cavity)
+        inside = self.scene.bodies_in(cavity)
         length = sum(2 * self.half[k][0] for k in inside)
         bodies, places, ceiling, at = [], [], [], -length / 2
         for k in inside:
@@ -315,11 +315,6 @@ def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points + np.stack([-turn * points[:, 1], turn * points[:, 0]], axis=2)
 
 
-def _inside(scene: Scene, cavity: Cavity) -> list[int]:
-    """Return the numbers of the bodies in a cavity."""
-    return [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
-
-
 def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
     """Return as what each body ran: one without tilt as a slider, an open shape that tilts as a block."""
     return [
@@ -340,7 +335,7 @@ def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
     """Return by how much free travels are exaggerated: as much as the drawing bears."""
     bounds = []
     for cavity in scene.cavity:
-        inside = _inside(scene, cavity)
+        inside = scene.bodies_in(cavity)
         if inside:
             bounds.append(_ALONG * sum(2 * half[k][0] for k in inside) / cavity.gap)
             bounds.append(_ACROSS * min(2 * half[k][1] for k in inside) / (cavity.play or 1e-300))

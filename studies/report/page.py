@@ -27,7 +27,7 @@ from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, Study
 from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.motion_page import environment
-from vanedamp.studies.report.results import Results, Section, format_setting, sections
+from vanedamp.studies.report.results import Result, Results, Section, format_setting, sections
 from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
@@ -93,7 +93,7 @@ class Page:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
                     name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
-                    shows = section.section(results, replace(self, study=name))
+                    shows = _shown(section, results, replace(self, study=name))
                     of = {"section": shows, "study": name, "title": title, "not_ok": not_ok, **moves}
                     blocks.append(self.environment.from_string(template.read_text(encoding="utf-8")).render(of))
         return "".join(blocks)
@@ -107,6 +107,13 @@ class Page:
         """Return the pieces that were put off, below their headings."""
         parts = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
         return "".join(itertools.chain.from_iterable(parts))
+
+
+def _shown(section: Section, results: Mapping[str, Result], page: Page) -> Any:
+    """Return the data of a section's template."""
+    if hasattr(section, "section"):
+        return section.section(results, page)
+    return [section.shown(file, result.record, page) for file, result in results.items()]
 
 
 def write_report(results: Results, path: str | Path, title: str | None = None) -> None:

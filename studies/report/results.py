@@ -56,6 +56,9 @@ class Section(Protocol):
     def section(self, results: Mapping[str, Result], page: Any) -> Any:
         """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
 
+    def shown(self, file: str, record: Any, page: Any) -> Any:
+        """Return the data of one result: ours have it in place of `section`, where the template's are a list of it."""
+
 
 @dataclass(frozen=True)
 class Results:

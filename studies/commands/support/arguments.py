@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentTypeError
-from collections.abc import Callable
 from functools import partial
 
 from vanedamp.studies.commands.support.declaration import Argument, argument
@@ -36,51 +35,26 @@ def mode_count(text: str) -> int | None:
     return None if text == "auto" else count(text)
 
 
-def ratio(text: str) -> float:
-    """Return a number between 0 and 1."""
-    return _number(text, "a number between 0 and 1", lambda value: 0.0 < value < 1.0)
-
-
-def hertz(text: str) -> float:
-    """Return a frequency."""
-    return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
-
-
-def rpm(text: str) -> float:
-    """Return a speed of rotation."""
-    return _number(text, "a speed in rpm", lambda value: 0.0 < value < math.inf)
-
-
 def order(text: str) -> int:
     """Return an engine order."""
     return count(text, 1)
 
 
-def metres_per_second(text: str) -> float:
-    """Return a speed."""
-    return _number(text, "a speed in m/s", lambda value: 0.0 < value < math.inf)
-
-
-def seconds(text: str) -> float:
-    """Return a time."""
-    return _number(text, "a time in s", lambda value: 0.0 < value < math.inf)
-
-
-def newtons(text: str) -> float:
-    """Return a force."""
-    return _number(text, "a force in N", lambda value: 0.0 < value < math.inf)
-
-
-def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
+def number(text: str, expected: str, below: float = math.inf) -> float:
+    """Return a positive number."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not fits(value):
+    if not 0.0 < value < below:
         raise ArgumentTypeError(f"expected {expected}, not {text!r}")
     return value
 
 
+ratio = partial(number, expected="a number between 0 and 1", below=1.0)
+hertz, rpm = partial(number, expected="a frequency in Hz"), partial(number, expected="a speed in rpm")
+metres_per_second, seconds = partial(number, expected="a speed in m/s"), partial(number, expected="a time in s")
+newtons = partial(number, expected="a force in N")
 #: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
 spot_count = partial(count, most=1000)
 #: a number of families of modes

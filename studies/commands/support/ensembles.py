@@ -13,7 +13,6 @@ from vanedamp.coupling.ensembles.members import members
 from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.budget import check_sweep
@@ -61,8 +60,6 @@ def run_ensemble(arguments: Namespace, scene: Scene) -> None:
     ]
     found = [warning for warning in result.provenance.get("warnings", ()) if warning not in points.grid.warnings]
     write_result(arguments, result.to_json() | speed | resonance, lines, found, output=result.save)
-    if checkpoint is not None:
-        clear(checkpoint)
 
 
 def _at_one_frequency(result: Ensemble) -> Iterator[str]:

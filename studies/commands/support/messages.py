@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+import time
 from argparse import Namespace
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from vanedamp.coupling.response.response import Response
-from vanedamp.files.store import finite, json_text, together, write_json
+from vanedamp.files.checkpoint_file import clear
+from vanedamp.files.store import clear_leftovers, finite, json_text, together, write_json
 from vanedamp.studies.headline import without_round_off
 
 
@@ -19,7 +22,7 @@ def write_result(
     warnings: Collection[str] = (),
     **files: Callable[[str], object],
 ) -> None:
-    """Write the results of a command. All files appear together, or none.
+    """Write the results of a command. All files appear together, or none; then its checkpoint has served.
 
     result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
     lines: for people, on standard output
@@ -41,6 +44,22 @@ def write_result(
     if target != "-":
         for line in lines:
             print(line)
+    if getattr(arguments, "checkpoint", None) is not None:
+        clear(arguments.checkpoint)
+        clear_leftovers(arguments.output)
+
+
+def write_timed(
+    arguments: Namespace, record: Any, started: float, summary: Callable[[Any, float], Iterable[str]],
+    warnings: Collection[str] = (), more: Mapping[str, Any] = MappingProxyType({}),
+) -> None:  # fmt: skip
+    """Write the results of a command that has worked on a record since `started` (time.perf_counter).
+
+    summary: lines of the record and the seconds, which the record does not keep: it is the same however it came about.
+    """
+    seconds = time.perf_counter() - started
+    data = record.to_json() | {"wall_time_s": seconds} | dict(more)
+    write_result(arguments, data, summary(record, seconds), warnings, output=record.save)
 
 
 def print_note(source: str, message: str) -> None:

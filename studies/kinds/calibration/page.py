@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +31,6 @@ def load(path: Path) -> Result:
     return Result(record, {"matrices": record.provenance, "versions": record.versions})
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return tables and charts of every calibration."""
-    return [_calibration(file, result.record, page) for file, result in results.items()]
-
-
 def figure(record: CalibrationRecord) -> go.Figure:
     """Draw the measured response with its fit, or else the tuned frequencies. Raises InputError without either."""
     if record.label:
@@ -46,7 +40,8 @@ def figure(record: CalibrationRecord) -> go.Figure:
     raise InputError("plot: there is no figure of a calibration without measurements")
 
 
-def _calibration(file: str, record: CalibrationRecord, page: Page) -> dict[str, Any]:
+def shown(file: str, record: CalibrationRecord, page: Page) -> dict[str, Any]:
+    """Return tables and charts of a calibration."""
     targets: list[dict[str, Any]] = []
     chart, response = None, None
     if record.part:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from vanedamp.modal.records.campbell import RPM, Campbell
 from vanedamp.studies.headline import format_margin
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 40
 _ORDER, _MARK = "#64748b", "#111827"
@@ -20,12 +18,8 @@ _ORDER, _MARK = "#64748b", "#111827"
 _DASHES = ("solid", "dot", "dashdot")
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return chart and tables of every diagram."""
-    return [_diagram(file, result.record, page) for file, result in results.items()]
-
-
-def _diagram(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
+def shown(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
+    """Return chart and tables of a diagram."""
     chart = page.chart("campbell", figure(diagram), *campbell_table(diagram), [file])
     solved = ", ".join(f"{speed * RPM:.6g}" for speed in diagram.solved)
     margins = [diagram.operating and format_margin(each.margin(diagram.operating)) for each in diagram.crossings]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import plotly.graph_objects as go
@@ -10,21 +9,16 @@ import plotly.graph_objects as go
 from vanedamp.rom.ring.identification import Identified
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 58
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the deviations of every ring with their chart."""
-    shown = []
-    for file, result in results.items():
-        found = result.record
-        rows = zip(range(len(found.stiffness)), found.stiffness.tolist(), found.errors.tolist(), strict=True)
-        header = ("sector", "deviation", "error")
-        chart = page.chart("deviations", dressed(figure(found), height=380), header, rows, [file])
-        shown.append({"file": file, "record": found, "chart": chart})
-    return shown
+def shown(file: str, record: Identified, page: Page) -> dict[str, Any]:
+    """Return the deviations of a ring with their chart."""
+    rows = zip(range(len(record.stiffness)), record.stiffness.tolist(), record.errors.tolist(), strict=True)
+    header = ("sector", "deviation", "error")
+    chart = page.chart("deviations", dressed(figure(record), height=380), header, rows, [file])
+    return {"file": file, "record": record, "chart": chart}
 
 
 def figure(record: Identified) -> go.Figure:

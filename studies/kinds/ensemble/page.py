@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from vanedamp.studies.kinds.ensemble.charts import (
     title,
 )
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 52
 figure = ensemble_figure
@@ -29,12 +28,8 @@ figure = ensemble_figure
 _MOST = 6
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every ensemble with its sentences, quantiles and charts."""
-    return [_ensemble(file, result.record, page) for file, result in results.items()]
-
-
-def _ensemble(file: str, record: Ensemble, page: Page) -> dict[str, Any]:
+def shown(file: str, record: Ensemble, page: Page) -> dict[str, Any]:
+    """Return the sentences, quantiles and charts of an ensemble."""
     shown, all_places = [], places(record)
     for place in all_places[:_MOST]:
         bands = bars = None

@@ -12,7 +12,7 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.identification.record import Identification, Proposal
 from vanedamp.studies.report.charts import COLOURS, axis_title
 
-_DARK, _PALE, _BAND = "#0f172a", "#94a3b8", "rgba(29, 79, 145, 0.18)"
+_PALE, _BAND = "#94a3b8", "rgba(29, 79, 145, 0.18)"
 #: panels side by side, and how far apart, as a fraction of the width: the titles of their axes lie between
 _COLUMNS, _APART = 3, 0.13
 #: rise of the misfit beyond which a profile is not drawn, over the threshold

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from vanedamp.studies.kinds.identification.charts import (
 )
 from vanedamp.studies.report.charts import Chart, Table, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 57
 figure = data_figure
@@ -35,12 +34,8 @@ _CORRELATIONS = "Correlations of the numbers."
 _NEXT = "The next measurement: what each would leave of the largest uncertainty."
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every identification with its numbers and charts."""
-    return [_identification(file, result.record, page) for file, result in results.items()]
-
-
-def _identification(file: str, record: Identification, page: Page) -> dict[str, Any]:
+def shown(file: str, record: Identification, page: Page) -> dict[str, Any]:
+    """Return numbers and charts of an identification."""
     return {
         "file": file, "record": record, "numbers": _numbers(record), "charts": list(_charts(file, record, page)),
         "next": None if record.proposal is None else proposal_text(record.paths, record.proposal),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,19 +10,14 @@ from vanedamp.studies.kinds.life.charts import life_figure
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.report.charts import dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength_charts import wear_figure
 
 ORDER = 57
 figure = life_figure
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every life with its charts and the wear of its contacts."""
-    return [_life(file, result.record, page) for file, result in results.items()]
-
-
-def _life(file: str, record: LifeRecord, page: Page) -> dict[str, Any]:
+def shown(file: str, record: LifeRecord, page: Page) -> dict[str, Any]:
+    """Return charts of a life and the wear of its contacts."""
     faces = record.faces
     depth = {name: record.depth[:, places].mean(axis=1) for name, places in faces.items()}
     rate = [float(record.depth_rate[0, places].mean()) for places in faces.values()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,13 @@ from vanedamp.studies.kinds.mistuning.charts import (
     sectors_table,
 )
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 16
 figure = amplification_figure
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return charts and table of every study."""
-    return [_study(file, result.record, page) for file, result in results.items()]
-
-
-def _study(file: str, study: MistuningStudy, page: Page) -> dict[str, Any]:
+def shown(file: str, study: MistuningStudy, page: Page) -> dict[str, Any]:
+    """Return charts and table of a study."""
     worst = int(np.argmax(study.amplification[:, 0]))
     sectors, drawn = sectors_figure(study, worst), None
     if len(study.seeds) > 1:

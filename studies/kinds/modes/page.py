@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +31,6 @@ def load(path: Path) -> Result:
     return Result((values, attributes), provenance)
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the tables of every modal analysis, and a chart or a picture of its first bending."""
-    return [_analysis(file, result.record, page) for file, result in results.items()]
-
-
 def figure(record: Modes | tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
     """Draw the modes of a file, which has the mesh. Raises InputError for a mesh with too large a surface."""
     if isinstance(record, Modes):
@@ -48,7 +42,8 @@ def figure(record: Modes | tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
     return mode_figure(values, surface, int(attributes.get("first_bending", 0)))
 
 
-def _analysis(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Page) -> dict[str, Any]:
+def shown(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Page) -> dict[str, Any]:
+    """Return the tables of a modal analysis, and a chart or a picture of its first bending."""
     values, attributes = record
     bending = int(attributes["first_bending"]) if "first_bending" in attributes else None
     chart, picture = None, None

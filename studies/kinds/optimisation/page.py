@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.report.charts import dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 55
 figure = optimisation_figure
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every optimisation with its optima and its chart."""
-    return [_optimisation(file, result.record, page) for file, result in results.items()]
-
-
-def _optimisation(file: str, record: Optimisation, page: Page) -> dict[str, Any]:
+def shown(file: str, record: Optimisation, page: Page) -> dict[str, Any]:
+    """Return the optima and their chart."""
     header = ("mass_ratio", "gap_ratio", "relative_amplitude")
     rows = (
         (mass, gap, record.map_amplitude[i, j])

@@ -12,10 +12,9 @@ from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
-from vanedamp.studies.headline import reference_of
 from vanedamp.studies.report.charts import Table, axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people
-from vanedamp.studies.report.map_chart import Panel, panels
+from vanedamp.studies.report.map_chart import Panel, map_panels
 from vanedamp.studies.report.sweep_beside import system_of
 
 #: colours of borders by their kind, which the colour-blind tell apart (Okabe and Ito 2008)
@@ -111,9 +110,7 @@ def map_of(branches: Branches, sweep: Sweep) -> Panel | None:
     )
     if mine is None or mine != shown:
         return None
-    tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
-    relative = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
-    return panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), two)[0]
+    return map_panels(sweep, two)[0]
 
 
 def maps_of(branches: Branches, sweeps: Mapping[str, Sweep]) -> dict[str, Panel]:

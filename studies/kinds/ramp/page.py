@@ -16,7 +16,6 @@ from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
 from vanedamp.studies.report.charts import COLOURS, Chart, Table, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength import course_chart
 from vanedamp.studies.report.sweep_beside import sweeps_beside
 
@@ -29,12 +28,8 @@ _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return charts and peaks of the runs of each file."""
-    return [_ramp(file, result.record, page) for file, result in results.items()]
-
-
-def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
+def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
+    """Return charts and peaks of the runs of a file."""
     sweeps = page.results.kinds["sweep"]
     beside = sweeps_beside(ramp.scene, ramp.table.path, sweeps, "amplitude_mean_dynamic")
     named = {page.names[other]: points for other, points in beside.items()}

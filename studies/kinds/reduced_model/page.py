@@ -15,14 +15,8 @@ from vanedamp.studies.hot_spots import spot_lines, spot_warnings
 from vanedamp.studies.report.charts import COLOURS, Chart
 from vanedamp.studies.report.mode_chart import small_surface, spots_figure, spots_rows
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 30
-
-
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the tables of every model."""
-    return [_reduction(file, result.record, page) for file, result in results.items()]
 
 
 def figure(record: ReducedModel) -> go.Figure:
@@ -45,7 +39,8 @@ def _range(record: ReducedModel) -> tuple[float, float]:
     return max(low, 0.01 * high), high
 
 
-def _reduction(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
+def shown(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
+    """Return the tables of a model."""
     spots = hot_spots(model)
     placed = {name: facts for name, facts in spots.items() if "coordinates" in facts}
     return {

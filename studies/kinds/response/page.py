@@ -32,11 +32,6 @@ def load(path: Path) -> Result:
     return Result.of(History.of(response), None if response.scene is None else response.scene.to_dict())
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the results of every run, its charts and its motion if it was sampled, its impacts if it kept events."""
-    return [_history(file, result.record, page) for file, result in results.items()]
-
-
 def figure(record: History | Response) -> go.Figure:
     """Draw the time history. Raises InputError for a run that kept no samples."""
     history = record if isinstance(record, History) else History.of(record)
@@ -45,7 +40,8 @@ def figure(record: History | Response) -> go.Figure:
     return history_figure(history.late())
 
 
-def _history(file: str, history: History, page: Page) -> dict[str, Any]:
+def shown(file: str, history: History, page: Page) -> dict[str, Any]:
+    """Return the results of a run, its charts and its motion if it was sampled, its impacts if it kept events."""
     energies = history.measures["energy"]
     largest = max(map(abs, energies.values()), default=0.0)
     shown: dict[str, Any] = {"file": file, "measures": history.measures, "bodies": _bodies(history.measures)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import zip_longest
 from typing import Any
 
@@ -14,7 +14,6 @@ from scipy.ndimage import median_filter
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.strength import course_chart
 
 ORDER = 75
@@ -35,12 +34,8 @@ HEADER = [
 ]  # fmt: skip
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return results and charts of every ring-down."""
-    return [_shown(file, result.record, page) for file, result in results.items()]
-
-
-def _shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
+def shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
+    """Return results and charts of a ring-down."""
     table = record.table
     begun = _BEGUN[table.start].format(frequency=record.scene.frequency, impulse=table.impulse or 0.0)
     chart = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,24 +11,16 @@ from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 31
 #: frequencies that are drawn and listed
 _MOST = 200
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return every ring with the chart of its frequencies."""
-    return [
-        {
-            "file": file, "ring": result.record, "estimate": result.record.provenance.get("estimate", {}),
-            "chart": page.chart(
-                "ring-frequencies", dressed(figure(result.record), height=420), *_table(result.record), [file]
-            ),
-        }
-        for file, result in results.items()
-    ]  # fmt: skip
+def shown(file: str, record: RingModel | SectorRing, page: Page) -> dict[str, Any]:
+    """Return a ring with the chart of its frequencies."""
+    chart = page.chart("ring-frequencies", dressed(figure(record), height=420), *_table(record), [file])
+    return {"file": file, "ring": record, "estimate": record.provenance.get("estimate", {}), "chart": chart}
 
 
 def figure(record: RingModel | SectorRing) -> go.Figure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,17 +32,13 @@ def load(path: Path) -> Result:
     return Result((found, ring_surface(found.modes, values)), found.modes.provenance)
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return charts and tables of every ring."""
-    return [_ring(file, result.record, page) for file, result in results.items()]
-
-
 def figure(record: Interference | tuple[Interference, WholeRing | None]) -> go.Figure:
     """Draw the frequencies over nodal diameters with the engine orders."""
     return interference_figure(record[0] if isinstance(record, tuple) else record)
 
 
-def _ring(file: str, record: tuple[Interference, WholeRing | None], page: Page) -> dict[str, Any]:
+def shown(file: str, record: tuple[Interference, WholeRing | None], page: Page) -> dict[str, Any]:
+    """Return charts and tables of a ring."""
     found, surface = record
     diagram = page.chart("interference", interference_figure(found), *interference_table(found), [file])
     campbell, view = None, None

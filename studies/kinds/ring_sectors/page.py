@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from vanedamp.studies.kinds.ring_model.page import __file__ as TEMPLATE
-from vanedamp.studies.kinds.ring_model.page import figure, section
+from vanedamp.studies.kinds.ring_model.page import figure, shown
 
-__all__ = ["ORDER", "TEMPLATE", "figure", "section"]
+__all__ = ["ORDER", "TEMPLATE", "figure", "shown"]
 
 ORDER = 32

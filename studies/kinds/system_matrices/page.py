@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,23 +11,17 @@ import plotly.graph_objects as go
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
-from vanedamp.studies.report.results import Result
 
 ORDER = 12
 #: nodes that are drawn, evenly chosen of more
 _MOST = 20_000
 
 
-def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+def shown(file: str, record: SystemMatrices, page: Page) -> dict[str, Any]:
     """Return the sizes of matrices and the chart of their nodes."""
-    return [
-        {
-            "file": file, "matrices": result.record,
-            "chart": page.chart("nodes", dressed(figure(result.record), height=520), ("x", "y", "z"),
-                                result.record.coordinates.tolist(), [file]),
-        }
-        for file, result in results.items()
-    ]  # fmt: skip
+    drawn = dressed(figure(record), height=520)
+    return {"file": file, "matrices": record,
+            "chart": page.chart("nodes", drawn, ("x", "y", "z"), record.coordinates.tolist(), [file])}  # fmt: skip
 
 
 def figure(record: SystemMatrices) -> go.Figure:
