@@ -13,7 +13,7 @@ from vanedamp.modal import parallel, petsc
 from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.iterative import Iteration, chosen
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.modal.petsc import Factorization, SolverError, factorize
+from vanedamp.modal.petsc import Factorization, Product, SolverError, factorize
 from vanedamp.modal.records.modes import Modes
 
 __all__ = [
@@ -65,11 +65,12 @@ def solve_modes(
     else:
         iteration = None if counted else _iteration(matrices, pencil, floor)
         eigenvalues, vectors = _within(pencil, min_frequency, max_frequency, floor, iteration)
-    vectors, inertia = _orthonormal(vectors, vectors @ pencil.mass)
-    forces = vectors @ pencil.stiffness
+    vectors, inertia = _orthonormal(vectors, Product(pencil.mass)(vectors))
+    forces = Product(pencil.stiffness)(vectors)
     residuals = np.linalg.norm(forces - eigenvalues[:, None] * inertia, axis=1)
     residuals /= (eigenvalues - floor) * np.linalg.norm(inertia, axis=1)
-    round_off = np.finfo(float).eps * np.einsum("ij,ij->i", np.abs(vectors), np.abs(vectors) @ abs(pencil.stiffness))
+    sizes = np.abs(vectors)
+    round_off = np.finfo(float).eps * np.einsum("ij,ij->i", sizes, Product(abs(pencil.stiffness))(sizes))
     eigenvalues = np.where(eigenvalues > round_off, eigenvalues, 0.0)
     signs = shape_signs(vectors, inertia @ matrices.movable_translations()[free])
     shapes = np.zeros((len(eigenvalues), matrices.size))

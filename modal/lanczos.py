@@ -48,7 +48,7 @@ def eigenpairs(
     """Return the eigenvalues (m,) nearest to a shift, nearest first, and mass-orthonormal vectors (m, n).
 
     solve      (K - shift M)^-1 applied to rows, or its inverse in a subspace, where the vectors then lie
-    mass       (n, n) sparse, positive definite
+    mass       (n, n) positive definite, sparse or applied to rows
     tolerance  of the residual of the shifted inverse, relative to its eigenvalue, in the norm of the mass: eigenvalues
                have its square; not below the round-off of the largest one
     spare      that many more pairs, to the square root of the tolerance
@@ -63,7 +63,7 @@ def eigenpairs(
     for _ in range(_RESTARTS):
         while space.count <= space.most - width:
             if space.block == 0:  # at the start, or the space holds all that its start can reach
-                space.begin(solve(product(mass, random.standard_normal((width, space.size)))))
+                space.begin(solve(space.mass(random.standard_normal((width, space.size)))))
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
             residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
@@ -79,7 +79,7 @@ class _Krylov(Subspace):
     """A Krylov space: the operator has not been applied to the last `block` rows yet."""
 
     def __init__(self, mass: Any, most: int) -> None:
-        super().__init__(partial(product, mass), mass.shape[0], most)
+        super().__init__(mass if callable(mass) else partial(product, mass), mass.shape[0], most)
         self._before = 0  # first of the rows that the operator couples with the last block
 
     def begin(self, rows: np.ndarray) -> None:

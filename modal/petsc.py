@@ -107,6 +107,7 @@ class Product:
     """A sparse matrix (m, n) that is applied to rows (k, n): several of them share a pass over its entries."""
 
     def __init__(self, matrix: sparse.csr_array) -> None:
+        self.shape = matrix.shape
         indices = (matrix.indptr.astype(PETSc.IntType, copy=False), matrix.indices.astype(PETSc.IntType, copy=False))
         self._kept = (*indices, matrix.data)  # PETSc reads them where they are
         self._matrix = PETSc.Mat().createAIJWithArrays(matrix.shape, self._kept, comm=PETSc.COMM_SELF)
@@ -149,7 +150,7 @@ def nearest_eigenpairs(
         matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
         with factorize(matrix, definite=shift <= 0.0) as factors:
             try:
-                values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare, width=width)
+                values, vectors = eigenpairs(factors.solve_rows, Product(mass), count, shift, spare=spare, width=width)
             except NotConvergedError as error:
                 raise SolverError(str(error)) from error
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:wanted]
