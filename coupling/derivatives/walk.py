@@ -17,7 +17,6 @@ from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStat
 from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
-from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
@@ -160,6 +159,6 @@ class PassageWalk:
 
 
 def _met(event: Event) -> float:
-    """Return the speed at which the gap of an event closes, m/s, nan for other events."""
+    """Return the speed, m/s, at which the contact meets whose event it is; nan without an impact of that."""
     met = event.before[event.struck == event.unit]
-    return float(met[0]) if event.what == codes.CLOSES and len(met) else np.nan
+    return float(met[0]) if len(met) else np.nan
