@@ -220,7 +220,7 @@ def _error(found: Sensitivity, weights: np.ndarray, reference: Difference, path:
 def _of_largest(name: str) -> bool:
     """Whether a figure is the largest of some values."""
     one = quantities().get(name.split(".")[0])
-    largest = ("peak", "peaks", "distance", "distances", "tilt", "sectors", "contacts", "wear")
+    largest = ("peak", "peaks", "highest", "heights", "distance", "distances", "tilt", "sectors", "contacts", "wear")
     return one is not None and not set(one.needs).isdisjoint(largest)
 
 
