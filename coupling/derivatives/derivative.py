@@ -153,7 +153,7 @@ class Derivative:
                 self.worsen(PassageStatus.GRAZING)
         else:
             M = self._saltation(before, new, flow, z, jump, kick, guards)
-        self._check_still(new, M, z)
+        M = self._still(new, M, z)
         self._check_idle(new, M, z)
         self._took_part[before.segment.state != new.state] = new.start
         self._took_part[[event.unit, *event.struck]] = new.start
@@ -378,8 +378,12 @@ class Derivative:
         k = len(self._scale)
         return np.column_stack([np.abs(M[:, :k]).max(axis=1), np.abs(M[:, k:])])
 
-    def _check_still(self, new: Segment, M: np.ndarray, z: np.ndarray) -> None:
-        """Raise Untrusted if the derivative moves coordinates at rest."""
+    def _still(self, new: Segment, M: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the derivative without what moves rows at rest. Raises Untrusted if that is more than round-off.
+
+        Round-off is relative to the largest derivatives so far: after a chatter has amplified these, it may be as large
+        as the derivative is now.
+        """
         dynamics, u = self.dynamics, len(new.state)
         closed = np.isinf(self.system.spring) & presses(new.state) & contacts_of(self.system)
         rigid, k = np.flatnonzero(closed), dynamics.one
@@ -391,8 +395,12 @@ class Derivative:
         # a number that hardly moves anything leaves round-off of the coordinates' sizes
         self._reach[:, 1:] = np.maximum(self._reach[:, 1:], _LEAST_TURN * self._size[:, None])
         terms = np.abs(still) @ self._reach + self._largest_of(own)
-        if np.any(self._largest_of(still @ M + own) > _STILL * terms):
+        left = self._largest_of(still @ M + own)
+        if np.any(left > _STILL * terms):
             raise Untrusted
+        if np.any(left > _STILL * (np.abs(still) @ self._largest_of(M) + self._largest_of(own))):
+            return self._constraints.begun(new.state, closed, z)(M)
+        return M
 
     def _check_idle(self, segment: Segment, M: np.ndarray, z: np.ndarray) -> None:
         """Note contacts that touch without force and that neighbouring motions open or hit: they have a kink."""
