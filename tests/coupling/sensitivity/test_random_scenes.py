@@ -21,7 +21,7 @@ def test_no_derivative_is_off(seed, tmp_path):
 
 
 def test_a_body_that_rests_at_a_wall_is_not_said_to_leave_it(tmp_path):
-    """A chatter makes derivatives large, and small again: what round-off leaves of them is no motion of rows at rest."""
+    """A chatter makes derivatives large and small again: what round-off leaves of them is no motion of rows at rest."""
     for each in check(1001, tmp_path):
         assert not [error for error in each.errors if error.off], (each.kind, each.subject)
 
