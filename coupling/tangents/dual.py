@@ -10,7 +10,7 @@ import cmath
 import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,9 @@ _LINEAR, _OF_VALUES = (np.conjugate, np.positive), (np.isfinite, np.isinf, np.is
 _COMPARE = (np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal)
 
 
+_SILENT = nullcontext()
+
+
 class _Active(threading.local):
     count: int | None = None
 
@@ -48,9 +51,15 @@ def numbers(count: int | None) -> Iterator[None]:
     """Let `zeros` and `array` make numbers with derivatives by `count` numbers; None: plain ones."""
     before, _ACTIVE.count = _ACTIVE.count, count
     try:
-        yield
+        with _quiet(count is None):
+            yield
     finally:
         _ACTIVE.count = before
+
+
+def _quiet(already: bool) -> AbstractContextManager[None]:
+    """Let numpy be silent, unless it is already: nan is what is not known."""
+    return _SILENT if already else np.errstate(all="ignore")
 
 
 class Dual(np.lib.mixins.NDArrayOperatorsMixin):
@@ -77,7 +86,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         out = options.pop("out", None)
         if method != "__call__" or options:
             return NotImplemented
-        with np.errstate(all="ignore"):  # nan is what is not known
+        with _quiet(_ACTIVE.count is not None):
             found = _called(ufunc, inputs, self.turns.shape[-1])
         if out is None or found is NotImplemented:
             return found
