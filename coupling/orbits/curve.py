@@ -174,11 +174,11 @@ def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Poi
 def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
     """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
 
-    known: points (k + m,) from which it is predicted; where they lead to none of its sequence the tangent may.
+    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence.
     """
-    point = corrected(head, step, known)
+    point = corrected(head, step)
     if known and (point is None or point.passage.sequence != head.passage.sequence):
-        other = corrected(head, step)
+        other = corrected(head, step, known)
         point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
         return None

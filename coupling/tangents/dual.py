@@ -94,7 +94,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         return out[0]
 
     def __array_function__(self, function: Any, types: Any, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
-        own = _FUNCTIONS.get(function)
+        own = _FUNCTIONS.get(function.__name__)
         return NotImplemented if own is None else own(*given, **options)
 
     def __getitem__(self, place: Any) -> Dual:
@@ -166,7 +166,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
 def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
     """Return a function of numbers, some of which have derivatives."""
-    if ufunc is np.matmul:
+    if ufunc.__name__ == "matmul":
         return _product(*inputs)
     plain = [values(one) for one in inputs]
     value = ufunc(*plain)
@@ -260,20 +260,18 @@ def _diag(one: Dual) -> Dual:
     return Dual(np.diag(one.value), made)
 
 
-_FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.concatenate: lambda parts, axis=0: _joined(np.concatenate, parts, axis),
-    np.vstack: lambda parts: _joined(
-        np.concatenate, [part if part.ndim > 1 else part.reshape(1, -1) for part in parts]
-    ),
-    np.hstack: lambda parts: _joined(np.concatenate, parts, -1),
-    np.stack: lambda parts, axis=0: _joined(np.stack, parts, axis),
-    np.where: _where,
-    np.outer: lambda one, other: one.reshape(-1, 1) * other.reshape(1, -1),
-    np.diag: _diag,
-    np.cross: lambda one, other: Dual(np.cross(one.value, other), np.cross(one.turns.T, other).T),
-    np.linalg.norm: lambda one: np.sqrt((one * one).sum()),
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "concatenate": lambda parts, axis=0: _joined(np.concatenate, parts, axis),
+    "vstack": lambda parts: _joined(np.concatenate, [part if part.ndim > 1 else part.reshape(1, -1) for part in parts]),
+    "hstack": lambda parts: _joined(np.concatenate, parts, -1),
+    "stack": lambda parts, axis=0: _joined(np.stack, parts, axis),
+    "where": _where,
+    "outer": lambda one, other: one.reshape(-1, 1) * other.reshape(1, -1),
+    "diag": _diag,
+    "cross": lambda one, other: Dual(np.cross(one.value, other), np.cross(one.turns.T, other).T),
+    "norm": lambda one: np.sqrt((one * one).sum()),
+    "shape": lambda one: one.value.shape,
 }
-_FUNCTIONS[np.shape] = lambda one: one.value.shape
 
 
 def active() -> int | None:

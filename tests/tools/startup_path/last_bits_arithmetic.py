@@ -434,10 +434,17 @@ def _put(owner, functions):
 
         @functools.wraps(original)
         def call(*arguments, _changed=changed, _original=original, **options):
+            if any(map(_has_own_functions, arguments)):
+                return _original(*arguments, **options)
             return _changed(_original, *arguments, **options)
 
         call.original = original
         setattr(owner, name, call)
+
+
+def _has_own_functions(value):
+    """Whether numpy hands functions of a value on to it, such as of numbers with derivatives."""
+    return not isinstance(value, np.ndarray) and hasattr(type(value), "__array_function__")
 
 
 replace(np)
