@@ -37,6 +37,8 @@ from vanedamp.files.toml_input import InputError
 
 #: periods before the end of a part that are at its end
 _AT_END = 1e-9
+#: what a map has of its scene once it is asked for
+_EQUATIONS = ("scene", "_frame", "dynamics", "_event_names")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ class PeriodMap:
     def _with_equations(self, **changes: Any) -> PeriodMap:
         """Return the map with fields changed that its equations do not depend on."""
         found = replace(self, **changes)
-        found.__dict__.update({name: getattr(self, name) for name in ("scene", "_frame", "dynamics", "_event_names")})
+        found.__dict__.update({name: made for name, made in self.__dict__.items() if name in _EQUATIONS})
         return found
 
     @property
