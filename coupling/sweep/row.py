@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Quantity, labels, table
+from vanedamp.coupling.quantities.quantity import Quantity, labels, possible, table
 from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE, OF_SECTIONS
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
@@ -44,7 +44,7 @@ class Row:
             ("stress",): bool(self._sizes["hot_spot"]), ("sectors",): ring is not None, ("contacts",): wanted(base),
         }  # fmt: skip
         known = {name for names, there in parts.items() if there for name in names}.union(OF_MOTION)
-        self.quantities, self._had = dict[str, Quantity](), dict[frozenset[str], list[str]]()
+        self.quantities = dict[str, Quantity]()
         self.places, self.width = dict[str, slice](), 0
         self.texts = list(TEXTS)
         for name, one in table().items():
@@ -81,14 +81,12 @@ class Row:
 
     def put_parts(self, row: np.ndarray, parts: Mapping[str, Any]) -> None:
         """Put the quantities of a run into a row (width,) that come from some of its parts."""
-        for name in self._had_by(frozenset(parts)):
-            self._set(row[None], name, np.asarray(self.quantities[name].of(parts), float)[None])
+        for one in self._had_by(parts):
+            self._set(row[None], one.name, np.asarray(one.of(parts), float)[None])
 
-    def _had_by(self, sources: frozenset[str]) -> list[str]:
-        """Return the names of the quantities that some sources have."""
-        if sources not in self._had:
-            self._had[sources] = [name for name, one in self.quantities.items() if one.exists(sources)]
-        return self._had[sources]
+    def _had_by(self, sources: Mapping[str, Any]) -> Iterator[Quantity]:
+        """Yield the quantities that some sources have."""
+        return (one for one in possible(frozenset(sources)) if one.name in self.quantities)
 
     def _set(self, rows: np.ndarray, name: str, values: np.ndarray) -> None:
         """Put a quantity of k runs (k, ...) into rows (k, width); of sections the last, the first places stay free."""
@@ -102,8 +100,8 @@ class Row:
     def put_many(self, rows: np.ndarray, sources: Mapping[str, Any]) -> None:
         """Put the quantities of k runs into rows (k, width), by what they need, (k,) each."""
         with np.errstate(all="ignore"):
-            for name in self._had_by(frozenset(sources)):
-                self._set(rows, name, np.asarray(self.quantities[name].of(sources)))
+            for one in self._had_by(sources):
+                self._set(rows, one.name, np.asarray(one.of(sources)))
 
     def value(self, rows: np.ndarray, name: str) -> np.ndarray:
         """Return a quantity of rows (..., width); nan where points have none."""
