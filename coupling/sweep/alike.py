@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import pickle
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -18,7 +18,19 @@ import numpy as np
 
 from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
 from vanedamp.coupling.engine.line.event_driven import EngineRun
-from vanedamp.coupling.engine.line.scenes import BEGINS, COUNT, DROPPED, LEAVES, LEFT, PLACE, STAGE, Job, new_job
+from vanedamp.coupling.engine.line.scenes import (
+    BEGINS,
+    COUNT,
+    DROPPED,
+    GIVEN,
+    LEFT,
+    LINKS,
+    OWN,
+    PLACE,
+    STAGE,
+    Job,
+    new_job,
+)
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import OUTSIDE
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
@@ -71,24 +83,28 @@ class Kind:
     def run_all(
         self,
         values: Mapping[str, np.ndarray],
-        start: RestartState | None,
+        start: RestartState | Sequence[RestartState] | None,
         linked: bool,
         alone: Alone,
         keep: Keep | None = None,
     ) -> tuple[Job, np.ndarray, RestartState | None]:
         """Run scenes (k,). Return the job with their results, linear amplitudes (k, 2), and the state they leave.
 
-        values: of all paths; start: of the first of linked scenes; alone: runs scenes that compiled code refuses, whose
-        codes stay 0; keep: takes what is kept of every other one, before the next begins.
+        values: of all paths; start: of the first of linked scenes, or of every scene (`left` then says how each ends);
+        alone: runs scenes that compiled code refuses, whose codes stay 0; keep: takes what is kept of every other one,
+        before the next begins.
         """
         run, size = self.run, len(next(iter(values.values())))
-        table, fits = self._columns(values, start, size, linked)
-        job = new_job(size, most_periods(self.scene), linked, run.keep)
+        given = [] if start is None else [start] if isinstance(start, RestartState) else start
+        job = new_job(size, most_periods(self.scene), LINKS if linked else GIVEN if given else OWN, run.keep)
+        table = self._columns(values, given, linked, job)
+        first = given[0] if linked and given else None
         for count in [size] if keep is None else range(1, size + 1):
             job.at[COUNT] = count
-            while not fits or run.run_many(job, table, self.statistics) == OUTSIDE:
-                place, fits = int(job.at[PLACE]), True
-                left = alone(place, self._left(job, place, start) if linked else None)
+            while run.run_many(job, table, self.statistics) == OUTSIDE:
+                place = int(job.at[PLACE])
+                left = alone(place, self._left(job, place, first) if linked else None)
+                job.codes[place] = 0
                 if linked:
                     for name in STARTS:
                         column = getattr(table, name)
@@ -97,13 +113,11 @@ class Kind:
                 job.at[LEFT] = job.at[LEFT] if left is None else place + 1
             if keep is not None and job.codes[count - 1]:
                 keep(count - 1, self._parts(job, table, values, count - 1))
-        return job, self._linear(table, values), self._left(job, size, start) if linked else start
+        return job, self._linear(table, values), self._left(job, size, first) if linked else None
 
-    def end(self, job: Job) -> RestartState:
-        """Return the state that the only scene of a job has left, which is not linked."""
-        job.at[PLACE], job.at[STAGE] = 0, LEAVES
-        self.run.run_many(job, self.run.columns, self.statistics)
-        return marked_with_speed(self.scene, self.run.start_in(0, 0))
+    def left(self, k: int) -> RestartState:
+        """Return the state that scene k of the last job has left, which are not linked."""
+        return marked_with_speed(self.scene, self.run.start_in(k, k))
 
     def _parts(self, job: Job, table: Columns, values: Mapping[str, np.ndarray], k: int) -> dict[str, Any]:
         """Return what is kept of the run of scene k, which has just ended, by name."""
@@ -132,22 +146,22 @@ class Kind:
         )  # fmt: skip
 
     def _columns(
-        self, values: Mapping[str, np.ndarray], start: RestartState | None, size: int, linked: bool
-    ) -> tuple[Columns, bool]:
+        self, values: Mapping[str, np.ndarray], given: Sequence[RestartState], linked: bool, job: Job
+    ) -> Columns:
         """Return the columns of scenes; of linked ones with a row more, for the state that the last one leaves.
 
-        And whether the start fits the first scene as it is: otherwise Python moves it.
+        Scenes that a given start does not fit as it is are noted in the job: Python moves it.
         """
         if linked:
             values = {path: np.append(numbers, numbers[-1]) for path, numbers in values.items()}
         table = columns(self.scene, self.run.whole, self.run.system, self.start, values)
-        fits = True
-        if start is not None:
-            moved = start_of(self.scene, self._whole(table, 0), start)
+        for k, start in enumerate(given):
+            moved = start_of(self.scene, self._whole(table, k), start)
             for name in STARTS:
-                getattr(table, name)[0] = getattr(start, name)
-            fits = all(np.array_equal(getattr(start, name), getattr(moved, name)) for name in STARTS)
-        return table, fits
+                getattr(table, name)[k] = getattr(start, name)
+            if not all(np.array_equal(getattr(start, name), getattr(moved, name)) for name in STARTS):
+                job.codes[k] = OUTSIDE
+        return table
 
     def _left(self, job: Job, place: int, start: RestartState | None) -> RestartState | None:
         """Return the state with which linked scene k begins: that of the last one before that has left one."""

@@ -6,7 +6,7 @@ takes several times as long as its motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.line.columns import columned, tells
 from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, UNCERTAIN
 from vanedamp.coupling.quantities.quantity import Measured, evaluated
 from vanedamp.coupling.quantities.sums import sources_of
@@ -65,26 +65,54 @@ class Runs:
 
         None where the numbers make no scene. Raises InputError for a start that the scene does not take.
         """
+        return self.run_all([numbers], [start])[0]
+
+    def run_all(
+        self, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
+    ) -> list[Ran | Response | None]:
+        """Return the runs with numbers, each as `run`: those that differ only in columns in one compiled call."""
+        found: list[Ran | Response | None] = [None] * len(points)
+        waiting = dict.fromkeys(range(len(points)))
         if self._paths and self._whole:
-            kind = kind_of(self._maker, numbers, self._paths, self._common)
-            with suppress(InputError):  # a start that does not fit: its own run says so
-                if kind is not None and (found := _ran(kind, numbers, self._paths, start)) is not None:
-                    return found
-        scene = self.scene(numbers)
-        return None if scene is None else simulate(scene, start=start)
+            groups: dict[Any, list[int]] = {}
+            for place, (numbers, start) in enumerate(zip(points, starts, strict=True)):
+                groups.setdefault((start is None, *self._beside(numbers)), []).append(place)
+            for places in groups.values():
+                kind = kind_of(self._maker, points[places[0]], self._paths, self._common)
+                with suppress(InputError):  # a start that does not fit: its own run says so
+                    if kind is not None:
+                        own = self._ran(kind, [points[place] for place in places], [starts[place] for place in places])
+                        for place, ran in zip(places, own, strict=True):
+                            if ran is not None:
+                                found[place] = ran
+                                del waiting[place]
+        for place in waiting:
+            scene = self.scene(points[place])
+            found[place] = None if scene is None else simulate(scene, start=starts[place])
+        return found
 
+    def _beside(self, numbers: Mapping[str, float]) -> Iterable[Any]:
+        """Yield what tells numbers apart whose scenes differ by more than columns."""
+        for path, value in numbers.items():
+            if path not in self._paths:
+                yield value
+            elif tells(path):
+                yield value > 0.0
 
-def _ran(kind: Kind, numbers: Mapping[str, float], paths: Iterable[str], start: RestartState | None) -> Ran | None:
-    """Return the run of one scene of a kind; None for one that compiled code refuses."""
-    values = {path: np.array([numbers[path]]) for path in paths}
-    job, linear, final = kind.run_all(values, start, start is not None, lambda *_: None)
-    if not job.codes[0]:
-        return None
-    if job.codes[0] not in _WHOLE:
-        final = None
-    elif start is None:
-        final = kind.end(job)
-    undamped, fixed = linear[0].tolist()
-    status, classification = ended_as(job, 0)
-    sources = sources_of(job.sums[0]) | {"undamped": undamped, "fixed": fixed, "overlap": 0.0}
-    return Ran(status, classification, evaluated(sources, partial(known_value, status)), final)
+    def _ran(
+        self, kind: Kind, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
+    ) -> list[Ran | None]:
+        """Return the runs of scenes of a kind, all with starts or all without; None for those that it refuses."""
+        values = {path: np.array([numbers[path] for numbers in points]) for path in self._paths}
+        given = [start for start in starts if start is not None]
+        job, linear, _ = kind.run_all(values, given or None, False, lambda *_: None)
+        found = list[Ran | None]()
+        for k, (undamped, fixed) in enumerate(linear.tolist()):
+            if not job.codes[k]:
+                found.append(None)
+                continue
+            final = kind.left(k) if job.codes[k] in _WHOLE else None
+            status, classification = ended_as(job, k)
+            sources = sources_of(job.sums[k]) | {"undamped": undamped, "fixed": fixed, "overlap": 0.0}
+            found.append(Ran(status, classification, evaluated(sources, partial(known_value, status)), final))
+        return found

@@ -16,7 +16,7 @@ from vanedamp.studies.identification.decay import Decay
 from vanedamp.studies.identification.forced import Forced
 from vanedamp.studies.identification.impacts import Impacts
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Steady
+from vanedamp.studies.identification.steady import Follower, Steady
 from vanedamp.studies.identification.study import IdentificationStudy
 
 _MODELS: dict[str, type[Model]] = {"forced": Forced, "decay": Decay, "impacts": Impacts}
@@ -87,21 +87,23 @@ class Fit:
     def remember(self, z: np.ndarray) -> None:
         """Keep the motions at z for `recall`."""
         self.predict(z)
-        self._kept = [follower.leader for model in self.models for follower in model.followers]
+        self._kept = [follower.leader for follower in self._followers]
 
     def recall(self) -> None:
         """Begin with the motions that were kept last: what follows depends on no place in between."""
-        followers = [follower for model in self.models for follower in model.followers]
-        for follower, leader in zip(followers, self._kept, strict=True):
+        for follower, leader in zip(self._followers, self._kept, strict=True):
             follower.leader = leader
         self._last = None
 
     def forget(self) -> None:
         """Let motions begin with the scene's own start again: what follows depends on no place before."""
-        for model in self.models:
-            for follower in model.followers:
-                follower.motion = follower.leader = None
+        for follower in self._followers:
+            follower.motion = follower.leader = None
         self._last = None
+
+    @property
+    def _followers(self) -> list[Follower]:
+        return [follower for model in self.models for follower in model.followers.each]
 
     def widening(self, z: np.ndarray) -> float:
         """Return the sum of the logarithms of standard deviations with the errors of runs over those without."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from vanedamp.coupling.quantities.amplitude import phase
-from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Follower, Steady, run
+from vanedamp.studies.identification.steady import Followers, Steady
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.measure import Measure
 
@@ -31,67 +31,79 @@ class Forced(Model):
         super().__init__(study, measured, count)
         names, scene = [measured.measure, phase.name][: len(measured.channels)], study.base.replace(measured.changes)
         self._measures = [Measure.of_runs(scene, name, "measure") for name in names]
-        self.followers = [Follower(self.runs, study.paths, count) for _ in measured.at]
+        self.followers = Followers(self.runs, study.paths, count, self._before())
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs; those that go up or down begin with the state of their neighbour."""
-        motions: list[Steady | None] = [None] * len(self.followers)
-        before: RestartState | None = None
-        for place, linked in self._order():
-            motions[place] = run(self.runs, self._at(values, place), before if linked else None, self.count)
-            before = _end(motions[place])
-        return self._predicted(motions)
+        return self._predicted(self.followers.run(self._points(values)))
 
     def predict(self, values: np.ndarray) -> Predicted:
         """Return the prediction by runs, which begin with the last orbits where motions repeat."""
-        before: RestartState | None = None
-        for place, linked in self._order():
-            found = self.followers[place].follow(self._at(values, place), before if linked else None)
-            before = _end(found)
-        return self._predicted([follower.motion for follower in self.followers])
+        return self._predicted(self.followers.follow(self._points(values)))
 
     def derivative(self, values: np.ndarray) -> Values:
         """Return the derivatives: of orbits exact ones, of means of runs differences."""
-        of = np.array([self._slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
-        return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
+        return self._by_channel(np.array([self._slopes(values, place) for place in range(len(self.measured.at))]))
 
     def rough_derivative(self, values: np.ndarray) -> Values:
-        """Return the derivatives of the runs that `predict` made, and let the next ones begin with these."""
-        of = np.array([self._rough_slopes(values, place) for place in range(len(self.followers))]).transpose(1, 0, 2)
-        return {channel.name: of[number] for number, channel in enumerate(self.measured.channels)}
+        """Return the derivatives of the runs that `predict` made, and let the next ones begin with these.
 
-    def _order(self) -> Iterator[tuple[int, bool]]:
-        """Yield places as they were measured, and whether each was reached from the one before."""
+        They are differences to one side where motions repeat.
+        """
+        motions = [follower.motion for follower in self.followers.each]
+        of = np.zeros((len(motions), len(self._measures), len(values)))
+        rough = {place: motion for place, motion in enumerate(motions) if motion is not None and motion.repeats}
+        here = np.array([self._figures(motion)[0] for motion in rough.values()])
+        if rough:
+            of[list(rough)] = self.differences(values, partial(self._beside, rough), _EXACT, here)
+        for place, follower in enumerate(self.followers.each):
+            if place in rough:
+                follower.lead()
+            else:
+                of[place] = self._slopes(values, place)
+        return self._by_channel(of)
+
+    def _by_channel(self, of: np.ndarray) -> Values:
+        """Return derivatives (n, c, P) by the names of the channels."""
+        return {channel.name: of[:, number] for number, channel in enumerate(self.measured.channels)}
+
+    def _before(self) -> list[int | None]:
+        """Return the place, of each, from which it was reached when it was measured; None for no other one."""
         direction, at = np.array(self.measured.direction), self.measured.at
-        for way in ("", "up", "down"):
+        found = list[int | None]([None] * len(at))
+        for way in ("up", "down"):
             places = np.flatnonzero(direction == way)
             places = places[np.argsort(-at[places] if way == "down" else at[places], kind="stable")]
-            for number, place in enumerate(places.tolist()):
-                yield place, bool(way) and number > 0
+            for one, other in itertools.pairwise(places.tolist()):
+                found[other] = one
+        return found
 
     def _slopes(self, values: np.ndarray, place: int) -> np.ndarray:
         """Return derivatives (c, P) of the channels at a place."""
-        follower = self.followers[place]
+        follower = self.followers.each[place]
         found, motion = follower.sensitivity(), follower.motion
         if found is not None and all(one.key in found.derivatives for one in self._measures):
             return np.array([found.derivatives[one.key] for one in self._measures])
         if motion is None:
             return np.zeros((len(self._measures), len(values)))
-        return self.differences(values, partial(self._beside, place, motion), _EXACT if motion.repeats else _MEAN)
+        figures = partial(self._beside, {place: motion})
+        return self.differences(values, figures, _EXACT if motion.repeats else _MEAN)[0]
 
-    def _rough_slopes(self, values: np.ndarray, place: int) -> np.ndarray:
-        """Return derivatives (c, P) of the channels at a place, by differences of runs to one side."""
-        follower = self.followers[place]
-        if (motion := follower.motion) is None or not motion.repeats:
-            return self._slopes(values, place)
-        here, figures = self._figures(motion)[0], partial(self._beside, place, motion)
-        found = self.differences(values, figures, _EXACT, here)
-        follower.lead()
-        return found
+    def _beside(self, motions: Mapping[int, Steady], moved: np.ndarray) -> np.ndarray:
+        """Return the measured quantities (n, c) with values (P,) of the numbers near those of motions, by place.
 
-    def _beside(self, place: int, motion: Steady, moved: np.ndarray) -> np.ndarray:
-        """Return the measured quantities (c,) with values (P,) of the numbers near those of a motion."""
-        return self._figures(self.followers[place].beside(self._at(moved, place)) or motion)[0]
+        Runs begin with what leads the followers, or with the motions; where one has no end its motion stays.
+        """
+        leaders = [
+            None if place not in motions else follower.leader or motions[place]
+            for place, follower in enumerate(self.followers.each)
+        ]
+        found = self.followers.beside(self._points(moved), leaders)
+        return np.array([self._figures(found[place] or motion)[0] for place, motion in motions.items()])
+
+    def _points(self, values: np.ndarray) -> list[dict[str, float]]:
+        """Return the numbers of every place by their paths."""
+        return [self._at(values, place) for place in range(len(self.measured.at))]
 
     def _at(self, values: np.ndarray, place: int) -> dict[str, float]:
         levels = {path: float(each[place]) for path, each in self.measured.levels.items()}
@@ -112,7 +124,3 @@ class Forced(Model):
         of = dict(zip((channel.name for channel in self.measured.channels), np.transpose(figures), strict=True))
         repeats = [one is not None and not error for one, error in zip(motions, errors, strict=True)]
         return Predicted(of, np.array(errors), np.array(repeats))
-
-
-def _end(steady: Steady | None) -> RestartState | None:
-    return None if steady is None else steady.restart

@@ -12,7 +12,7 @@ from vanedamp.coupling.derivatives.passage import Crossing
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.studies.identification.data import Measured
 from vanedamp.studies.identification.model import Model, Predicted, Values
-from vanedamp.studies.identification.steady import Follower, Steady, map_of, run
+from vanedamp.studies.identification.steady import Followers, Steady, map_of
 from vanedamp.studies.identification.study import IdentificationStudy
 
 
@@ -21,15 +21,15 @@ class Impacts(Model):
 
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         super().__init__(study, measured, count)
-        self.followers = [Follower(self.runs, study.paths, count)]
+        self.followers = Followers(self.runs, study.paths, count)
 
     def quick(self, values: np.ndarray) -> Predicted:
         """Return the prediction by the motion in which a run from the scene's own start ends."""
-        return self._of(run(self.runs, self.numbers(values), None, self.count))
+        return self._of(*self.followers.run([self.numbers(values)]))
 
     def predict(self, values: np.ndarray) -> Predicted:
         """Return the prediction by the motion near the last one, or that of the scene's own start."""
-        return self._of(self.followers[0].follow(self.numbers(values)))
+        return self._of(*self.followers.follow([self.numbers(values)]))
 
     def _of(self, motion: Steady | None) -> Predicted:
         """Return the prediction by a motion."""
@@ -53,8 +53,8 @@ class Impacts(Model):
 
     def derivative(self, values: np.ndarray) -> Values:
         """Return the derivatives."""
-        found, nothing = self.followers[0].sensitivity(), np.zeros((len(self.measured.at), len(values)))
-        orbit = self.followers[0].orbit()
+        found, nothing = self.followers.each[0].sensitivity(), np.zeros((len(self.measured.at), len(values)))
+        orbit = self.followers.each[0].orbit()
         if orbit is None or orbit.map is None or found is None or not len(found.impact_time):
             return {"speed": nothing, "time": nothing}
         place, _ = self._nearest(found.impact_time, _length(orbit.map))

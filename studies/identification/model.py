@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.runs import Runs
 from vanedamp.studies.identification.data import Measured
-from vanedamp.studies.identification.steady import Follower
+from vanedamp.studies.identification.steady import Followers
 from vanedamp.studies.identification.study import IdentificationStudy
 
 #: arrays by the names of a measurement's channels
@@ -37,9 +37,9 @@ class Model(ABC):
     def __init__(self, study: IdentificationStudy, measured: Measured, count: Counter[str]) -> None:
         self.measured, self.paths, self.count = measured, study.paths, count
         self._bounds = np.array([(number.min, number.max) for number in study.numbers.values()]).T
-        self.followers: list[Follower] = []
         further = (*measured.levels, FREQUENCY) if measured.kind == "forced" else ()
         self.runs = Runs(study.base.replace(measured.changes), (*study.paths, *further))
+        self.followers = Followers(self.runs, study.paths, count, ())
 
     def numbers(self, values: np.ndarray) -> dict[str, float]:
         """Return values (P,) of the numbers by their paths."""
@@ -64,7 +64,7 @@ class Model(ABC):
     def differences(
         self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray], step: float, here: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return differences (m, P) of a function (m,) of the numbers, by steps relative to their ranges.
+        """Return differences (..., P) of a function (...,) of the numbers, by steps relative to their ranges.
 
         here: its values at these numbers, for differences to one side.
         """

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -61,17 +61,6 @@ class Follower:
         self.motion: Steady | None = None
         self.leader: Steady | None = None
 
-    def follow(self, numbers: Mapping[str, float], before: RestartState | None = None) -> Steady | None:
-        """Return the motion with numbers: a run from one that repeats, or else from a state or the scene's own start.
-
-        That one changes with `lead` and `sensitivity`, and where a run from it has no end, such as in a narrower gap.
-        """
-        self.motion = None if self.leader is None else self.beside(numbers)
-        if self.motion is None:
-            self.motion = repeated(self._runs, run(self._runs, numbers, before, self._count), self._count)
-            self.lead()
-        return self.motion
-
     def lead(self) -> None:
         """Let runs begin with the last motion from now on, if it repeats."""
         self.leader = self.motion if self.motion is not None and self.motion.repeats else None
@@ -90,39 +79,106 @@ class Follower:
         found = sensitivity(orbit, self.paths)
         return found if found.complete else None
 
-    def beside(self, numbers: Mapping[str, float]) -> Steady | None:
-        """Return the motion with numbers that differ little from those of the last one, which stays the last one."""
-        leader = self.leader or self.motion
-        return None if leader is None else run(self._runs, numbers, leader.restart, self._count)
 
+class Followers:
+    """The steady motions of a scene at several places, each followed; runs of all of them are one compiled call.
 
-def run(runs: Runs, numbers: Mapping[str, float], start: RestartState | None, count: Counter[str]) -> Steady | None:
-    """Return the motion in which a run ends, from a start or the scene's own; None if it has no end."""
-    count["runs"] += 1
-    response = runs.run(numbers, start)
-    return Steady(numbers, None, response) if response is not None and response.status in _USABLE else None
-
-
-def repeated(runs: Runs, steady: Steady | None, count: Counter[str]) -> Steady | None:
-    """Return the motion in which a run has ended, after more runs until these repeat it; its orbit where they do not.
-
-    A thousand periods take less than one passage of Newton's method.
+    before: the place, of each, with whose end a run without a leader begins; None for the scene's own start.
     """
-    for _ in range(_MORE):
-        if steady is None or steady.response is None or not steady.repeats or steady.response.final is None:
-            return steady
-        again = run(runs, steady.numbers, steady.response.final, count)
-        if again is None or again.response is None or not again.repeats:
-            break
-        same = all(
-            abs(getattr(again.response, name) - getattr(steady.response, name))
-            <= _SAME * abs(again.response.amplitude_max)
-            for name in _REPEATED
-        )
-        steady = again
-        if same:
-            return steady
-    return settled(runs, steady, count)
+
+    def __init__(
+        self, runs: Runs, paths: tuple[str, ...], count: Counter[str], before: Sequence[int | None] = (None,)
+    ) -> None:
+        self._runs, self._count, self._before = runs, count, before
+        self.each = [Follower(runs, paths, count) for _ in before]
+
+    def run(self, points: Sequence[Mapping[str, float]]) -> list[Steady | None]:
+        """Return the motions in which runs end that nothing leads, of numbers by place; None where one has no end."""
+        found = list[Steady | None]([None] * len(points))
+        self._in_turn(points, range(len(points)), found, lambda motions: motions)
+        return found
+
+    def follow(self, points: Sequence[Mapping[str, float]]) -> list[Steady | None]:
+        """Return the motions with numbers by place: runs from those that lead, or else as `run`.
+
+        The latter repeat themselves, and lead. What leads changes with Follower.lead and sensitivity, too, and where
+        a run from it has no end, such as in a narrower gap.
+        """
+        found = self.beside(points, [follower.leader for follower in self.each])
+        missing = [place for place, motion in enumerate(found) if motion is None]
+        self._in_turn(points, missing, found, self._repeated)
+        for place, follower in enumerate(self.each):
+            follower.motion = found[place]
+            if place in missing:
+                follower.lead()
+        return found
+
+    def beside(self, points: Sequence[Mapping[str, float]], leaders: Sequence[Steady | None]) -> list[Steady | None]:
+        """Return the motions with numbers by place that differ little from those of leaders; None without one."""
+        found = list[Steady | None]([None] * len(points))
+        led = {place: leader for place, leader in enumerate(leaders) if leader is not None}
+        motions = self._run([points[place] for place in led], [leader.restart for leader in led.values()])
+        for place, motion in zip(led, motions, strict=True):
+            found[place] = motion
+        return found
+
+    def _in_turn(
+        self, points: Sequence[Mapping[str, float]], places: Iterable[int], found: list[Steady | None],
+        settle: Callable[[list[Steady | None]], list[Steady | None]],
+    ) -> None:  # fmt: skip
+        """Set the motions of some places, all those that no other of them comes before as one."""
+        waiting = list(places)
+        while waiting:
+            ready = [place for place in waiting if self._before[place] not in waiting]
+            others = [self._before[place] for place in ready]
+            starts = [None if other is None else end_of(found[other]) for other in others]
+            for place, motion in zip(ready, settle(self._run([points[p] for p in ready], starts)), strict=True):
+                found[place] = motion
+            waiting = [place for place in waiting if place not in ready]
+
+    def _run(self, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]) -> list[Steady | None]:
+        """Return the motions in which runs end, each from a start or the scene's own."""
+        self._count["runs"] += len(points)
+        return [
+            Steady(numbers, None, ran) if ran is not None and ran.status in _USABLE else None
+            for numbers, ran in zip(points, self._runs.run_all(points, starts), strict=True)
+        ]
+
+    def _repeated(self, motions: list[Steady | None]) -> list[Steady | None]:
+        """Return the motions after more runs until these repeat them; orbits where they do not.
+
+        A thousand periods take less than one passage of Newton's method.
+        """
+        found, waiting = list(motions), {place: motion for place, motion in enumerate(motions) if _goes_on(motion)}
+        for _ in range(_MORE):
+            again = self._run([one.numbers for one in waiting.values()], [one.restart for one in waiting.values()])
+            for (place, one), more in zip(tuple(waiting.items()), again, strict=True):
+                if more is None or not more.repeats:
+                    found[place] = settled(self._runs, waiting.pop(place), self._count)
+                    continue
+                found[place] = waiting[place] = more
+                if not _goes_on(more) or _same(one, more):
+                    del waiting[place]
+        for place, one in waiting.items():
+            found[place] = settled(self._runs, one, self._count)
+        return found
+
+
+def end_of(steady: Steady | None) -> RestartState | None:
+    """Return the state with which a motion continues; None without one."""
+    return None if steady is None else steady.restart
+
+
+def _goes_on(steady: Steady | None) -> TypeGuard[Steady]:
+    """Return whether a motion is a run that repeats and that others may go on from."""
+    return steady is not None and steady.response is not None and steady.repeats and steady.response.final is not None
+
+
+def _same(one: Steady, other: Steady) -> bool:
+    """Return whether the amplitudes of two runs are the same."""
+    first, second = ([getattr(each.response, name) for name in _REPEATED] for each in (one, other))
+    most = _SAME * abs(second[_REPEATED.index("amplitude_max")])
+    return all(abs(before - after) <= most for before, after in zip(first, second, strict=True))
 
 
 def map_of(runs: Runs, steady: Steady) -> tuple[PeriodMap, np.ndarray] | None:

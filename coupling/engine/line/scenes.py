@@ -42,12 +42,14 @@ from vanedamp.coupling.system.transient import Setup, begin_transient, run_lengt
 _SEGMENTS = 8 * SLICE
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
-# those left out and the longest run; the code that ends it; segments since Python has seen it; whether a scene begins
-# with the state that the one before has left; the number of the last scene that has left one, from 1, 0: none;
-# whether Python keeps the log
+# those left out and the longest run; the code that ends it; segments since Python has seen it; with which states
+# scenes begin; the number of the last scene that has left one for the next, from 1, 0: none; whether Python keeps the
+# log
 COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SEGMENTS, LINKED, LEFT, LOGS = range(11)
 #: what comes next with a scene: it begins, goes on, or leaves its state in its columns
 BEGINS, RUNS, LEAVES = range(3)
+#: scenes begin with their own states, each with what the one before has left, or with states of other runs that fit
+OWN, LINKS, GIVEN = range(3)
 
 
 @record_with(free_axes=2)
@@ -55,13 +57,13 @@ class Job(NamedTuple):
     """What is asked of a call, and the results of k scenes."""
 
     at: Annotated[np.ndarray, "numbers", int]
-    codes: Annotated[np.ndarray, "k", int]  # of numerics.codes; 0: the scene has not run
+    codes: Annotated[np.ndarray, "k", int]  # of numerics.codes; 0: the scene has not run, OUTSIDE: it is not to
     kinds: Annotated[np.ndarray, "k", int]  # classes of motion (response.figures)
     sums: Annotated[np.ndarray, "k sums"]
     peaks: Annotated[np.ndarray, "periods"]  # room to judge a run
 
 
-def new_job(scenes: int = 0, periods: int = 0, linked: bool = False, logs: bool = False) -> Job:
+def new_job(scenes: int = 0, periods: int = 0, linked: int = OWN, logs: bool = False) -> Job:
     """Return the job of many scenes, of at most so many periods; or of one run that the caller judges."""
     job = room(Job, {"numbers": 11, "k": scenes, "sums": len(SUMS), "periods": periods})
     job.at[COUNT], job.at[LINKED], job.at[LOGS] = scenes, linked, logs
@@ -104,7 +106,8 @@ def run(
             _set_start(system, st, watched, columns, k)
             if at[COUNT] > 0:
                 _clear(rec, used)
-                if _is_outside(system, st, columns, k, at[LINKED], at[LEFT]):
+                refused = job.codes[k] == OUTSIDE
+                if refused or (at[LINKED] != GIVEN and _is_outside(system, st, columns, k, at[LINKED], at[LEFT])):
                     return OUTSIDE
                 begin_transient(setup, loose, held, free, stuck)
                 at[DROPPED], at[GOAL], at[MOST] = run_length(setup, free, stuck)
@@ -129,12 +132,12 @@ def run(
             st.counters[LOGGED] = 0
             at[SEGMENTS] += SLICE
         elif _end(job, setup, free, stuck, measured, rec, st.counters[PERIOD], code):
-            if at[LINKED]:
-                if code == DONE:
-                    _leave(system, flows, st, scratch, columns, k + 1)
-                    at[LEFT] = k + 1
-                else:  # a run that broke off within a period leaves the state that it began with
-                    _repeat(columns, k)
+            links = at[LINKED] == LINKS
+            if code == DONE:
+                _leave(system, flows, st, scratch, columns, k + links)
+                at[LEFT] = k + 1
+            elif links:  # a run that broke off within a period leaves the state that it began with
+                _repeat(columns, k)
             at[PLACE], at[STAGE], at[CODE] = k + 1, BEGINS, DONE
             at[SEGMENTS] += st.counters[EVENTS] + st.counters[PERIOD]
         if at[SEGMENTS] >= _SEGMENTS:

@@ -46,6 +46,27 @@ def test_runs_are_those_of_their_scenes(name, monkeypatch):
     assert {"amplitude_mean", "amplitude_fixed", "phase", "impacts_per_period"} <= set(found[0].quantities)
 
 
+def test_runs_together_are_those_one_by_one():
+    """Some from starts, one of which has to be moved into a narrower cavity, with numbers that make scenes of a kind."""
+    scene, rng = validate(Scene, _RIGID, "scene"), np.random.default_rng(8)
+    points = [{path: float(rng.uniform(*ends)) for path, ends in _NUMBERS.items()} for _ in range(9)]
+    for point in points:
+        point["structure.damping_ratio"] = 0.02
+    runs = Runs(scene, _NUMBERS)
+    starts = [None, *(runs.run(point).final for point in points[1:])]
+    for start, point in zip(starts[4:], points[4:], strict=True):
+        point["cavity.c.gap"] = 1.5 * float(np.ptp(start.slip)) + 1e-4
+    starts[6:8] = None, None
+    alone = [Runs(scene, _NUMBERS).run(point, start) for point, start in zip(points, starts, strict=True)]
+    together = runs.run_all(points, starts)
+    assert len({one.amplitude_mean for one in alone}) > 5
+    for one, other in zip(alone, together, strict=True):
+        assert (one.status, one.classification) == (other.status, other.classification)
+        assert one.final.to_list() == other.final.to_list()
+        assert repr(one.amplitude_mean) == repr(other.amplitude_mean)
+        assert repr(dict(one.quantities)) == repr(dict(other.quantities))
+
+
 def test_numbers_that_make_no_scene_have_no_run():
     runs = Runs(validate(Scene, _ONE, "scene"), ["structure.mass"])
     assert runs.run({"structure.mass": -1.0}) is None and runs.scene({"structure.mass": -1.0}) is None
