@@ -22,7 +22,7 @@ _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomi
 class Course(NamedTuple):
     """A motion over a time: n nodes in it with weights (n,) of integrals, s.
 
-    time (n,) s; z (n, K), Z (n, K, P): the motion and its derivatives there; last (K,), end (K, P): at its end.
+    time (n,) s; z (n, K), Z (n, K, ...): the motion and its derivatives there; last (K,), end (K, ...): at its end.
     """
 
     time: np.ndarray
@@ -44,7 +44,7 @@ class Series:
         rows, columns = np.nonzero(X)
         number, at, of = np.nonzero(D)
         self._X = rows, columns, X[rows, columns]
-        self._D = number, at, of, D[number, at, of]
+        self._D, self._numbers = (number, at, of, D[number, at, of]), len(D)
 
     @cached_property
     def alone(self) -> Series:
@@ -52,7 +52,10 @@ class Series:
         return Series(self.X, np.zeros((0, *self.X.shape)))
 
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
-        """Return the motion from z (K,), Z (K, P) over a duration, s; at nodes, or without any."""
+        """Return the motion from z (K,), Z (K, k + P) over a duration, s; at nodes, or without any.
+
+        The first k columns are derivatives by what changes no flow.
+        """
         panels = max(int(np.ceil(self._norm * abs(duration) / _NORM)), 1)
         step, (k, p) = duration / panels, Z.shape
         places = _NODES if nodes else np.zeros(0)
@@ -60,7 +63,8 @@ class Series:
         of_z, of_Z = np.empty((panels * g, k)), np.empty((panels * g, k, p))
         z, Z = np.array(z), np.array(Z)
         room = np.empty((_TERMS, k)), np.empty((_TERMS, k, p))
-        _advance(*self._X, *self._D, z, Z, step, panels, places, *room, of_z, of_Z)
+        number, *of_D = self._D
+        _advance(*self._X, number + (p - self._numbers), *of_D, z, Z, step, panels, places, *room, of_z, of_Z)
         time = (np.arange(panels)[:, None] + places) * step
         weight = np.tile(_WEIGHTS if nodes else places, panels) * step
         return Course(time.ravel(), weight, of_z, of_Z, z, Z)

@@ -33,7 +33,7 @@ class Start:
     ) -> None:  # fmt: skip
         #: columns (k + P,) of derivatives whose motions may make a kink: only those by numbers if the start is given
         self.counts = slice(len(state) if given else 0, None)
-        #: derivative (2N, P) by numbers before units that are at rest stop what these would move
+        #: derivative (2N, k + P), as that of a passage, before units that are at rest stop what it would move
         self.unheld = np.zeros((dynamics.one, 0))
         self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
         self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
@@ -71,7 +71,7 @@ class Start:
             M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
         if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z, M):
             status = PassageStatus.GRAZING
-        self.unheld = M[:, k:]
+        self.unheld = np.hstack([M[:, :k] * dynamics.scale, M[:, k:]])
         M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
         return M[:, :k], M[:, k:], status
 

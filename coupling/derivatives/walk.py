@@ -34,16 +34,21 @@ def run_from(frame: Frame, state: np.ndarray, periods: int) -> EventRun:
 
 
 class Watch(Protocol):
-    """Measures a motion and its derivatives by numbers, P columns behind those by the start."""
+    """Measures a motion and its derivatives M (2N, k + P): by the start, in units of its sizes, then by numbers.
+
+    nears: whether events that nearly happen are sought, too.
+    """
+
+    nears: bool
 
     def begin(self, unheld: np.ndarray) -> None:
-        """Take the derivative (2N, P) of the start as it is given, before what sticks is stopped."""
+        """Take the derivative (2N, k + P) of the start as it is given, before what sticks is stopped."""
 
     def segment(self, begun: Before, course: Course) -> None:
         """Take the motion until the next event. begun: its start, with the derivative there."""
 
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
-        """Take an event, or a period's end. M: the derivative after it; shift: (P,) of its time, s."""
+        """Take an event, or a period's end. M: the derivative after it; shift: (k + P,) of its time, s."""
 
     def end(self, before: Before) -> None:
         """Take the end of the motion."""
@@ -52,10 +57,10 @@ class Watch(Protocol):
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
-    turns: (k, P) how numbers change the start; watch: is called with the course of every segment, in place of
-    a search for the clearance; given: as in Start; reached: state (k,) and derivatives (k, k) and (k, P) some part of a
-    period, or periods, after the start, of a passage without its derivative only the state; None without a part, or if
-    the engine has not come so far; short: whether the passage ends there, its own end unknown.
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; given: as in Start;
+    reached: state (k,) and derivatives (k, k) and (k, P) some part of a period, or periods, after the start, of a
+    passage without its derivative only the state; None without a part, or if the engine has not come so far; short:
+    whether the passage ends there, its own end unknown.
     """
 
     def __init__(
@@ -110,7 +115,7 @@ class PassageWalk:
             if not self._whole:
                 before = Before(segment, segment.event, flow, z, M)
                 continue
-            if self._watch is None:
+            if self._watch is None or self._watch.nears:
                 least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
                 if least < self._clearance[0]:
                     self._clearance = least, self._names.possible(unit, what)
@@ -120,17 +125,17 @@ class PassageWalk:
 
     def _followed(self, begun: Before, duration: float, watch: Watch | None) -> Before:
         """Return the motion a duration after the start of a segment, s."""
-        segment, flow, k = begun.segment, begun.flow, len(self._dynamics.scale)
-        z, power = flow.after(begun.z, duration)
+        segment, flow = begun.segment, begun.flow
         if self._numbers is None:
+            z, power = flow.after(begun.z, duration)
             return begun._replace(z=z, M=power @ begun.M)
-        Z = self._numbers.harmonics(self._dynamics, segment.start).T
-        Z[: len(power)] = begun.M[:, k:]
-        series = derivative_of(flow, self._numbers).series
-        course = series.course(begun.z, Z, duration, watch is not None)
+        one, numbers = len(begun.M), self._numbers.harmonics(self._dynamics, segment.start).T
+        Z = np.zeros((len(begun.z), begun.M.shape[1]))
+        Z[:one], Z[one:, Z.shape[1] - numbers.shape[1] :] = begun.M, numbers[one:]
+        course = derivative_of(flow, self._numbers).series.course(begun.z, Z, duration, watch is not None)
         if watch is not None:
             watch.segment(begun, course)
-        return begun._replace(z=z, M=np.hstack([power @ begun.M[:, :k], course.end[: len(power)]]))
+        return begun._replace(z=course.last, M=course.end[:one])
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
         """Return the derivative as a segment begins, nan where it is unknown, and keep the event before it."""
@@ -154,7 +159,7 @@ class PassageWalk:
             made.worsen(PassageStatus.UNDETERMINED)
             M = np.full((len(u), len(made.shift)), np.nan)
         if before is not None and self._watch is not None:
-            self._watch.event(before, segment, M, made.shift[len(self._dynamics.scale) :])
+            self._watch.event(before, segment, M, made.shift)
         return M
 
 

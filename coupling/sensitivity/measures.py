@@ -45,6 +45,7 @@ class Measures:
     """
 
     run: EventRun
+    nears = False
 
     def __init__(
         self, dynamics: Dynamics, numbers: Numbers, first: int, orders: Sequence[int] = (1,),
@@ -81,20 +82,20 @@ class Measures:
 
     def begin(self, unheld: np.ndarray) -> None:
         """Take the start as it is given: friction may take its momentum at once."""
-        self._unheld = unheld
+        self._unheld = unheld[:, self._k :]
 
     def segment(self, begun: Before, course: Course) -> None:
         """Take the motion until the next event."""
-        self._begun, self._course = begun, course
+        self._begun, self._course = begun, course._replace(Z=course.Z[..., self._k :], end=course.end[:, self._k :])
 
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end, and what led there."""
         boundary = before.event.unit < 0
-        moves = new.period * self.numbers.parts.period if boundary else shift
+        moves = new.period * self.numbers.parts.period if boundary else shift[self._k :]
         self._passed(before, moves)
         self._since = moves
         if not boundary:
-            self._struck(before, new, M, shift)
+            self._struck(before, new, M, moves)
 
     def end(self, before: Before) -> None:
         """Take the end of the motion."""

@@ -19,6 +19,7 @@ from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.figures import Figures
 from vanedamp.coupling.sensitivity.measures import Measures
+from vanedamp.coupling.sensitivity.passed import Passed
 from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
 
@@ -77,7 +78,7 @@ class Motion:
         return sizes
 
     def passed(
-        self, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures | None = None,
+        self, state: np.ndarray, turns: np.ndarray, periods: int, watch: Measures | Passed | None = None,
         given: bool = False, part: float = np.inf,
     ) -> Passage:  # fmt: skip
         """Return the passage from a state (k,) that numbers turn by (k, P), over all periods or the first part of them.
@@ -86,13 +87,18 @@ class Motion:
         """
         names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
         short = part < periods
-        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, measures, given, part, short)
+        walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, watch, given, part, short)
         run = run_from(self.frame, state, periods)
-        if measures is not None:
-            measures.run = run
+        if watch is not None:
+            watch.run = run
         passage = walk.passage(run, periods)
         self.completed = walk.derivative.completed
         return passage
+
+    def along(self, passed: Passed, turns: np.ndarray, measures: Measures) -> None:
+        """Measure a motion that has been passed, whose start numbers turn by (k, P)."""
+        measures.run = passed.run
+        passed.along(turns * self.numbers.size / self.dynamics.scale[:, None], measures)
 
     def grown(self, passage: Passage) -> np.ndarray:
         """Return the derivative (k, k) of a passage in units of the coordinates' sizes."""

@@ -17,6 +17,7 @@ from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
+from vanedamp.coupling.sensitivity.passed import Passed
 from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
 from vanedamp.files.store import frozen
 
@@ -41,26 +42,33 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
         raise NoDerivative(SensitivityStatus.STOPPED, f"no orbit was found: {orbit.status.value}")
     assert orbit.section.map is not None
     motion = _motion(orbit.section.map, paths)
-    turns, known, neutral = _moved(orbit, motion)
-    found = _followed(orbit, motion, turns, paths, options, known)
+    passed = Passed()
+    turns, known, neutral = _moved(orbit, motion, passed)
+    found = _followed(orbit, motion, turns, paths, options, passed, known)
     count, others = len(motion.numbers), list[Sensitivity]()
     for first in range(0, len(neutral), count):
         aside = neutral[first : first + count]
         shift = np.zeros_like(turns)
         shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
-        others.append(_followed(orbit, motion, turns + shift, paths, options))
+        others.append(_followed(orbit, motion, turns + shift, paths, options, passed))
     return _without_open(found, others, motion.numbers.size) if others else found
 
 
 def _followed(
-    orbit: Orbit, motion: Motion, turns: np.ndarray, paths: Paths, options: dict[str, Any],
+    orbit: Orbit, motion: Motion, turns: np.ndarray, paths: Paths, options: dict[str, Any], passed: Passed,
     known: PassageStatus | None = None,
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives along an orbit whose section numbers turn by (k, P).
 
-    known: how the section's passage ended, to be judged; None: of another orbit that numbers leave open.
+    passed: the passage from the section; known: how that ended, to be judged; None: of another orbit that numbers leave
+    open.
     """
     section, periods, state = orbit.section, orbit.periods, orbit.section.state
+    if known is PassageStatus.OK and not section.later:
+        measures = Measures(motion.dynamics, motion.numbers, 0, **options)
+        motion.along(passed, turns, measures)
+        _check_energies(measures)
+        return record(motion, measures, periods, state, turns)
     if section.later:
         assert orbit.map is not None
         left = periods - section.later
@@ -119,14 +127,16 @@ def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:
     return bool(np.all(off <= _UNCERTAIN * size))
 
 
-def _moved(orbit: Orbit, motion: Motion) -> tuple[np.ndarray, PassageStatus, np.ndarray]:
+def _moved(orbit: Orbit, motion: Motion, passed: Passed) -> tuple[np.ndarray, PassageStatus, np.ndarray]:
     """Return how numbers move the state (k, P) of an orbit's section, how its passage ended, and open moves (n, k).
+
+    passed: takes that passage.
 
     One with kinks beside it, whose derivative holds on one side, may have none along the numbers. Raises NoDerivative
     where the state does not depend smoothly on them.
     """
     state, still = orbit.section.state, np.zeros((len(orbit.state), len(motion.numbers)))
-    passage = motion.passed(state, still, orbit.periods)
+    passage = motion.passed(state, still, orbit.periods, passed)
     if passage.status not in _ONE_SIDED or not passage.serves(True) or passage.clearance[0] <= TANGENTIAL:
         check(passage.status)
     equations = _Equations(passage, motion, orbit)
