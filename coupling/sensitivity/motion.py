@@ -30,7 +30,7 @@ _PARTED = 1e6
 #: what is to be known of derivatives that there are: of a kink of amplitudes, of a chatter that the engine completes
 _NOTES = (
     "summits of one height part: derivatives of amplitudes and other largest values hold on one side",
-    "a chatter ends in the motion: derivatives hold to some 1e-6, as far as the engine follows it",
+    "a chatter ends in the motion: derivatives hold to some 1e-6, of what its last flights alone move to less",
 )
 
 MEANING = {
