@@ -13,20 +13,21 @@ The accelerations are those of system.flow.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.minima import least_minimum
+from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Segment
 from vanedamp.coupling.system.flow import StateFlow
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.unit_laws import EVENTS, SINGULAR, possible_events, signals_of
 from vanedamp.coupling.tangents.dual import values, zeros
+from vanedamp.files.store import frozen
 
 #: points of a period, and of one turn of the fastest motion, between which least margins are sought; flows kept
 _LOOKS, _TURN, _KEPT = 32, 12, 1000
@@ -116,7 +117,7 @@ class Dynamics:
         system = self.system
         bound = np.vstack([system.J, system.elongation]) != 0.0
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T @ bound)
-        return np.asarray(connected_components(joined, directed=False)[1])
+        return _parts(joined.tobytes(), len(joined))
 
     def state(self, segment: Segment) -> np.ndarray:
         """Return u (2N,) at the start of a segment."""
@@ -177,6 +178,7 @@ class Flow:
         self.X = per[:, None] * solved.generator(free) / per
         self.free, self.known = free / per, solved.known_forces(open_force) / per
         self.carried = solved.carried @ self.free
+        self._functions: dict[tuple[int, int], tuple[np.ndarray, float]] = {}
         self.forces = self.known + solved.spread(self.carried)
 
     @cached_property
@@ -190,10 +192,10 @@ class Flow:
         """The states (u,) without slips that constraints hold."""
         return np.where(self.slips_held & (self.way != 0.0) & self.rubs, codes.STICK, self.state)
 
-    def after(self, z: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return z (K,) after a duration, s, and the derivative (2N, 2N) of u then by u before."""
-        power, k = expm(self.X * duration), self.dynamics.one
-        return power @ z, power[:k, :k]
+    @cached_property
+    def series(self) -> Series:
+        """The motions of the flow."""
+        return Series(self.X)
 
     def signals(self, r: int) -> dict[str, np.ndarray]:
         """Return the signals of unit r as functionals (K,) of z (system.unit_laws)."""
@@ -207,8 +209,11 @@ class Flow:
 
         It falls through zero at its event. The scale is inf for forces and slips that have none of their own.
         """
-        event, system = EVENTS[what], self.dynamics.system
-        return event.function(event.factors(system, r, self.way[r]), self.signals(r)), event.size(system, r)
+        if (r, what) not in self._functions:
+            event, system = EVENTS[what], self.dynamics.system
+            function = event.function(event.factors(system, r, self.way[r]), self.signals(r))
+            self._functions[r, what] = function, event.size(system, r)
+        return self._functions[r, what]
 
     @cached_property
     def possible(self) -> list[tuple[int, int]]:
@@ -217,14 +222,14 @@ class Flow:
         return [(r, int(event.code)) for r, event in events if event.order != codes.VELOCITY or not self.slips_held[r]]
 
     @cached_property
-    def _margins(self) -> np.ndarray:
-        """The functionals (m, K) of the possible events, each relative to its scale."""
+    def _margins(self) -> tuple[np.ndarray, np.ndarray]:
+        """The functionals (m, K) of the possible events, each relative to its scale, and their rates."""
         margins = np.zeros((len(self.possible), len(self.X)))
         for margin, (r, what) in zip(margins, self.possible, strict=True):
             functional, scale = self.function(r, what)
             typical = float(np.abs(functional) @ self.dynamics.typical)
             margin[:] = functional / (scale if np.isfinite(scale) else typical or 1.0)
-        return margins
+        return margins, margins @ self.X
 
     @cached_property
     def _fastest(self) -> float:
@@ -236,10 +241,17 @@ class Flow:
 
         Relative to its scale, where the margin turns inside the segment by more than round-off; inf without any.
         """
-        watched = [k for k, each in enumerate(self.possible) if each != event]
         step = min(self.dynamics.system.period / _LOOKS, 2 * np.pi / _TURN / (self._fastest or 1.0))
-        least, row = least_minimum(self.X, self._margins[watched], z, duration, step)
-        return (max(least, 0.0), *self.possible[watched[row]]) if row >= 0 else (np.inf, -1, 0)
+        without = self.possible.index(event) if event in self.possible else -1
+        least, row = least_minimum(self.series, *self._margins, z, duration, step, without)
+        return (max(least, 0.0), *self.possible[row]) if row >= 0 else (np.inf, -1, 0)
+
+
+@lru_cache(_KEPT)
+def _parts(joined: bytes, size: int) -> np.ndarray:
+    """Return numbers (size,) of the parts of what is joined, (size, size) as bytes: the same for many systems."""
+    found = connected_components(np.frombuffer(joined, bool).reshape(size, size), directed=False)[1]
+    return frozen(found, int)
 
 
 def _projector(rows: np.ndarray) -> np.ndarray:

@@ -2,49 +2,87 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from scipy.linalg import expm
+
+from vanedamp.coupling.derivatives.series import Series
+from vanedamp.coupling.numerics.compiler.jit import entry
 
 #: most points at which it is sought; relative round-off of a slope; steps of Newton's method, and their last size
 _POINTS, _ROUND_OFF, _STEPS, _SMALL = 240, 1e-9, 8, 1e-12
 
 
 def least_minimum(
-    X: np.ndarray, functionals: np.ndarray, z: np.ndarray, duration: float, step: float
-) -> tuple[float, int]:
+    series: Series, functionals: np.ndarray, slopes: np.ndarray, z: np.ndarray, duration: float, step: float,
+    without: int = -1,
+) -> tuple[float, int]:  # fmt: skip
     """Return the smallest minimum of functionals (m, K) of z(t) = exp(X t) z within a duration, and which it is.
 
-    Minima between points about a step apart are found by their slopes, where these pass through zero by more than
-    round-off; (inf, -1) without any.
+    slopes: functionals X; without: number of one that does not count. Minima between points about a step apart are
+    found by their slopes, where these pass through zero by more than round-off; (inf, -1) without any.
     """
     if duration <= 0.0 or not len(functionals):
         return np.inf, -1
-    steps = min(max(int(np.ceil(duration / step)), 2), _POINTS)
+    steps = min(max(math.ceil(duration / step), 2), _POINTS)
     step = duration / steps
-    power, motion = expm(X * step), np.empty((steps + 1, len(X)))
-    motion[0] = z
-    for i in range(steps):
-        motion[i + 1] = power @ motion[i]
-    slopes = functionals @ X
-    value, slope = functionals @ motion.T, slopes @ motion.T
-    noise = _ROUND_OFF * np.abs(slopes) @ np.abs(motion).max(axis=0)
-    side = np.where(np.abs(slope) > noise[:, None], np.sign(slope), 0.0)
-    last = np.maximum.accumulate(np.where(side[:, :-1] != 0.0, np.arange(steps), 0), axis=1)
-    side[:, :-1] = np.take_along_axis(side, last, axis=1)  # without a sign of its own, the one before
-    which, cell = np.nonzero((side[:, :-1] < 0.0) & (side[:, 1:] > 0.0))
-    if not len(which):
+    motion = np.empty((steps + 1, len(z)))
+    row, cell, ahead = _coarse(series.power(step), functionals, slopes, z, step, without, motion)
+    if row < 0:
         return np.inf, -1
-    # where the slope's chord vanishes, for a choice; then Newton's method on the motion itself
-    one, other = np.minimum(slope[which, cell], 0.0), slope[which, cell + 1]
-    ahead = one / (one - other)
-    best = int(np.argmin(value[which, cell] + 0.5 * one * ahead * step))
-    row, at, low, high = int(which[best]), float(ahead[best] * step), 0.0, step
+    at, low, high = ahead * step, 0.0, step
+    bends, nothing = slopes[row] @ series.X, np.zeros((len(z), 0))
     for _ in range(_STEPS):
-        now = expm(X * at) @ motion[cell[best]]
-        tilt, bend = float(slopes[row] @ now), float(slopes[row] @ X @ now)
+        now = series.alone.course(motion[cell], nothing, at, False).last
+        tilt, bend = float(slopes[row] @ now), float(bends @ now)
         low, high = (at, high) if tilt < 0.0 else (low, at)
         move = at - tilt / bend if bend > 0.0 else low
         if abs(move - at) <= _SMALL * step:
             break
         at = move if low < move < high else 0.5 * (low + high)
-    return float(functionals[row] @ now), row
+    return float(functionals[row] @ now), int(row)
+
+
+@entry
+def _coarse(power, functionals, slopes, z, step, without, motion):  # type: ignore[no-untyped-def]
+    """Set the motion (n + 1, K) at points a step apart, and choose a minimum where a slope's chord vanishes.
+
+    Returns its functional (-1: none), the point before it, and the part of a step to it.
+    """
+    points, size = motion.shape
+    row, cell, share, least = -1, -1, 0.0, math.inf
+    for i in range(size):
+        motion[0, i] = z[i]
+    for p in range(1, points):
+        for i in range(size):
+            total = 0.0
+            for k in range(size):
+                total += power[i, k] * motion[p - 1, k]
+            motion[p, i] = total
+    for m in range(len(functionals)):
+        if m == without:
+            continue
+        noise = 0.0
+        for i in range(size):
+            largest = 0.0
+            for p in range(points):
+                largest = max(largest, abs(motion[p, i]))
+            noise += abs(slopes[m, i]) * largest
+        noise *= _ROUND_OFF
+        side, before = 0, 0.0  # without a sign of its own, that of the point before
+        for p in range(points):
+            slope = 0.0
+            for i in range(size):
+                slope += slopes[m, i] * motion[p, i]
+            if slope > noise and side < 0:
+                value, one = 0.0, min(before, 0.0)
+                for i in range(size):
+                    value += functionals[m, i] * motion[p - 1, i]
+                ahead = one / (one - slope)
+                value += 0.5 * one * ahead * step
+                if value < least:
+                    row, cell, share, least = m, p - 1, ahead, value
+            if abs(slope) > noise:
+                side = 1 if slope > 0.0 else -1
+            before = slope
+    return row, cell, share

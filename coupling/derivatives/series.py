@@ -5,7 +5,7 @@ z' = X z, and by P numbers of X: Z' = X Z + D z. The series end at round-off, so
 
 from __future__ import annotations
 
-from functools import cached_property
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -34,22 +34,31 @@ class Course(NamedTuple):
 
 
 class Series:
-    """The series of one flow X (K, K), with derivatives D (P, K, K)."""
+    """The series of one flow X (K, K), with derivatives or without."""
 
-    def __init__(self, X: np.ndarray, D: np.ndarray) -> None:
-        self.X = X
+    def __init__(self, X: np.ndarray) -> None:
+        self.X, self.alone = X, self
         # units of the constants, in which stiff springs have loads far above what they move, are no rates
         balanced = np.abs(matrix_balance(X, permute=False)[0])
         self._norm = float(min(balanced.sum(axis=0).max(), balanced.sum(axis=1).max()))
         rows, columns = np.nonzero(X)
-        number, at, of = np.nonzero(D)
         self._X = rows, columns, X[rows, columns]
+        self._set_derivatives(np.zeros((0, *X.shape)))
+
+    def by(self, D: np.ndarray) -> Series:
+        """Return the same series with derivatives D (P, K, K) of the flow."""
+        found = copy(self)
+        found._set_derivatives(D)
+        return found
+
+    def _set_derivatives(self, D: np.ndarray) -> None:
+        number, at, of = np.nonzero(D)
         self._D, self._numbers = (number, at, of, D[number, at, of]), len(D)
 
-    @cached_property
-    def alone(self) -> Series:
-        """The series without derivatives."""
-        return Series(self.X, np.zeros((0, *self.X.shape)))
+    def power(self, step: float) -> np.ndarray:
+        """Return exp(X step) (K, K)."""
+        eye = np.eye(len(self.X))
+        return self.alone.course(eye[0], eye, step, False).end
 
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
         """Return the motion from z (K,), Z (K, k + P) over a duration, s; at nodes, or without any.

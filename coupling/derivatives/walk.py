@@ -125,14 +125,13 @@ class PassageWalk:
 
     def _followed(self, begun: Before, duration: float, watch: Watch | None) -> Before:
         """Return the motion a duration after the start of a segment, s."""
-        segment, flow = begun.segment, begun.flow
-        if self._numbers is None:
-            z, power = flow.after(begun.z, duration)
-            return begun._replace(z=z, M=power @ begun.M)
-        one, numbers = len(begun.M), self._numbers.harmonics(self._dynamics, segment.start).T
+        series, one, numbers = begun.flow.series, len(begun.M), self._numbers
         Z = np.zeros((len(begun.z), begun.M.shape[1]))
-        Z[:one], Z[one:, Z.shape[1] - numbers.shape[1] :] = begun.M, numbers[one:]
-        course = derivative_of(flow, self._numbers).series.course(begun.z, Z, duration, watch is not None)
+        Z[:one] = begun.M
+        if numbers is not None:
+            series = derivative_of(begun.flow, numbers).series
+            Z[one:, Z.shape[1] - len(numbers) :] = numbers.harmonics(self._dynamics, begun.segment.start)[:, one:].T
+        course = series.course(begun.z, Z, duration, watch is not None)
         if watch is not None:
             watch.segment(begun, course)
         return begun._replace(z=course.last, M=course.end[:one])

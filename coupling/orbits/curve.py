@@ -29,6 +29,8 @@ from vanedamp.coupling.scene.orbit import Orbit as Table
 _EFFORT = ((8, 3, 3), (16, 10, 9))
 #: cosines of the angle between tangents from which steps grow, and are good enough
 _STRAIGHT, _BENT = 0.985, 0.9
+#: distance from the tangent, relative to the step, up to which steps grow where they are predicted on a curve
+_NEAR = 0.01
 #: share of the numbers in a tangent below which it is at a turn of both
 _FLAT = 0.05
 #: distances by which a prediction is moved to where the sequence of events is still that of the condition
@@ -158,27 +160,32 @@ def beginning(problem: Problem, y: np.ndarray, row: np.ndarray, condition: Condi
     return None if passage is None else Point(problem, Zero(OrbitStatus.OK, y, passage, np.nan, 0), row, condition)
 
 
-def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
-    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near.
+def predicted(head: Point, at: float, known: Sequence[np.ndarray] = ()) -> np.ndarray:
+    """Return where a curve is expected (k + m,) at a distance along the tangent.
 
-    It is predicted on the tangent, or on the curve of least order that has it and passes the two nearest of some known
-    points (k + m,). Next to an event that grazes, with a speed v, a state may be away from its orbit by some v^3 before
-    its own sequence is another: there the tangent serves for steps of v^1.5 only.
+    That is on the tangent, or on the curve of least order that has it and passes the two nearest of some known points
+    (k + m,). Next to an event that grazes, with a speed v, a state may be away from its orbit by some v^3 before its
+    own sequence is another: there the tangent serves for steps of v^1.5 only.
     """
     places = {float((y - head.y) @ head.tangent): y for y in known}
-    nearest = sorted(places.keys() - {0.0}, key=lambda place: abs(place - step))[:2]
+    nearest = sorted(places.keys() - {0.0}, key=lambda place: abs(place - at))[:2]
     curve = KroghInterpolator([0.0, 0.0, *nearest], [head.y, head.tangent, *(places[place] for place in nearest)])
-    return near(head, curve(step), head.tangent, abs(step))
+    return np.asarray(curve(at))
+
+
+def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
+    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near."""
+    return near(head, predicted(head, step, known), head.tangent, abs(step))
 
 
 def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
     """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
 
-    known: points (k + m,) from which it is predicted where the tangent leads to none of its sequence.
+    known: points (k + m,) from which it is predicted; where they lead to none of its sequence the tangent may.
     """
-    point = corrected(head, step)
+    point = corrected(head, step, known)
     if known and (point is None or point.passage.sequence != head.passage.sequence):
-        other = corrected(head, step, known)
+        other = corrected(head, step)
         point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
         return None
@@ -186,7 +193,8 @@ def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point
         y, edge = point.y, float(np.clip(point.y[number], 0.0, 1.0))
         if y[number] != edge and 0.0 <= head.y[number] <= 1.0 and abs(head.y[number] - edge) > _EDGE:
             ahead = y[number] - head.y[number]
-            start = head.y + (edge - head.y[number]) / ahead * (y - head.y)
+            along = (edge - head.y[number]) / ahead * (y - head.y) @ head.tangent
+            start = predicted(head, float(along), [y, *known])
             start[number] = edge
             point = near(head, start, np.copysign(1.0, ahead) * head.problem.row(number), step) or point
     return regular(point)
@@ -291,7 +299,9 @@ class Path:
                 break
             cosine = float(point.tangent @ head.tangent)
             if cosine > _BENT or step <= 2 * least:
+                bend = float(np.linalg.norm(point.y - head.y - step * head.tangent))
                 quick = point.zero.iterations <= _EFFORT[point.given is not None][2] and cosine > _STRAIGHT
+                quick = quick and (not self.trail or bend <= _NEAR * step)
                 self.step = min(1.5 * step, self._longest(point)) if quick else max(step, least)
                 if (last := self._passed(head, point)) is not None:
                     self._onward(last)
