@@ -257,20 +257,26 @@ def without_starts(paths: Iterable[str]) -> list[str]:
     return [path for path in paths if not any(part in path for part in _OF_STARTS)]
 
 
+def keys(points: PointTable, paths: Iterable[str]) -> list[tuple[Any, ...]]:
+    """Return of every point what its scene has in common with those that differ from it in numbers with columns."""
+    kept = points.columns
+    telling = [values for path, values in kept.items() if path not in paths]
+    telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
+    return list(zip(*telling, strict=True)) if telling else [()] * len(points)
+
+
 def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list[str], list[int]]]:
     """Yield the paths with columns, and the places of points that differ only in these; linked ones in turn."""
     kept = points.columns
     paths = [path for path in columned(base, kept) if all(isinstance(value, int | float) for value in kept[path])]
     paths = without_starts(paths) if linked else paths
-    telling = [values for path, values in kept.items() if path not in paths]
-    telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
-    keys = list(zip(*telling, strict=True)) if telling else [()] * len(points)
+    key = keys(points, paths)
     if not paths or Row(base).alone:
         yield from (([], [place]) for place in range(len(points)))
     elif linked:
-        yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), keys.__getitem__))
+        yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), key.__getitem__))
     else:
         found: dict[tuple[Any, ...], list[int]] = {}
         for place in range(len(points)):
-            found.setdefault(keys[place], []).append(place)
+            found.setdefault(key[place], []).append(place)
         yield from ((paths, some) for some in found.values())

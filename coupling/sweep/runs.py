@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned, tells
+from vanedamp.coupling.engine.line.columns import columned
 from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, UNCERTAIN
 from vanedamp.coupling.quantities.quantity import Measured, evaluated
 from vanedamp.coupling.quantities.sums import sources_of
@@ -23,8 +23,8 @@ from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import Common, Kind, ended_as, kind_of, without_starts
-from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.sweep.alike import Common, Kind, ended_as, keys, kind_of, without_starts
+from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import InputError
 
@@ -72,32 +72,23 @@ class Runs:
     ) -> list[Ran | Response | None]:
         """Return the runs with numbers, each as `run`: those that differ only in columns in one compiled call."""
         found: list[Ran | Response | None] = [None] * len(points)
-        waiting = dict.fromkeys(range(len(points)))
+        waiting, groups = dict.fromkeys(range(len(points))), dict[Any, list[int]]()
         if self._paths and self._whole:
-            groups: dict[Any, list[int]] = {}
-            for place, (numbers, start) in enumerate(zip(points, starts, strict=True)):
-                groups.setdefault((start is None, *self._beside(numbers)), []).append(place)
-            for places in groups.values():
-                kind = kind_of(self._maker, points[places[0]], self._paths, self._common)
-                with suppress(InputError):  # a start that does not fit: its own run says so
-                    if kind is not None:
-                        own = self._ran(kind, [points[place] for place in places], [starts[place] for place in places])
-                        for place, ran in zip(places, own, strict=True):
-                            if ran is not None:
-                                found[place] = ran
-                                del waiting[place]
+            for place, key in enumerate(keys(PointTable.of(points), self._paths)):
+                groups.setdefault((starts[place] is None, *key), []).append(place)
+        for places in groups.values():
+            kind = kind_of(self._maker, points[places[0]], self._paths, self._common)
+            with suppress(InputError):  # a start that does not fit: its own run says so
+                if kind is not None:
+                    own = self._ran(kind, [points[place] for place in places], [starts[place] for place in places])
+                    for place, ran in zip(places, own, strict=True):
+                        if ran is not None:
+                            found[place] = ran
+                            del waiting[place]
         for place in waiting:
             scene = self.scene(points[place])
             found[place] = None if scene is None else simulate(scene, start=starts[place])
         return found
-
-    def _beside(self, numbers: Mapping[str, float]) -> Iterable[Any]:
-        """Yield what tells numbers apart whose scenes differ by more than columns."""
-        for path, value in numbers.items():
-            if path not in self._paths:
-                yield value
-            elif tells(path):
-                yield value > 0.0
 
     def _ran(
         self, kind: Kind, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
