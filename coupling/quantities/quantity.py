@@ -44,6 +44,10 @@ class Quantity(NamedTuple):
         """Type of its arrays."""
         return object if self.text else float
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go to other processes by name: its function is none of a module."""
+        return _of_table, (self.name,)
+
     def exists(self, sources: Iterable[str]) -> bool:
         """Whether all that it needs is among some names."""
         return set(self.needs).issubset(sources)
@@ -85,6 +89,10 @@ def table() -> Mapping[str, Quantity]:
                 raise ValueError(f"{module.__name__}: there is a quantity {one.name} in {found[one.name].family}")
             found[one.name] = one._replace(family=name)
     return found
+
+
+def _of_table(name: str) -> Quantity:
+    return table()[name]
 
 
 def declared_in(module: Any) -> Iterator[Quantity]:
