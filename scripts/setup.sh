@@ -160,7 +160,7 @@ works() {
 import sys
 from importlib.util import find_spec
 
-packages = "dolfinx slepc4py scipy h5py numba gmsh meshio vanedamp".split()
+packages = "dolfinx slepc4py scipy h5py numba gmsh vanedamp".split()
 sys.exit(not all(map(find_spec, packages)))
 END
 }

@@ -69,13 +69,12 @@ COMMANDS = (
         "modal", "natural frequencies, effective masses, rigid model of the first bending", 20,
         (
             input_file("CASE.toml"), output_file("MODES.h5"), json_file,
-            argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)"),
             argument(
                 "--solver", choices=["factor", "iterative", "auto"],
                 help="by factors of the stiffness, without, or as the memory allows (default: the case's, else auto)",
             ),
         ),
-        writes={"output": _RECORD, "vtk": (".vtu", ".vtk")}, reads=_CASE, takes=("case",),
+        writes={"output": _RECORD}, reads=_CASE, takes=("case",),
     ),
     Command(
         "campbell", "natural frequencies versus the speed of rotation, and their crossings with engine orders", 25,
@@ -92,7 +91,6 @@ COMMANDS = (
         (
             input_file("CASE.toml"), output_file("RING.h5"), json_file,
             argument("--picture", metavar="FILE.png", help="the interference diagram as a picture"),
-            argument("--vtu", metavar="FILE.vtu", help="the modes on the whole ring, for ParaView"),
             argument(
                 "--rpm", type=rpm, nargs=2, metavar=("LOW", "HIGH"),
                 help="speeds of operation (default: those of [campbell], or 5 %% about that of [rotation])",
@@ -111,7 +109,7 @@ COMMANDS = (
                 help="family, from 1, around whose frequencies amplification counts (default: %(default)s)",
             ),
         ),
-        writes={"output": _RECORD, "picture": (".png",), "vtu": (".vtu",), "mistuning": _RECORD},
+        writes={"output": _RECORD, "picture": (".png",), "mistuning": _RECORD},
         reads=Function("support.cases:read_ring_case"), takes=("case",),
     ),
     Command(

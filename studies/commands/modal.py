@@ -16,23 +16,11 @@ from vanedamp.studies.hot_spots import plus_minus
 
 def run(arguments: Namespace, case: Case) -> None:
     """Compute the modes, and what follows from them."""
-    if arguments.vtk:  # loads matplotlib and meshio, and reports missing packages before the work
-        from vanedamp.studies.report.pictures import save_vtk
-
     if arguments.solver is not None:
         case = replace(case, modes=replace(case.modes, solver=arguments.solver))
     analysis = modal_analysis(assemble(case))
     result = analysis.to_json()
-
-    def vtk(path: str) -> None:
-        mesh, cell_type = analysis.structure.mesh()
-        pairs = zip(analysis.modes.frequencies_hz, analysis.modes.shapes, strict=True)
-        fields = {
-            f"mode {k}: {frequency:.6g} Hz": shape.reshape(-1, 3) for k, (frequency, shape) in enumerate(pairs, 1)
-        }
-        save_vtk(fields, mesh["coordinates"].values, mesh["cell"].values, cell_type, path)
-
-    write_result(arguments, result, _summary(result), analysis.warnings, output=analysis.save, vtk=vtk)
+    write_result(arguments, result, _summary(result), analysis.warnings, output=analysis.save)
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:

@@ -21,7 +21,6 @@ from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.ring_mesh import whole_ring, with_parts
 from vanedamp.studies.terminal import progress
 
 #: families, and engine orders of a diameter, that are printed at most; meetings
@@ -32,8 +31,6 @@ _FAMILIES = 3
 
 def run(arguments: Namespace, case: Case) -> None:
     """Compute the modes, where engine orders meet them, and the amplification of a mistuned ring."""
-    if arguments.vtu:  # reports missing packages before the work
-        import vanedamp.studies.report.pictures  # noqa: F401
     operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
     if operating is not None and not operating[0] <= operating[1]:
         raise InputError("--rpm: expected the lowest speed, then the highest")
@@ -60,25 +57,18 @@ def run(arguments: Namespace, case: Case) -> None:
 
 def _files(structure: Structure, found: Interference) -> dict[str, Callable[[str], object]]:
     """Return by its option what writes a file of the modes."""
-    modes, (mesh, cell_type) = found.modes, structure.mesh()
 
     def save(path: str) -> None:
+        mesh, cell_type = structure.mesh()
         ratio = structure.matrices.damping_ratio
         found.save(path, mesh, {"vtk_cell_type": cell_type, "damping_ratio": ratio})
-
-    def vtu(path: str) -> None:
-        from vanedamp.studies.report.pictures import save_vtk
-
-        ring = whole_ring(modes, mesh["coordinates"].values, mesh["cell"].values)
-        named = ((f"{found.name(k)}: {hz:.6g} Hz", ring.shape(modes, k)) for k, hz in enumerate(modes.frequencies_hz))
-        save_vtk(with_parts(named), ring.points, ring.cells, cell_type, path)
 
     def picture(path: str) -> None:
         from vanedamp.studies.kinds.ring_modes.picture import interference_picture  # matplotlib, for this file only
 
         interference_picture(found, Path(path))
 
-    return {"output": save, "vtu": vtu, "picture": picture}
+    return {"output": save, "picture": picture}
 
 
 def _study(arguments: Namespace, structure: Structure, found: Interference) -> tuple[MistuningStudy, list[str]]:

@@ -1,9 +1,8 @@
-"""Pictures of mode shapes, and mode shapes for ParaView."""
+"""Pictures of mode shapes and forced responses."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 
-from vanedamp.files.store import load, replacing
+from vanedamp.files.store import load
 from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 from vanedamp.studies.report.forced_response_charts import RELATIVE
 from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges, surface, unit_normals, viewpoint
@@ -22,8 +21,6 @@ from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges,
 if TYPE_CHECKING:
     from vanedamp.studies.report.forced_response import ForcedResponse
 
-#: names of VTK's cells: linear ones, and of any order, as dolfinx has them
-_CELLS = {10: "tetra", 12: "hexahedron", 71: "VTK_LAGRANGE_TETRAHEDRON", 72: "VTK_LAGRANGE_HEXAHEDRON"}
 #: part of the light that comes from all sides
 _AMBIENT = 0.55
 
@@ -97,17 +94,3 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
     draw_grid(right)
     right.legend(frameon=False)
     save(figure, path, dpi=110)
-
-
-def save_vtk(
-    fields: Mapping[str, np.ndarray], coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path
-) -> None:
-    """Write fields by name, such as mode shapes, on their mesh (.vtu or .vtk, for ParaView). cell_type: VTK's."""
-    from meshio import Mesh
-
-    legacy = Path(path).suffix == ".vtk"
-    # names end at a space in old files, and readers know this sign for it
-    named = {name.replace(" ", "%20") if legacy else name: field for name, field in fields.items()}
-    mesh = Mesh(coordinates, [(_CELLS[cell_type], cells)], point_data=named)
-    with replacing(path) as temporary:
-        mesh.write(temporary, file_format="vtk" if legacy else "vtu")

@@ -261,7 +261,7 @@ for folder, event, end, command in json.loads(sys.argv[1]):
     waiting.clear()
 """
 RUN = ["run", "scene.toml", "-o", "response.h5", "--json", "response.json"]
-MODAL = ["modal", "case.toml", "-o", "modes.h5", "--vtk", "modes.vtu"]
+MODAL = ["modal", "case.toml", "-o", "modes.h5", "--json", "modes.json"]
 #: command, event, the end of its file's name; whether the command says that it was interrupted, files that it leaves
 CASES = {
     "run opens HDF5": (RUN, "open", ".h5", True, set()),
@@ -269,8 +269,8 @@ CASES = {
     "run puts HDF5 in place": (RUN, "os.rename", ".h5", True, {"response.h5", "response.json"}),
     "run puts JSON in place": (RUN, "os.rename", ".json", True, {"response.h5", "response.json"}),
     "modal opens HDF5": (MODAL, "open", ".h5", True, set()),
-    "modal opens VTK": (MODAL, "open", ".vtu", True, set()),
-    "modal puts HDF5 in place": (MODAL, "os.rename", ".h5", True, {"modes.h5", "modes.vtu"}),
+    "modal opens JSON": (MODAL, "open", ".json", True, set()),
+    "modal puts HDF5 in place": (MODAL, "os.rename", ".h5", True, {"modes.h5", "modes.json"}),
     "run has ended": (RUN, "end", "", False, {"response.h5", "response.json"}),
 }
 
@@ -303,7 +303,7 @@ def interrupted(tmp_path_factory):
 
 @pytest.mark.parametrize("name", CASES)
 def test_interrupt_while_files_are_written(name, interrupted):
-    """Two files, HDF5's and JSON's or VTK's: both or none."""
+    """Two files, HDF5's and JSON's: both or none."""
     command, _, _, told, left = CASES[name]
     if command is MODAL:
         pytest.importorskip("dolfinx")

@@ -38,7 +38,9 @@ def figure(record: Modes | tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:
     values, attributes = record
     surface = small_surface(values)
     if surface is None:
-        raise InputError("plot: the surface of this mesh is too large for a figure; take vanedamp modal --vtk")
+        raise InputError(
+            "plot: the surface of this mesh is too large for a figure; take vanedamp export MODES.h5 -o FILE.vtkhdf"
+        )
     return mode_figure(values, surface, int(attributes.get("first_bending", 0)))
 
 

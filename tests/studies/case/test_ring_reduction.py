@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh, splu
 
+from tests.tools.archives import labelled
 from tests.tools.rings import whole_ring
 from vanedamp.files.store import kind_of
 from vanedamp.rom.ring.deviations import Deviations
@@ -139,17 +139,15 @@ def test_a_group_that_deviates_of_an_abaqus_mesh(structure, tmp_path: Path):
     case = tmp_path / "case.toml"
     case.write_text(CASE)
     assert main(["mesh", str(case), "-o", str(tmp_path / "disk.msh")]) == 0
-    mesh = meshio.read(tmp_path / "disk.msh")
-    lines = ["*NODE", *(f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1))]
-    names = {(dimension, tag): name for name, (tag, dimension) in mesh.field_data.items()}
-    number = 0
-    for block, tags in zip(mesh.cells, mesh.cell_data["gmsh:physical"], strict=True):
-        for cell, tag in zip(block.data + 1, tags, strict=True):
-            if block.type == "hexahedron":
-                number += 1
-                lines += [f"*ELEMENT, TYPE=C3D8, ELSET={names[3, tag]}", ", ".join(map(str, (number, *cell)))]
-            elif (2, tag) in names:
-                lines += [f"*NSET, NSET={names[2, tag]}", ", ".join(map(str, cell))]
+    mesh = labelled(tmp_path / "disk.msh")
+    lines = ["*NODE", *(", ".join(map(repr, (label, *place.tolist()))) for label, place in mesh.nodes.items())]
+    for name, labels in mesh.element_sets.items():
+        for label in labels:
+            kind, nodes = mesh.elements[label]
+            if kind == "hexahedron":
+                lines += [f"*ELEMENT, TYPE=C3D8, ELSET={name}", ", ".join(map(str, (label, *nodes)))]
+            else:
+                lines += [f"*NSET, NSET={name}", ", ".join(map(str, nodes))]
     (tmp_path / "disk.inp").write_text("\n".join(lines) + "\n")
     case.write_text('[mesh]\nfile = "disk.inp"\ndegree = 1\n' + CASE[CASE.index("[material") :])
     deviations = Deviations(-0.3 * np.eye(6)[1])

@@ -283,6 +283,8 @@ def test_page_without_a_picture_says_so(results, tmp_path, monkeypatch):
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "No picture: this machine cannot render one" in text
     assert "Plotly" not in text
+    with pytest.raises(InputError, match=r"take vanedamp export MODES.h5 -o FILE.vtkhdf"):
+        modes_section.figure(load(results / "modes.h5", "modes"))
 
 
 GAPS = [1e-5, 5e-5, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 7e-4, 8e-4, 1e-3, 2e-3]
