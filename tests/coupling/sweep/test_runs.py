@@ -47,7 +47,7 @@ def test_runs_are_those_of_their_scenes(name, monkeypatch):
 
 
 def test_runs_together_are_those_one_by_one():
-    """Some from starts, one of which has to be moved into a narrower cavity, with numbers that make scenes of a kind."""
+    """Some from starts, one of which is moved into a narrower cavity, with numbers that make scenes of one kind."""
     scene, rng = validate(Scene, _RIGID, "scene"), np.random.default_rng(8)
     points = [{path: float(rng.uniform(*ends)) for path, ends in _NUMBERS.items()} for _ in range(9)]
     for point in points:
