@@ -31,7 +31,7 @@ def _samples(kept: int, scene: Scene, run: Outcome, known: Fields) -> Fields:
     made: dict[str, Any] = {"time": time, "displacement": x, "body_displacement": taken[:, 1:].copy()}
     if coordinates.size and np.all(np.isfinite(coordinates)):
         made["coordinates"] = coordinates.copy()
-    if run.plane is not None:
+    if run.plane is not None and run.system.bodies:
         made["in_plane"] = planar_samples(run.system, x, records.sampled[rows], records.shut[rows])
     return made
 

@@ -68,7 +68,7 @@ class History:
         return cls(
             time=frozen(response.time),
             displacement=frozen(response.displacement),
-            bodies=frozen(response.body_displacement),
+            bodies=frozen(response.body_displacement).reshape(len(response.time), -1),  # files have none without bodies
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
             by_place=impacts_by_place(response, whole),
