@@ -270,7 +270,9 @@ def period_map(
     chosen = made(scene)
     check_waveform(chosen, "exact")
     turns = (parameter in SPEEDS or second in SPEEDS) and isinstance(chosen.structure, Rom)
-    return PeriodMap(scene, parameter, periods, Frame(chosen).sizes(), chosen.speed if turns else None, made=made)
+    if not len(sizes := Frame(chosen).sizes()):
+        raise InputError("damper: expected bodies, since nothing else may move beside the structure's given motion")
+    return PeriodMap(scene, parameter, periods, sizes, chosen.speed if turns else None, made=made)
 
 
 def _made(choices: Choices, moves: bool, scene: Scene) -> Scene:

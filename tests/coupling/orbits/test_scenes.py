@@ -209,6 +209,9 @@ def test_a_scene_without_table_and_another_method_are_refused():
         vd.orbits(scene(data))
     with pytest.raises(InputError, match=r"solver.method: orbits are those of the exact engine"):
         vd.orbits(scene(BODY, solver={"method": "moreau"}))
+    still = {"structure": {"model": "prescribed", "displacement_amplitude": 1e-3}, "damper": [], "cavity": []}
+    with pytest.raises(InputError, match="damper: expected bodies"):
+        vd.find_orbit(scene(data, excitation={"frequency": 100.0}, **still))
 
 
 def test_a_run_that_repeats_after_several_periods_is_an_orbit_of_so_many():
