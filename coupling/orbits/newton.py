@@ -245,25 +245,22 @@ def solve(
         step = least_squares(np.vstack([J, row]), -np.append(wanted, row @ y - plane))
         size, length = 1.0 + float(np.linalg.norm(y)), float(np.linalg.norm(step))
         last = length <= _SMALL * size
-        # what is left where it is reached is noise
-        if last and condition is None and _at_round_off(problem, residual, passage, size):
-            status = OrbitStatus.OK
-            break
         bound = np.full(len(residual), np.inf) if begins or last else residual
         taken, changed = _taken(problem, missed, y, step, passage, bound, halvings)
         if taken is None:
             # near a bifurcation a residual at round-off is an orbit, and the next step is noise
-            if _at_round_off(problem, residual, passage, size):
+            if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(problem, passage, size):
                 status = OrbitStatus.OK
             elif changed:
                 status = OrbitStatus.FORBIDDEN
             break
         moved, before = taken[0] - y, residual
         y, passage, residual = taken
+        off = float(np.abs(residual[:k]).max(initial=0.0))
         known = condition is None or (
             not begins and (length <= _SMALLER * size or np.linalg.norm(residual) >= 0.1 * np.linalg.norm(before))
         )
-        if last and known and _at_round_off(problem, residual[:k], passage, size):
+        if last and known and off <= _ROUND_OFF * _reach(problem, passage, size):
             status = OrbitStatus.OK
             break
         if length > _NOISE * size:
@@ -274,13 +271,9 @@ def solve(
     return Zero(status, y, passage, off, count)
 
 
-def _at_round_off(problem: Problem, residual: np.ndarray, passage: Passage, size: float) -> bool:
-    """Return whether a residual is no more than the round-off of a passage's sums: scaled states times its derivative.
-
-    size: of the states.
-    """
-    reach = size * (1.0 + float(np.abs(problem.derivative(passage)).max(initial=0.0)))
-    return float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * reach
+def _reach(problem: Problem, passage: Passage, size: float) -> float:
+    """Return the size of a passage's sums: scaled states times its derivative."""
+    return size * (1.0 + float(np.abs(problem.derivative(passage)).max(initial=0.0)))
 
 
 def _taken(

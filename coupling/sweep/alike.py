@@ -261,7 +261,7 @@ def keys(points: PointTable, paths: Iterable[str]) -> list[tuple[Any, ...]]:
     """Return of every point what its scene has in common with those that differ from it in numbers with columns."""
     kept = points.columns
     telling = [values for path, values in kept.items() if path not in paths]
-    telling += [np.asarray(kept[path]) > 0.0 for path in paths if tells(path)]
+    telling += [np.asarray(kept[path]) > 0.0 for path in paths if path in kept and tells(path)]
     return list(zip(*telling, strict=True)) if telling else [()] * len(points)
 
 

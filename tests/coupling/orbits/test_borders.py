@@ -352,8 +352,8 @@ def test_a_branch_without_special_points_says_so():
     assert found.borders == () and found.warnings[0].startswith("orbit.track: the branches have none of fold, ")
 
 
-def test_a_slider_in_the_middle_begins_to_slip_where_its_spring_comes_to_its_bound():
-    """Where it rests shifts that force: round-off of Newton's steps must not move it. In closed form."""
+def test_a_slider_that_may_rest_anywhere_has_no_border_of_its_own():
+    """A friction damper begins to slip at a force that its resting place shifts."""
     track = {"parameter": "friction_damper.0.friction", "to": 0.12, "kinds": ["sequence"]}
     data = scene(
         structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
@@ -365,11 +365,4 @@ def test_a_slider_in_the_middle_begins_to_slip_where_its_spring_comes_to_its_bou
             "max_step": 1.0, "max_points": 20, "track": track,
         },
     )  # fmt: skip
-    found = orbits(data)
-    (branch,), (border,) = found.branches, found.borders
-    # the spring carries 0.5 x = friction, and |1.5 - 1 + 0.1 i| x = force
-    assert [point.kind for point in branch.special] == ["sequence", "end"] and found.warnings == ()
-    assert branch.special[0].parameter == pytest.approx(0.2 * math.hypot(0.5, 0.1), rel=1e-9)
-    # on the border the slider hardly slips, and orbits that rest elsewhere are near
-    assert border.parameter == pytest.approx(2 * math.hypot(0.5, 0.1) * np.array(border.second), rel=1e-6)
-    assert len(border.parameter) > 4
+    assert any("may rest anywhere" in warning for warning in orbits(data).warnings)

@@ -59,7 +59,7 @@ def test_runs_together_are_those_one_by_one():
     starts[6:8] = None, None
     alone = [Runs(scene, _NUMBERS).run(point, start) for point, start in zip(points, starts, strict=True)]
     together = runs.run_all(points, starts)
-    assert len({one.amplitude_mean for one in alone}) > 5
+    assert len({one.amplitude_mean for one in alone}) > 5 and runs.run_all([], []) == []
     for one, other in zip(alone, together, strict=True):
         assert (one.status, one.classification) == (other.status, other.classification)
         assert one.final.to_list() == other.final.to_list()
