@@ -64,11 +64,11 @@ class History:
     def of(cls, response: Response, scene: Scene | None = None) -> History:
         """Return the history of a run; scene: that of a response that does not say."""
         impacts = (event for event in response.event_list if event.kind == "impact")
-        whole = _unrolled(response.scene or scene)
+        whole, bodies = _unrolled(response.scene or scene), response.body_displacement  # in a file none without bodies
         return cls(
             time=frozen(response.time),
             displacement=frozen(response.displacement),
-            bodies=frozen(response.body_displacement).reshape(len(response.time), -1),  # files have none without bodies
+            bodies=frozen(bodies if len(bodies) else np.zeros((len(response.time), 0))),
             plane=response.in_plane,
             hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
             by_place=impacts_by_place(response, whole),
