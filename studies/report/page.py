@@ -161,7 +161,7 @@ def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
-    shared.filters |= {"ratio": lambda value: "none" if value is None or math.isnan(value) else f"{value:z.3f}"}
+    shared.filters |= {"ratio": lambda value: "none" if value is None or not math.isfinite(value) else f"{value:z.3f}"}
     shared.filters["clean"] = without_round_off
     shared.filters["plus_minus"] = lambda error: plus_minus(error or None)  # files before 0.4 have none
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
