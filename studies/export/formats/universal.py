@@ -156,9 +156,10 @@ def response(record: Record, path: Path) -> tuple[str, ...]:
     """
     if "time" not in record.variables or len(record.values("time")) < 2:
         raise InputError(f"{record.file}: holds no samples; run the scene by `vanedamp run --samples N`")
-    time, bodies = record.values("time"), record.values("body_displacement")
+    time, moves = record.values("time"), "body_displacement" in record.variables  # not in a run without bodies
+    bodies = record.values("body_displacement").T if moves else ()
     sets = [*_headers(record), _curve("displacement", time, record.values("displacement"), HISTORY, TIME)]
-    for body, moved in enumerate(bodies.T, start=1):
+    for body, moved in enumerate(bodies, start=1):
         sets.append(_curve(f"body {body} in its cavity", time, moved, HISTORY, TIME, rsp_node=1 + body))
     write_universal(sets, path)
     return _troubles([record.attributes["status"]], "runs")

@@ -14,8 +14,10 @@ ROOT = Path(__file__).parents[3]
 
 def shown(scene, folder):
     simulate(scene, events=True, samples_per_period=20).save(folder / "run.h5")
-    for words in (["report", "run.h5", "-o", "page.html"], ["info", "run.h5"], ["export", "run.h5", "-o", "run.csv"]):
+    for words in (["report", "run.h5", "-o", "page.html"], ["info", "run.h5"]):
         assert main(words) == 0
+    for ending in ("csv", "uff"):
+        assert main(["export", "run.h5", "-o", f"run.{ending}"]) == 0
     return (folder / "page.html").read_text()
 
 
