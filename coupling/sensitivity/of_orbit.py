@@ -50,24 +50,25 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
         aside = neutral[first : first + count]
         shift = np.zeros_like(turns)
         shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
-        others.append(_followed(orbit, motion, turns + shift, paths, options, passed))
+        others.append(_followed(orbit, motion, turns + shift, paths, options, passed, known, True))
     return _without_open(found, others, motion.numbers.size) if others else found
 
 
 def _followed(
     orbit: Orbit, motion: Motion, turns: np.ndarray, paths: Paths, options: dict[str, Any], passed: Passed,
-    known: PassageStatus | None = None,
+    known: PassageStatus, aside: bool = False,
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives along an orbit whose section numbers turn by (k, P).
 
-    passed: the passage from the section; known: how that ended, to be judged; None: of another orbit that numbers leave
-    open.
+    passed: the passage from the section; known: how that ended, to be judged but for `aside`, of another orbit that
+    numbers leave open.
     """
     section, periods, state = orbit.section, orbit.periods, orbit.section.state
     if known is PassageStatus.OK and not section.later:
         measures = Measures(motion.dynamics, motion.numbers, 0, **options)
         motion.along(passed, turns, measures)
-        _check_energies(measures)
+        if not aside:
+            _check_energies(measures)
         return record(motion, measures, periods, state, turns)
     if section.later:
         assert orbit.map is not None
@@ -80,7 +81,7 @@ def _followed(
     passage = motion.passed(state, turns, periods, measures, True)
     # an event or a contact at rest at the very start or end is no kink of the motion, as its section tells
     check(PassageStatus.OK if section.later and passage.status in _ONE_SIDED else passage.status)
-    if known is not None:
+    if not aside:
         if known is not PassageStatus.OK and not _same(passage.by_number, turns, orbit.scale):
             check(known)
         _check_energies(measures)
