@@ -59,7 +59,7 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     code = run.advance(period, scene.solver.max_events)
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
-        searched = run.system, run.flows, run.state, run.event_functions
+        searched = run.system, run.flows, run.state, run.watched
         tau = _as_run(_search, run, *searched, 1)
         grown = run.flows, run.state, run.scratch, tau
         _as_run(_amplitudes, run, *grown)

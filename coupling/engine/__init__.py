@@ -1,1 +1,1 @@
-"""The exact engines, `line` for sliders and `plane` for all bodies: backends decides which runs, run is shared."""
+"""The exact engines, `line` for sliders and `plane` for all bodies: backends decides which runs, the rest is shared."""

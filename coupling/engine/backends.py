@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.system.line_system import line_system
@@ -23,7 +22,7 @@ def engine_run(
     if system.in_plane:
         from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 
-        return PlanarRun(system, motion_of(system, start), records, events, max_events, linearisation)
+        return PlanarRun(system, start, records, events, max_events, linearisation)
     from vanedamp.coupling.engine.line.event_driven import EngineRun
 
     return EngineRun(system, line_system(system), start, records, events, max_events)

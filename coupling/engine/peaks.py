@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from vanedamp.coupling.numerics.codes import ACTIVE
 from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound, whole_vectors
@@ -15,10 +13,14 @@ from vanedamp.coupling.numerics.tolerances import PEAK
 GRIDS = 5
 
 
-def grid_factors(rate: np.ndarray, period: float) -> np.ndarray:
-    """Return the factors (GRIDS, m) of modes with these eigenvalues over a step of each grid."""
-    factors: np.ndarray = np.exp(np.outer(0.125 * period * 0.5 ** np.arange(GRIDS), rate))
-    return factors
+@kernel
+def set_grid_factors(flows, s, m, period):
+    """Set the factors of the modes of a flow over a step of each grid."""
+    step = 0.125 * period
+    for level in range(GRIDS):
+        for j in range(m):
+            flows.grid_factor[s, level, j] = exp_minus_one(flows.eigenvalue[s, j] * step) + 1.0
+        step *= 0.5
 
 
 @inlined

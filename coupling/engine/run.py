@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
+from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
+from vanedamp.coupling.engine.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVALUATIONS,
@@ -30,76 +33,132 @@ from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
-
-#: bytes that the subsystems of one run may take
-ROOM = 2**29
-
-
-class IllConditioned(ArithmeticError):
-    """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
-
-
-def with_free_place(
-    stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray | None = None
-) -> tuple[Any, int]:
-    """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
-
-    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
-    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again or, by the
-    times (s,) at which its places were last used, gives away the one that has waited longest, as it is.
-    """
-    free = np.flatnonzero(filled == 0)
-    if len(free):
-        return stack, int(free[0])
-    size = len(filled)
-    if 2 * sum(part.nbytes for part in stack) > ROOM:
-        if used is None:
-            return empty(size), 0
-        return stack, int(np.argmin(used))
-    larger = empty(2 * size)
-    for part, old in zip(larger, stack, strict=True):
-        part[:size] = old
-    return larger, size
-
-
-def places(empty: Callable[[int], Any], room: int) -> int:
-    """Return how many places of a stack `empty(size)` so many bytes hold, all zeros of which take no memory."""
-    return max(4, room // sum(part.nbytes for part in empty(1)))
+from vanedamp.files.store import frozen
 
 
 class EventDrivenRun(ABC):
     """The mutable state of one run of an engine, and the flows of the subsystems that it has met.
 
-    whole: the scene's system; events: whether to keep the log; max_events: after which a run ends.
+    whole: the scene's system; system: its rows as the engine has them; events: whether to keep the log; max_events:
+    after which a run ends. columns: what differs between scenes of a job (engine.columns), or the start of one run.
     """
 
     #: counters that the outcome has
     NUMBERS: ClassVar = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
     #: returns what the rows of the log are (event_log.Rows), from the system
     rows_of: ClassVar[Any]
-    state: Any
+    #: the compiled function, and whether a scene is so common that it is compiled for its lengths
+    compiled: ClassVar[Any]
+    is_common: ClassVar[Any]
+    #: those compiled for lengths, by engine
+    _sized: ClassVar[dict[type, Any]] = {}
+    known: Known
+    #: largest shortening by a tilt over the play, for a status ok
+    linearisation: float = np.inf
     flows: Any
-    #: (capacity, width) the log of a slice
-    log: np.ndarray
+    state: Any
+    watched: Any
+    scratch: Any
+    assembly: Any
 
-    def __init__(self, whole: System, records: Records, events: bool, max_events: int) -> None:
-        self.whole, self.records, self.keep, self.max_events = whole, records, events, max_events
+    def __init__(
+        self, whole: System, system: Any, start: RestartState, records: Records, events: bool, max_events: int
+    ) -> None:
+        self.whole, self.system, self.records = whole, system, records
+        self.keep, self.max_events, self.log = events, max_events, records.log
         self.chunks: list[np.ndarray] = []
         self.begun, self.ended, self._since = False, False, START
         self.listed = 0  # entries of the log, kept or not
+        self.columns, self.job, self.statistics = repeated(whole, system, start), new_job(), UNJUDGED
+        self._new_state()
+        self._run = self.compiled
+        if hasattr(self._run, "sized") and self.is_common(system, self.flows.eigenvalue.shape[1]):
+            if type(self) not in self._sized:
+                self._sized[type(self)] = self._run.sized(*self._records(), 0, 0)
+            self._run = self._sized[type(self)]
 
     @abstractmethod
+    def _new_state(self) -> None:
+        """Make known subsystems, flows, state, event functions and scratch space."""
+
+    @property
+    @abstractmethod
+    def key(self) -> np.ndarray:
+        """What names the present subsystem: closed rows, or states."""
+
+    @abstractmethod
+    def _empty_flows(self, size: int) -> Any:
+        """Return storage for so many flows."""
+
+    @abstractmethod
+    def columns_of(
+        self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
+    ) -> tuple[Columns, Iterable[int]]:
+        """Return columns of scenes by some numbers (k,), by path, and places of those that compiled code cannot run.
+
+        start: of the scene.
+        """
+
+    @abstractmethod
+    def whole_in(self, table: Columns, k: int) -> System:
+        """Return the system of scene k of some columns."""
+
+    def _records(self) -> tuple[Any, ...]:
+        return (
+            self.job, self.columns, self.system, self.known.stack, self.flows, self.state, self.watched, self.records,
+            self.scratch, self.assembly, *self.statistics,
+        )  # fmt: skip
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise InputError for a structure that the engine does not take."""
+
     def begin(self, max_events: int) -> int:
-        """Decide the initial state. Return the code of numerics.codes."""
+        """Decide the initial state. Return the code of numerics.codes. Raises InputError as `check`."""
+        self.begun = True
+        self.check()
+        return self.advance(0, max_events)
 
-    @abstractmethod
     def _advance(self, periods: int, max_events: int) -> int:
         """Run a slice of compiled code. Return the code of numerics.codes."""
+        return int(self._run(*self._records(), periods, max_events))
 
-    @abstractmethod
     def _add_flow(self) -> None:
-        """Add the flow of the subsystem that the state calls for. Raises IllConditioned or LinAlgError."""
+        """Find the subsystem that the state calls for, and a place for it. Raises IllConditioned, LinAlgError."""
+        self.flows = with_place(self.flows, self.known, self.known.place(self.system, self.key), self._empty_flows)
+
+    def run_many(self, job: Job, columns: Columns, statistics: tuple[Any, ...]) -> int:
+        """Go on with the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.
+
+        columns: with a row more than scenes where these are linked; statistics: Setup, LinearParts and LinearModes of
+        the loose and the held system, Measured.
+        """
+        self.job, self.columns, self.statistics, self.chunks = job, columns, statistics, []
+        while True:
+            code = self._advance(0, self.max_events)
+            self._keep_log()
+            if code == NEEDS_FLOW:
+                try:
+                    self._add_flow()
+                except (IllConditioned, np.linalg.LinAlgError):
+                    job.at[CODE] = ILL_CONDITIONED
+            elif code != PAUSED:
+                return code
+
+    def start_in(self, k: int, left: int) -> RestartState:
+        """Return the start of scene k in the columns, in the cavities of the scene, by its place, that has left it."""
+        parts = {name: frozen(getattr(self.columns, name)[k]) for name in STARTS}
+        behind = self.columns.play.shape[1] - (len(self.whole.rest) if self.whole.in_plane else self.whole.contacts)
+        return RestartState(**parts, gap=frozen(self.columns.play[left, behind:][: self.whole.contacts]))
+
+    def _left(self) -> RestartState:
+        """Return the state at the end of the periods done."""
+        self.job.at[STAGE] = LEAVES
+        self._advance(0, 0)
+        self.job.at[STAGE] = RUNS
+        return self.start_in(int(self.job.at[PLACE]), 0)
 
     @abstractmethod
     def _segment(self) -> Segment:
@@ -108,10 +167,6 @@ class EventDrivenRun(ABC):
     @abstractmethod
     def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
         """Return the last event and the time since the segment began, s. log: entries since then."""
-
-    @abstractmethod
-    def _left(self) -> RestartState:
-        """Return the state at the end of the periods done."""
 
     @property
     def counters(self) -> np.ndarray:

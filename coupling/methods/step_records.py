@@ -224,7 +224,7 @@ def _follow_contacts(system, times, motion, records, log, k):
                 motion.counters[IMPACTS] += 1
                 records.impacts[p] += 1
                 if system.surface[r] == LEFT or system.surface[r] == RIGHT:
-                    motion.walls[p, system.body[r]] += 1
+                    records.walls[p, system.body[r]] += 1
                 records.collided[p] += 0.5 * before * before / system.delassus[r, r]
             motion.speed[r], motion.total[r], motion.total[u + r], motion.lost[r] = before, 0.0, 0.0, 0.0
             motion.begun[r] = (p * (len(times.phase) - 1) + k) * times.step

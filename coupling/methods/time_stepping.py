@@ -13,9 +13,9 @@ import numpy as np
 from vanedamp.coupling.numerics.codes import COUNTERS, DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
-from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, rows_of_units
+from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.plane import plane_of
-from vanedamp.coupling.response.records import ENERGIES, IMPACT, Records
+from vanedamp.coupling.response.records import ENERGIES, IMPACT, LINE_WIDTH, WIDTH, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of
 from vanedamp.coupling.response.restart_state import RestartState
@@ -64,7 +64,6 @@ class Motion(NamedTuple):
     half: np.ndarray  # (N,) velocity half a step later (central differences), or acceleration (Newmark)
     force: np.ndarray  # (2u,) of rows, N
     counters: np.ndarray  # (COUNTERS,) int
-    walls: np.ndarray  # (periods, b) int: impacts on walls
     ledger: np.ndarray  # (6,) J
     deepest: np.ndarray  # (1,) largest penetration relative to the free travel
 
@@ -131,7 +130,7 @@ def start(system: System, begun: RestartState, spring: np.ndarray, records: Reco
     contact = np.arange(u) < system.contacts
     return on_structure(system), Motion(
         q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
-        counters=np.zeros(COUNTERS, np.int64), walls=np.zeros((len(records.impacts), system.bodies), np.int64),
+        counters=np.zeros(COUNTERS, np.int64),
         ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
         spring=spring,
         live=np.flatnonzero(np.r_[contact, ~contact | (system.friction > 0.0)]), active=np.zeros(u, np.int64),
@@ -148,7 +147,7 @@ class SteppedRun:
         self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
     ) -> None:
         self.system, self.march, self.motion, self.records, self.options = system, march, motion, records, options
-        self.plane = plane_of(system, records, options.linearisation, motion.walls) if system.in_plane else None
+        self.plane = plane_of(system, records, options.linearisation) if system.in_plane else None
         # a contact logs at most one impact per step
         self.slice = max(_SLICE // max(system.contacts, 1), 1)
         self.log = np.zeros((_SLICE if events else 0, WIDTH))

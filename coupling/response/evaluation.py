@@ -240,9 +240,9 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
     energy = {name: float(value) for name, value in sums["energy"].items()}
     status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
     if run.plane is not None:
-        in_plane = in_plane_of(run.plane, slice(first, done))
-        status = Status.TILTED if _tilted(in_plane, run.plane.bound) and status in _USABLE else status
-        sums |= in_plane
+        found = in_plane_of(run.plane, slice(first, done))
+        status = levelled_status(status, found, run.plane.bound)
+        sums |= found
     section, b = records.section[: done + 1], system.bodies
     return {
         "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
@@ -262,20 +262,25 @@ def closed_status(status: Status, imbalance: float, gain: float, bound: float) -
     return Status.ENERGY if not closed and status in _USABLE else status
 
 
+def in_plane(tilt: np.ndarray, lifted: np.ndarray, walls: np.ndarray, neglected: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what quantities need of planar bodies (b, ...), over the evaluated periods; nan for sliders.
+
+    tilt: largest, rad; lifted: time off the floor, s; walls: impacts on walls; neglected: as of a Plane.
+    """
+    slider = np.where(np.isnan(neglected), np.nan, 1.0)
+    return {"tilt": slider * tilt, "lifted": slider * lifted, "walls": walls, "neglected": neglected}
+
+
 def in_plane_of(plane: Plane, window: slice) -> dict[str, np.ndarray]:
-    """Return what quantities need of planar bodies (b,), over the evaluated periods; nan for sliders."""
-    slider = np.where(np.isnan(plane.neglected), np.nan, 1.0)
-    return {
-        "tilt": slider * plane.tilt[window].max(axis=0, initial=0.0),
-        "lifted": slider * plane.lifted[window].sum(axis=0),
-        "walls": plane.walls[window].sum(axis=0),
-        "neglected": plane.neglected,
-    }
+    """Return what quantities need of planar bodies (b,), over the evaluated periods."""
+    tilt, lifted = plane.tilt[window].max(axis=0, initial=0.0), plane.lifted[window].sum(axis=0)
+    return in_plane(tilt, lifted, plane.walls[window].sum(axis=0), plane.neglected)
 
 
-def _tilted(in_plane: Mapping[str, np.ndarray], bound: float) -> bool:
-    """Return whether bodies tilt too far."""
-    return bool(np.any(in_plane["neglected"] * in_plane["tilt"] ** 2 > bound))
+def levelled_status(status: Status, found: Mapping[str, np.ndarray], bound: float) -> Status:
+    """Return the status of a run by how far planar bodies tilt, too."""
+    tilted = bool(np.any(found["neglected"] * found["tilt"] ** 2 > bound))
+    return Status.TILTED if tilted and status in _USABLE else status
 
 
 def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str, Any] = {}) -> Mapping[str, Any]:

@@ -11,12 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.response.records import DETACHES, IMPACT, KINDS
+from vanedamp.coupling.response.records import DETACHES, IMPACT, KINDS, WIDTH
 from vanedamp.coupling.response.response import Event
 from vanedamp.coupling.system.system import FLOOR, SURFACES, System
-
-#: columns of the log of bodies in the plane, and of the log of sliders
-WIDTH, LINE_WIDTH = 8, 6
 
 
 class Rows(NamedTuple):

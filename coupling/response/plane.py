@@ -27,9 +27,9 @@ class Plane(NamedTuple):
     walls: np.ndarray
 
 
-def plane_of(system: System, records: Records, linearisation: float, walls: np.ndarray) -> Plane:
-    """Return the results in the plane of a run; walls: (periods, b) impacts on walls."""
-    return Plane(records.tilt, records.lifted, system.neglected, linearisation, walls)
+def plane_of(system: System, records: Records, linearisation: float) -> Plane:
+    """Return the results in the plane of a run."""
+    return Plane(records.tilt, records.lifted, system.neglected, linearisation, records.walls)
 
 
 def planar_samples(system: System, x: np.ndarray, q: np.ndarray, shut: np.ndarray) -> PlanarSamples:

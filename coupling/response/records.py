@@ -12,6 +12,8 @@ from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
+#: columns of the log of bodies in the plane, and of the log of sliders
+WIDTH, LINE_WIDTH = 8, 6
 #: entries of the energy balance
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
 
@@ -33,9 +35,10 @@ class Records(NamedTuple):
     coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; first nan: not kept
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
+    walls: np.ndarray  # (periods + 1, b) impacts of bodies in the plane on their walls
     sampled: np.ndarray  # (periods * s, N) all coordinates at the samples, of runs in the plane
     shut: np.ndarray  # (periods * s, u) int: whether contacts are closed there
-    log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
+    log: np.ndarray  # (capacity, WIDTH or LINE_WIDTH) entries of a slice (response.event_log)
     swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
     worn: np.ndarray  # (periods + 1, w) work of friction of each row of the log, J; w = 0: not wanted
     struck: np.ndarray  # (periods + 1, w) sum over its impacts of their energy to the power `exponent`, J^exponent
@@ -74,9 +77,10 @@ def new_records(
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
         samples=np.zeros((periods * samples, 1 + b)),
         coordinates=kept, tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
+        walls=np.zeros((periods + 1, b), np.int64),
         sampled=np.zeros((periods * samples, len(system.mass))),
         shut=np.zeros((periods * samples, len(system.rest)), np.int8),
-        log=np.zeros((4096 + 4 * (system.bodies + system.dampers + system.contacts), 6)),
+        log=np.zeros((4096 + 8 * (b + system.dampers + system.contacts), WIDTH if system.in_plane else LINE_WIDTH)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
         worn=worn, struck=struck, hits=hits, exponent=np.array([1.0 if exponent is None else exponent]),
         outputs=np.tile([-np.inf, np.inf, 0.0], (periods + 1, len(system.outputs) * outputs, 1)),

@@ -1,4 +1,4 @@
-"""Points of a sweep that differ in numbers only, run as one in compiled code (engine.line.scenes).
+"""Points of a sweep that differ in numbers only, run as one in compiled code (engine.scenes).
 
 A scene of a sweep costs a run a few microseconds there, where Python would take a thousand times as long to make it.
 Points whose other values differ, and scenes that the compiled code refuses, are run one by one.
@@ -16,15 +16,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import LEVELS, STARTS, Columns, columned, columns, tells
-from vanedamp.coupling.engine.line.event_driven import EngineRun
-from vanedamp.coupling.engine.line.scenes import (
+from vanedamp.coupling.engine.columns import LEVELS, STARTS, Columns, columned, tells
+from vanedamp.coupling.engine.run import EventDrivenRun
+from vanedamp.coupling.engine.scenes import (
     BEGINS,
     COUNT,
     DROPPED,
     GIVEN,
     LEFT,
     LINKS,
+    NEGLECTED,
     OWN,
     PLACE,
     STAGE,
@@ -34,8 +35,8 @@ from vanedamp.coupling.engine.line.scenes import (
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import OUTSIDE
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
-from vanedamp.coupling.quantities.sums import ENERGIES, SUMS
-from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status
+from vanedamp.coupling.quantities.sums import ENERGIES, SUMS, sources_of
+from vanedamp.coupling.response.evaluation import STATUS_OF, class_name, closed_status, in_plane, levelled_status
 from vanedamp.coupling.response.figures import measured_of
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import marked_with_speed, start_of
@@ -47,7 +48,6 @@ from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import PARTS, Row
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient, most_periods
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
@@ -70,8 +70,8 @@ class Kind:
         """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
         self.observers = parts_of(scene)
         run = run_of(scene, self.observers)
-        if not isinstance(run, EngineRun) or scene.contact.parallel:
-            raise ValueError("not a scene of the engine for sliders, or one whose contacts begin at several gaps")
+        if not isinstance(run, EventDrivenRun) or scene.contact.parallel:
+            raise ValueError("not a scene of the exact engine, or one whose contacts begin at several gaps")
         run.check()
         self.scene, self.run, self.start, self._data = scene, run, start_of(scene, run.whole), scene.to_dict()
         transient, self.linear = Transient(scene, run.whole), linear_responses(scene, run.whole)
@@ -96,7 +96,8 @@ class Kind:
         """
         run, size = self.run, len(next(iter(values.values())))
         given = [] if start is None else [start] if isinstance(start, RestartState) else start
-        job = new_job(size, most_periods(self.scene), LINKS if linked else GIVEN if given else OWN, run.keep)
+        kind, bodies = LINKS if linked else GIVEN if given else OWN, run.whole.bodies * run.whole.in_plane
+        job = new_job(size, most_periods(self.scene), kind, run.keep, bodies)
         table = self._columns(values, given, linked, job)
         first = given[0] if linked and given else None
         for count in [size] if keep is None else range(1, size + 1):
@@ -115,6 +116,20 @@ class Kind:
                 keep(count - 1, self._parts(job, table, values, count - 1))
         return job, self._linear(table, values), self._left(job, size, first) if linked else None
 
+    def ended(self, job: Job, k: int) -> tuple[Status, str]:
+        """Return how scene k of a job has ended, and the class of its motion."""
+        unbalanced, made = (float(job.sums[k, SUMS.index(name)]) for name in ("unbalanced", "made"))
+        status = closed_status(STATUS_OF[int(job.codes[k])], unbalanced, made, OPEN_LEDGER)
+        if job.plane.size:
+            status = levelled_status(status, in_plane(*job.plane[:, k]), self.run.linearisation)
+        return status, class_name(int(job.kinds[k]))
+
+    def sources(self, job: Job, linear: np.ndarray, k: Any) -> dict[str, Any]:
+        """Return what quantities need of scene k of a job, or of several, (n, ...) each."""
+        undamped, fixed = linear[k].T
+        plane = in_plane(*job.plane[:, k]) if job.plane.size else {}
+        return sources_of(job.sums[k]) | {"undamped": undamped, "fixed": fixed, "overlap": 0.0 * undamped} | plane
+
     def left(self, k: int) -> RestartState:
         """Return the state that scene k of the last job has left, which are not linked."""
         return marked_with_speed(self.scene, self.run.start_in(k, k))
@@ -127,23 +142,12 @@ class Kind:
         found |= {"section": section[:, :2], "slip": section[:, 3 : 3 + b], "slip_velocity": section[:, 3 + b :]}
         if self.observers:
             scene = with_numbers(self.scene, self._data, {path: float(numbers[k]) for path, numbers in values.items()})
-            run, known = replace(run, system=self._whole(table, k)), dict[str, Any](transient=first)
+            run, known = replace(run, system=self.run.whole_in(table, k)), dict[str, Any](transient=first)
             known["energy"] = {name: float(job.sums[k, SUMS.index(name)]) for name in ENERGIES}
             found |= dict.fromkeys(PARTS)
             for observer in self.observers:
                 found |= observer.fields(scene, run, known)
         return found
-
-    def _whole(self, table: Columns, k: int) -> System:
-        """Return the system of scene k."""
-        whole, line = self.run.whole, self.run.system
-        rest, play, load, contacts = whole.rest.copy(), whole.play.copy(), whole.load.copy(), whole.contacts
-        rest[:contacts], play[:contacts] = (part[k, line.friction_rows :] for part in (table.rest, table.free_travel))
-        load[:, : table.load.shape[2]] = table.load[k]
-        return whole._replace(
-            omega=float(table.omega[k]), period=float(table.period[k]), frequency=table.frequency[k], rest=rest,
-            play=play, load=load,
-        )  # fmt: skip
 
     def _columns(
         self, values: Mapping[str, np.ndarray], given: Sequence[RestartState], linked: bool, job: Job
@@ -154,9 +158,12 @@ class Kind:
         """
         if linked:
             values = {path: np.append(numbers, numbers[-1]) for path, numbers in values.items()}
-        table = columns(self.scene, self.run.whole, self.run.system, self.start, values)
+        table, outside = self.run.columns_of(self.scene, self.start, values)
+        job.codes[[k for k in outside if k < len(job.codes)]] = OUTSIDE
+        if job.plane.size:
+            job.plane[NEGLECTED] = table.neglected[: len(job.codes)]
         for k, start in enumerate(given):
-            moved = start_of(self.scene, self._whole(table, k), start)
+            moved = start_of(self.scene, self.run.whole_in(table, k), start)
             for name in STARTS:
                 getattr(table, name)[k] = getattr(start, name)
             if not all(np.array_equal(getattr(start, name), getattr(moved, name)) for name in STARTS):
@@ -178,12 +185,6 @@ class Kind:
                 load = table.load[:size, np.isin(self.run.whole.order, response.order), :n]
             found.append(response.amplitude(frequency, load))
         return np.transpose(found)
-
-
-def ended_as(job: Job, k: int) -> tuple[Status, str]:
-    """Return how scene k of a job has ended, and the class of its motion."""
-    unbalanced, made = (float(job.sums[k, SUMS.index(name)]) for name in ("unbalanced", "made"))
-    return closed_status(STATUS_OF[int(job.codes[k])], unbalanced, made, OPEN_LEDGER), class_name(int(job.kinds[k]))
 
 
 def _own(record: Any) -> Any:

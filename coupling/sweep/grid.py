@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
 from vanedamp.coupling.scene.paths import assign, axis_values, namesake
@@ -278,7 +278,7 @@ def _check_speeds(points: Points, axes: Mapping[str, Sequence[Any]]) -> None:
 def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
     """Return scenes that decide whether all points are scenes. Raises InputError for a point that is none.
 
-    The frequency, and what has a column (engine.line.columns), has bounds that are linear in all such numbers: where
+    The frequency, and what has a column (engine.columns), has bounds that are linear in all such numbers: where
     the corners of the grid are scenes, so is what lies between.
     """
     known = {path for path in columned(points.base, axes) if _ordered(axes[path])}

@@ -62,13 +62,13 @@ class Row:
     @property
     def alone(self) -> bool:
         """Whether a run has to be one of its own, because quantities need more than compiled code keeps."""
-        known = OF_MOTION + OF_SECTIONS + PARTS
+        known = OF_MOTION + OF_PLANE + OF_SECTIONS + PARTS
         return len(self.texts) > len(TEXTS) or not all(one.exists(known) for one in self.quantities.values())
 
     @property
     def keeps(self) -> bool:
         """Whether quantities need more of a run than its sums."""
-        return not all(one.exists(OF_MOTION) for one in self.quantities.values())
+        return not all(one.exists(OF_MOTION + OF_PLANE) for one in self.quantities.values())
 
     def put(self, row: np.ndarray, response: Response, more: Mapping[str, Any]) -> tuple[str, ...]:
         """Put the quantities of a run into a row (width,); return its texts. more: what runs have no part for."""
@@ -98,10 +98,14 @@ class Row:
         rows[:, place] = values.reshape(len(rows), -1)
 
     def put_many(self, rows: np.ndarray, sources: Mapping[str, Any]) -> None:
-        """Put the quantities of k runs into rows (k, width), by what they need, (k,) each."""
+        """Put the quantities of k runs into rows (k, width), by what they need, (k, ...) each."""
         with np.errstate(all="ignore"):
             for one in self._had_by(sources):
-                self._set(rows, one.name, np.asarray(one.of(sources)))
+                if one.dims == ("damper",):  # of bodies in the plane, by the formula for one run
+                    each = (one.of({name: sources[name][k] for name in one.needs}) for k in range(len(rows)))
+                    self._set(rows, one.name, np.array(list(each)))
+                else:
+                    self._set(rows, one.name, np.asarray(one.of(sources)))
 
     def value(self, rows: np.ndarray, name: str) -> np.ndarray:
         """Return a quantity of rows (..., width); nan where points have none."""

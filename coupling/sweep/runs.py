@@ -14,16 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, UNCERTAIN
 from vanedamp.coupling.quantities.quantity import Measured, evaluated
-from vanedamp.coupling.quantities.sums import sources_of
 from vanedamp.coupling.response.evaluation import known_value
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import Common, Kind, ended_as, keys, kind_of, without_starts
+from vanedamp.coupling.sweep.alike import Common, Kind, keys, kind_of, without_starts
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import InputError
@@ -98,12 +97,12 @@ class Runs:
         given = [start for start in starts if start is not None]
         job, linear, _ = kind.run_all(values, given or None, False, lambda *_: None)
         found = list[Ran | None]()
-        for k, (undamped, fixed) in enumerate(linear.tolist()):
+        for k in range(len(points)):
             if not job.codes[k]:
                 found.append(None)
                 continue
             final = kind.left(k) if job.codes[k] in _WHOLE else None
-            status, classification = ended_as(job, k)
-            sources = sources_of(job.sums[k]) | {"undamped": undamped, "fixed": fixed, "overlap": 0.0}
-            found.append(Ran(status, classification, evaluated(sources, partial(known_value, status)), final))
+            status, classification = kind.ended(job, k)
+            quantities = evaluated(kind.sources(job, linear, k), partial(known_value, status))
+            found.append(Ran(status, classification, quantities, final))
         return found

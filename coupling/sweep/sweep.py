@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.methods.registry import wall_warnings
 from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.quantity import evaluated

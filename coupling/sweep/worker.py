@@ -14,12 +14,11 @@ from numpy.linalg import LinAlgError
 
 from vanedamp.coupling.exponents.lyapunov import NO_EXPONENT, lyapunov
 from vanedamp.coupling.numerics.compiler.jit import CacheError
-from vanedamp.coupling.quantities.sums import sources_of
 from vanedamp.coupling.response.evaluation import linear_parts
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import are_scenes, ended_as, groups, kind_of
+from vanedamp.coupling.sweep.alike import are_scenes, groups, kind_of
 from vanedamp.coupling.sweep.grid import Points, PointSet, PointTable
 from vanedamp.coupling.sweep.row import TEXTS, Row
 from vanedamp.files.errors import VanedampError
@@ -89,7 +88,7 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
         if kind is not None:
             with suppress(InputError):  # a start that does not fit: the runs say so
                 found = kind.run_all(numbers, state, task.linked, alone, keep if own.keeps else None)
-        if found is None:
+        if kind is None or found is None:
             for place in range(len(places)):
                 final = alone(place, state)
                 # a run that broke off within a period leaves the state that it began with
@@ -100,13 +99,11 @@ def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], 
         if not len(ran):
             continue
         at = np.array(places)[ran]
-        sums = sources_of(job.sums[ran])
-        undamped, fixed = linear[ran].T
         rows = values[at]
-        own.put_many(rows, sums | {"undamped": undamped, "fixed": fixed, "overlap": np.zeros(len(ran))})
+        own.put_many(rows, kind.sources(job, linear, ran))
         values[at] = rows
         for place, k in zip(at, ran, strict=True):
-            status, motion = ended_as(job, k)
+            status, motion = kind.ended(job, k)
             texts[place] = status.value, motion
     return TaskResult(values, texts, state, time.perf_counter() - started)
 

@@ -92,7 +92,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         restitution_at=law_address(scene.contact, values(units["restitution"])[: len(contacts)]),
         in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
-    return system if active() is not None else _with_scales(system)
+    return system if active() is not None else with_scales(system)
 
 
 # parts of a system by the names of its fields; n modes, N = size coordinates, b bodies
@@ -241,11 +241,11 @@ def _stiffness(
 def at_frequency(system: System, frequency: float) -> System:
     """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
     omega = 2 * np.pi * frequency
-    return _with_scales(system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order))
+    return with_scales(system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order))
 
 
-def _with_scales(system: System) -> System:
-    """Return a system with the moment and the speed that follow from the rest of it."""
+def with_scales(system: System) -> System:
+    """Return a system with the moment and the speed that follow from the rest of it (System)."""
     yields = np.isfinite(system.spring)
     mobility = (system.J[: len(yields)][yields] ** 2 / system.mass).sum(axis=1)
     pulled = (system.elongation[:, : system.modes] ** 2).sum(axis=1)

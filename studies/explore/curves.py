@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.scene.paths import Range
 from vanedamp.coupling.scene.rotation import FREQUENCY

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.tools.random_sweeps import TRAPS, RandomSweep, differing, one_by_one, random_sweep, run_cut, same
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene

@@ -6,8 +6,7 @@ import numpy as np
 
 from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.methods import moreau
-from vanedamp.coupling.response.event_log import WIDTH
-from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.records import WIDTH, new_records
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Motion, assemble
@@ -48,8 +47,8 @@ def initial_motion(scene, system) -> Motion:
 
 def open_run(scene, periods, events, samples=0):
     """A run of a scene that has not begun."""
-    system = assemble(scene)
-    return Run(system, initial_motion(scene, system), new_records(system, periods, samples), True, events)
+    system = assemble(scene)._replace(in_plane=True)  # sliders, too
+    return Run(system, start_of(scene, system), new_records(system, periods, samples), True, events)
 
 
 def run_planar(scene, periods, events=10**7, samples=0):

@@ -20,24 +20,16 @@ from scipy.linalg import expm, null_space
 from tests.tools.planar import Run, open_run
 from vanedamp.coupling.engine.line.event_functions import CHATTER
 from vanedamp.coupling.engine.line.gap_kinematics import SIMULTANEOUS
-from vanedamp.coupling.engine.plane.automaton import advance, begin
-from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow
-from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVENT_BUDGET,
     EVENTS,
-    ILL_CONDITIONED,
     LEAVING,
-    LOGGED,
-    NEEDS_FLOW,
     OPEN,
-    PAUSED,
     PERIOD,
     SLIP_LEFT,
     SLIP_RIGHT,
     STICK,
-    UNDECIDED,
 )
 from vanedamp.coupling.numerics.tolerances import COLLAPSE
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
@@ -286,14 +278,13 @@ class Stepper:
         self.run: Run = open_run(scene, scene.time.simulated, 10**9)
         run = self.run
         self.periods = scene.time.simulated
-        self.code = DONE if begin(run.system, run.state, run.records, run.log, run.scratch) else UNDECIDED
+        self.code = run.begin(0)
         self.hits = self._take()
 
     def _take(self) -> np.ndarray:
-        counters, log = self.run.state.counters, self.run.log
-        taken = log[: counters[LOGGED]].copy()
-        counters[LOGGED] = 0
-        return taken[taken[:, 1] == IMPACT]
+        taken = self.run.events(IMPACT)
+        self.run.chunks.clear()
+        return taken
 
     def step(self) -> np.ndarray | None:
         """Advance to the next event or the end of the period. Returns the impacts there, None at the end of the run."""
@@ -308,20 +299,8 @@ class Stepper:
             self._advance(self.periods, int(self.run.state.counters[EVENTS]), self.run)
 
     def _advance(self, periods: int, events: int, run: Run) -> np.ndarray:
-        while True:
-            self.code = advance(
-                run.system, run.flows, run.state, run.watched, run.records, run.log, run.scratch, periods,
-                events,
-            )  # fmt: skip
-            if self.code == PAUSED:
-                continue
-            if self.code != NEEDS_FLOW:
-                return self._take()
-            try:
-                run.flows = add_flow(run.flows, run.system, run.state.state)
-            except IllConditioned:
-                self.code = ILL_CONDITIONED
-                return self._take()
+        self.code = run.advance(periods, events)
+        return self._take()
 
     def moment(self) -> Moment:
         """Where the run is now."""

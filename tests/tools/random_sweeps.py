@@ -36,6 +36,7 @@ def random_sweep(seed: int) -> RandomSweep:
     rng = np.random.default_rng([seed, 49])
     tables, linked = _tables(rng), bool(rng.random() < 0.4)
     tables |= _kept(np.random.default_rng([seed, 50]), tables)
+    tables |= _in_plane(np.random.default_rng([seed, 51]), tables)
     scene = validate(Scene, tables, f"random sweep {seed}")
     drawn = dict(_axes(rng, scene))
     paths = rng.permutation(list(drawn))[: rng.integers(1, 5)].tolist()
@@ -104,6 +105,27 @@ def _kept(rng: np.random.Generator, tables: dict[str, Any]) -> dict[str, Any]:
     if rng.random() < 0.15:
         found["sweep"] = {"sections": int(rng.integers(1, 12))}
     return found
+
+
+def _in_plane(rng: np.random.Generator, tables: dict[str, Any]) -> dict[str, Any]:
+    """Return tables, in a third of the sweeps, that let bodies move in the plane: blocks, discs, two-phase impacts."""
+    if rng.random() > 0.35:
+        return {}
+    laws = [{"law": "poisson"}, {"law": "newton"}, {"law": "compliant", "stiffness": 100.0}]
+    names = [cavity["name"] for cavity in tables["cavity"]]
+    kinds = dict(zip(names, rng.choice(["slider", "block", "disc"], len(names), p=[0.3, 0.5, 0.2]), strict=True))
+    bodies = []
+    for body in tables["damper"]:
+        kind = kinds[body["cavity"]]
+        shape = {
+            "slider": {}, "block": {"shape": "block", "length": rng.uniform(0.5, 2.0), "height": rng.uniform(0.3, 1.5)},
+            "disc": {"shape": "disc", "radius": rng.uniform(0.2, 1.0)},
+        }[str(kind)]  # fmt: skip
+        bodies.append(body | shape)
+    plays = [cavity | {"play": _between(rng, 0.01, 0.3)} for cavity in tables["cavity"]]
+    gravity = {"acceleration": float(rng.choice([0.02, 0.1]))}
+    law = tables.get("contact", {}) if "pair" in tables.get("contact", {}) else laws[rng.integers(3)]
+    return {"damper": bodies, "cavity": plays, "gravity": gravity, "contact": law}
 
 
 def _axes(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[str, Any]]:

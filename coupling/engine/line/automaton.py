@@ -37,6 +37,7 @@ from vanedamp.coupling.engine.line.gap_kinematics import (
 from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
 from vanedamp.coupling.engine.line.recording import record_start, structure_state
 from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
+from vanedamp.coupling.engine.scenes import SLICE
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     ACTIVE,
@@ -72,9 +73,6 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import comparing, inlined, kernel, summing
 from vanedamp.coupling.numerics.tolerances import AT_START, CANCELLED, SIMULTANEOUS
 from vanedamp.coupling.response.records import FRICTION
-
-#: segments after which a run returns to Python, which sees interrupts
-SLICE = 4096
 
 
 @kernel

@@ -17,6 +17,7 @@ from scipy.linalg import qr, solve_triangular
 from scipy.linalg.lapack import dgejsv
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.engine.known import IllConditioned
 from vanedamp.coupling.engine.line.tolerances import (
     ALIKE,
     INDEPENDENT,
@@ -27,7 +28,6 @@ from vanedamp.coupling.engine.line.tolerances import (
     SHIFTS,
     STEPS,
 )
-from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST, NEARLY_EQUAL
 
 _EPS = float(np.finfo(float).eps)

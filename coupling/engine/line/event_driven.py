@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, ClassVar
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.columns import STARTS, Columns, repeated
-from vanedamp.coupling.engine.line.complex_modes import IllConditioned, complex_modes
+from vanedamp.coupling.engine.columns import Columns, system_in
+from vanedamp.coupling.engine.known import IllConditioned
+from vanedamp.coupling.engine.line.columns import columns
+from vanedamp.coupling.engine.line.complex_modes import complex_modes
 from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
-from vanedamp.coupling.engine.line.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job, run
+from vanedamp.coupling.engine.line.scenes import run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
-from vanedamp.coupling.engine.line.subsystems import known_of
-from vanedamp.coupling.engine.run import EventDrivenRun, with_free_place
+from vanedamp.coupling.engine.line.subsystem_assembly import Flows, empty_flows
+from vanedamp.coupling.engine.line.subsystems import known_subsystems
+from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import (
     ACTIVE,
     AT_LOW,
@@ -24,10 +26,7 @@ from vanedamp.coupling.numerics.codes import (
     CLOSES,
     FLOW,
     HELD,
-    ILL_CONDITIONED,
-    NEEDS_FLOW,
     PARTS,
-    PAUSED,
     PERIOD,
     POSITION,
     ROOT,
@@ -37,17 +36,14 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.tolerances import RESOLUTION
 from vanedamp.coupling.response.event_log import rows_of_line
-from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, Records
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import place_sliders
 from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
 from vanedamp.coupling.system.system import System
-from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
-
-#: the function compiled for the lengths of common scenes
-_COMMON: list[Any] = []
 
 
 def is_common(system: LineSystem, modes: int) -> bool:
@@ -63,43 +59,40 @@ class EngineRun(EventDrivenRun):
     """A run of sliders. system: its rows; known: subsystems that runs with its structure have met."""
 
     rows_of: ClassVar = staticmethod(rows_of_line)
+    compiled: ClassVar = staticmethod(run)
+    is_common: ClassVar = staticmethod(is_common)
 
-    def __init__(
-        self, whole: System, system: LineSystem, start: RestartState, records: Records, events: bool,
-        max_events: int,
-    ) -> None:  # fmt: skip
-        super().__init__(whole, records, events, max_events)
-        self.system, self.log, self._rows = system, records.log, rows_of_units(whole)
-        self.known, self.assembly, self.flows = known_of(system), new_assembly_scratch(system), empty_flows(system)
+    def _new_state(self) -> None:
+        system, self._rows = self.system, rows_of_units(self.whole)
+        self.known, self.flows = known_subsystems(system), empty_flows(system)
+        self.assembly = new_assembly_scratch(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.state, self.columns = new_state(system, modes), repeated(system, start)
-        self.event_functions = new_event_functions(system, modes)
+        self.state, self.watched = new_state(system, modes), new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
-        self.job, self.statistics = new_job(), UNJUDGED
-        self._run = self._common_run() if is_common(system, modes) and hasattr(run, "sized") else run
 
-    def _common_run(self) -> Any:
-        """Return the function compiled for the lengths of common scenes, which are the same for all of them."""
-        if not _COMMON:
-            _COMMON.append(run.sized(*self._records(), 0, 0))
-        return _COMMON[0]
+    @property
+    def key(self) -> np.ndarray:
+        """The closed rows."""
+        closed: np.ndarray = self.state.active_set
+        return closed
 
-    def _records(self) -> tuple[Any, ...]:
-        return (
-            self.job, self.columns, self.system, self.known.stack, self.flows, self.state, self.event_functions,
-            self.records, self.scratch, self.assembly, *self.statistics,
-        )  # fmt: skip
+    def _empty_flows(self, size: int) -> Flows:
+        return empty_flows(self.system, size)
+
+    def columns_of(
+        self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
+    ) -> tuple[Columns, Iterable[int]]:
+        """Return the columns of scenes, as EventDrivenRun says."""
+        return columns(scene, self.whole, self.system, start, values), ()
+
+    def whole_in(self, table: Columns, k: int) -> System:
+        """Return the system of scene k."""
+        return system_in(self.whole, table, k, np.arange(self.whole.contacts))
 
     def reuse(self, earlier: EngineRun) -> None:
         """Take over the flows of an earlier run of the same system."""
         if self.whole is earlier.whole:
             self.flows = earlier.flows
-
-    def begin(self, max_events: int) -> int:
-        """Decide the initial state and record it. Return the code of numerics.codes. Raises InputError as `check`."""
-        self.begun = True
-        self.check()
-        return self.advance(0, max_events)
 
     def check(self) -> None:
         """Raise InputError for a structure that is critically damped without any contact."""
@@ -110,19 +103,9 @@ class EngineRun(EventDrivenRun):
             except IllConditioned as error:
                 raise InputError(f"structure: {error}; change its damping slightly") from None
 
-    def _advance(self, periods: int, max_events: int) -> int:
-        return int(self._run(*self._records(), periods, max_events))
-
-    def _add_flow(self) -> None:
-        k = self.known.place(self.system, self.state.active_set)
-        own = self.flows.subsystem
-        if not np.any(own == self.known.stack.number[k]):
-            self.flows, s = with_free_place(self.flows, own, partial(empty_flows, self.system), self.flows.used)
-            self.flows.subsystem[s] = self.flows.modes[s] = 0
-
     def _segment(self) -> Segment:
         # roots of other segments do not apply
-        self.event_functions.status[int(self.counters[CARRIED]) :] = BOUNDED
+        self.watched.status[int(self.counters[CARRIED]) :] = BOUNDED
         system, line, rows, flows, st = self.whole, self.system, self._rows, self.flows, self.state
         s, active = int(st.counters[FLOW]), slice(int(st.counters[ACTIVE]))
         n, b, units, size = line.modes, line.bodies, len(rows), len(system.mass)
@@ -168,7 +151,7 @@ class EngineRun(EventDrivenRun):
         )  # fmt: skip
 
     def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
-        system, line, rows, st, watched = self.whole, self.system, self._rows, self.state, self.event_functions
+        system, line, rows, st, watched = self.whole, self.system, self._rows, self.state, self.watched
         unit, what, elapsed, hits = -1, 0, 0.0, True
         if since is not START:
             roots = np.flatnonzero(watched.status == ROOT)
@@ -188,33 +171,3 @@ class EngineRun(EventDrivenRun):
             before=np.array([met.get(int(rows[r]), 0.0) for r in struck]), after=st.velocity[rows[struck]],
             loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
         )  # fmt: skip
-
-    def run_many(self, job: Job, columns: Columns, statistics: tuple[Any, ...]) -> int:
-        """Go on with the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.
-
-        columns: with a row more than scenes where these are linked; statistics: Setup, LinearParts and LinearModes of
-        the loose and the held system, Measured.
-        """
-        self.job, self.columns, self.statistics, self.chunks = job, columns, statistics, []
-        while True:
-            code = self._advance(0, self.max_events)
-            self._keep_log()
-            if code == NEEDS_FLOW:
-                try:
-                    self._add_flow()
-                except (IllConditioned, np.linalg.LinAlgError):
-                    job.at[CODE] = ILL_CONDITIONED
-            elif code != PAUSED:
-                return code
-
-    def _left(self) -> RestartState:
-        self.job.at[STAGE] = LEAVES
-        self._advance(0, 0)
-        self.job.at[STAGE] = RUNS
-        return self.start_in(int(self.job.at[PLACE]), 0)
-
-    def start_in(self, k: int, left: int) -> RestartState:
-        """Return the start of scene k in the columns, in the cavities of the scene, by its place, that has left it."""
-        parts = [getattr(self.columns, name)[k] for name in STARTS]
-        travels = self.columns.free_travel[left, self.system.friction_rows :]
-        return RestartState(*map(frozen, (*parts, travels)))

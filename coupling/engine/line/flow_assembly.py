@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.form_assembly import set_energies
+from vanedamp.coupling.engine.form_assembly import (
+    FormScratch,
+    damp,
+    invert_rates,
+    kick,
+    list_single,
+    new_form_scratch,
+    set_form,
+    set_linear,
+    split,
+    take_factor,
+)
 from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import FAR
-from vanedamp.coupling.engine.peaks import GRIDS
-from vanedamp.coupling.numerics.codes import DONE, ILL_CONDITIONED, NEEDS_FLOW
+from vanedamp.coupling.engine.peaks import set_grid_factors
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.elimination import reciprocal, solve
-from vanedamp.coupling.numerics.exponentials import exp_minus_one
 from vanedamp.coupling.numerics.tolerances import CANCELLED
 from vanedamp.coupling.system.line_system import LineSystem
 
 
 @record
 class AssemblyScratch(NamedTuple):
-    """Space for intermediate results of `fill`: m complex modes, M with the harmonics."""
+    """Space for intermediate results of `fill`: m complex modes."""
 
     # harmonics and the modes that they drive
     order: Annotated[np.ndarray, "m", int]  # which mode of the subsystem each mode of the flow is
@@ -34,29 +44,17 @@ class AssemblyScratch(NamedTuple):
     # rows
     reach: Annotated[np.ndarray, "N"]  # of p under weight
     own: Annotated[np.ndarray, "b", complex]  # displacement of each body that its carrier does not have
-    body_rate: Annotated[np.ndarray, "M b", complex]  # speed of each body
     row_acceleration: Annotated[np.ndarray, "r", complex]
     row_size: Annotated[np.ndarray, "r"]  # size of its terms
 
-    # energies
-    inverse_rate: Annotated[np.ndarray, "M", complex]  # reciprocals of the eigenvalues
-    along: Annotated[np.ndarray, "M", complex]  # of the rate of a product with a harmonic
-    against: Annotated[np.ndarray, "M", complex]  # and of one with its conjugate
-    integral: Annotated[np.ndarray, "4 M", complex]
-    frame: Annotated[np.ndarray, "M", int]  # harmonic with which a mode turns, -1: none
-    span: Annotated[np.ndarray, "M 2", int]  # first factor of a mode that is not zero, and the last plus 1
-    left: Annotated[np.ndarray, "2 M w"]  # real and imaginary parts of the factors of a product of modes
-    right: Annotated[np.ndarray, "2 M w"]
-    reciprocals: Annotated[np.ndarray, "2 M M", complex]  # of the rates of products of modes, SUM and DIFFERENCE
-    products: Annotated[np.ndarray, "2 M M", complex]  # of modes k <= j
+    forms: FormScratch
 
 
 def new_assembly_scratch(system: LineSystem) -> AssemblyScratch:
     """Return space to fill flows of a system."""
     n, b, r, e, m = system.modes, system.bodies, len(system.delassus), len(system.frequency), most_modes(system)
-    return room(
-        AssemblyScratch, {"n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "M": m + e, "w": max(n, r, 1)}
-    )  # fmt: skip
+    sizes = {"b": b, "N": n + b, "r": r, "e": e, "m": m}
+    return room(AssemblyScratch, sizes, forms=new_form_scratch(m + e, n + b, max(n, r)))
 
 
 @kernel
@@ -87,42 +85,20 @@ def fill(system, subsystems, k, flows, s, scratch):
     for h in range(e):
         _set_harmonic(system, subsystems, k, flows, s, h, scratch)
     _set_outputs(system, flows, s, e + count)
-    step = 0.125 * system.period
-    for level in range(GRIDS):
-        for j in range(e + count):
-            flows.grid_factor[s, level, j] = exp_minus_one(flows.eigenvalue[s, j] * step) + 1.0
-        step *= 0.5
+    set_grid_factors(flows, s, e + count, system.period)
     _take_constants(system, subsystems, k, flows, s)
-    set_energies(system, flows, s, e + count, scratch)
+    _set_energies(system, flows, s, e + count, scratch.forms)
     flows.modes[s], flows.subsystem[s], flows.code[s] = e + count, subsystems.number[k], code_of(flows.active_set[s])
     return True
 
 
 @kernel
-def add_known(system, subsystems, closed, flows, scratch):
-    """Fill the flow of the closed rows (r,), at a place that has been theirs before or is new.
-
-    Returns DONE, ILL_CONDITIONED where doubles do not resolve it, NEEDS_FLOW for a subsystem that is new, or no place.
-    """
-    for k in range(len(subsystems.number)):
-        same = subsystems.number[k] > 0
-        for r in range(len(closed)):
-            if not same:
-                break
-            same = subsystems.closed[k, r] == closed[r]
-        if not same:
-            continue
-        free = -1
-        for s in range(len(flows.subsystem)):
-            if flows.subsystem[s] == subsystems.number[k]:
-                free = s
-                break
-            if flows.subsystem[s] == 0 and free < 0:
-                free = s
-        if free < 0:
-            return NEEDS_FLOW
-        return DONE if fill(system, subsystems, k, flows, free, scratch) else ILL_CONDITIONED
-    return NEEDS_FLOW
+def is_closed_as(system, subsystems, k, closed):
+    """Whether a subsystem is that of these closed rows (r,)."""
+    same = True
+    for r in range(len(closed)):
+        same = same and subsystems.closed[k, r] == closed[r]
+    return same
 
 
 @kernel
@@ -247,12 +223,12 @@ def _sum_modes(system, subsystems, k, h, scratch):
 @kernel
 def _order_modes(flows, s, count, scratch):
     """Put driven modes first, in order of the harmonics that drive them."""
-    e, place = flows.driven.shape[1] - 1, np.int64(0)
+    e, place, forms = flows.driven.shape[1] - 1, np.int64(0), scratch.forms
     for h in range(e + 1):
         flows.driven[s, h] = e + place
         for j in range(count):
             if scratch.driver[j] == h:
-                scratch.order[place], scratch.frame[e + place] = j, h if h < e else -1
+                scratch.order[place], forms.frame[e + place] = j, h if h < e else -1
                 flows.load[s, e + place] = scratch.push[j] if h < e else 0.0
                 place += 1
 
@@ -264,25 +240,27 @@ def _take_modes(system, subsystems, k, flows, s, count, scratch):
     for place in range(count):
         i, j = scratch.order[place], e + place
         rate = subsystems.eigenvalue[k, i]
-        flows.eigenvalue[s, j], scratch.inverse_rate[j] = rate, reciprocal(rate)
+        flows.eigenvalue[s, j], scratch.forms.inverse_rate[j] = rate, reciprocal(rate)
         flows.response[s, j], flows.momentum[s, j] = subsystems.response[k, i], subsystems.momentum[k, i]
         flows.speed[s, j], flows.acceleration[s, j] = subsystems.speed[k, i], subsystems.acceleration[k, i]
         for end in range(2):
             flows.support[s, j, end] = subsystems.support[k, i, end]
             flows.reach[s, j, end] = subsystems.reach[k, i, end]
+        for l in range(n):
+            scratch.forms.speed[j, l] = subsystems.shape[k, i, n + l]
         for l in range(2 * n):
             flows.shape[s, j, l], flows.project[s, j, l] = subsystems.shape[k, i, l], subsystems.project[k, i, l]
         for l in range(2 * b):
             flows.project_slip[s, j, l] = subsystems.project_slip[k, i, l]
         for l in range(b):
-            scratch.body_rate[j, l] = subsystems.body[k, i, l] * rate
+            scratch.forms.speed[j, n + l] = subsystems.body[k, i, l] * rate
         for r in range(len(system.spring)):
             flows.motion[s, r, j] = subsystems.motion[k, r, i]
             flows.velocity[s, r, j] = subsystems.motion[k, r, i] * rate
             flows.force[s, r, j] = subsystems.force[k, r, i]
             flows.impulse_response[s, r, j] = subsystems.impulse_response[k, r, i]
             if subsystems.closed[k, r] and system.spring[r] < np.inf:
-                flows.impulse[s, r, j] = subsystems.force[k, r, i] * scratch.inverse_rate[j]
+                flows.impulse[s, r, j] = subsystems.force[k, r, i] * scratch.forms.inverse_rate[j]
 
 
 @kernel
@@ -291,12 +269,17 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
     n, b, e, steady = system.modes, system.bodies, len(system.frequency), scratch.steady[h]
     omega, first, last, load = system.frequency[h], flows.driven[s, h], flows.driven[s, h + 1], flows.load[s]
     turn, lowest, highest = complex(0.0, omega), n, np.int64(0)
-    flows.eigenvalue[s, h], load[h], scratch.inverse_rate[h], scratch.frame[h] = turn, 0.0, reciprocal(turn), h
+    flows.eigenvalue[s, h], load[h], scratch.forms.inverse_rate[h], scratch.forms.frame[h] = (
+        turn,
+        0.0,
+        reciprocal(turn),
+        h,
+    )
     for i in range(n):
         rate = turn * steady[i]
         for j in range(first, last):
             rate += flows.shape[s, j, i] * load[j]
-        flows.shape[s, h, i], flows.shape[s, h, n + i] = steady[i], rate
+        flows.shape[s, h, i], flows.shape[s, h, n + i], scratch.forms.speed[h, i] = steady[i], rate, rate
         if steady[i] != 0.0 or rate != 0.0:
             lowest, highest = min(lowest, i), i + 1
     flows.support[s, h, 0], flows.support[s, h, 1] = min(lowest, highest), highest
@@ -314,7 +297,7 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
         rate = turn * x
         for j in range(first, last):
             rate += subsystems.body[k, scratch.order[j - e], i] * load[j]
-        scratch.body_rate[h, i] = rate
+        scratch.forms.speed[h, n + i] = rate
         momentum += system.mass[n + i] * rate
     flows.momentum[s, h], flows.response[s, h] = momentum, system.table[h]
     held = 0.0
@@ -374,7 +357,7 @@ def _set_forces(system, subsystems, k, flows, s, h, scratch):
             grown = push
             for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
                 grown -= flows.impulse[s, r, j] * flows.load[s, j]
-            flows.force[s, r, h], flows.impulse[s, r, h] = push, grown * scratch.inverse_rate[h]
+            flows.force[s, r, h], flows.impulse[s, r, h] = push, grown * scratch.forms.inverse_rate[h]
         stiff = stiff or (closed[r] and system.spring[r] == np.inf)
     if not stiff:
         return
@@ -422,3 +405,51 @@ def _take_constants(system, subsystems, k, flows, s):
         flows.attached[s, i] = subsystems.held[k, i]
         for l in range(b):
             flows.body_acceleration[s, i, l] = subsystems.body_acceleration[k, i, l]
+
+
+@kernel
+def _set_energies(system, flows, s, m, forms):
+    """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
+    n, e, rows = system.modes, len(system.frequency), len(system.spring)
+    # impacts between free flights happen where no rigid row is closed (line.impacts.all_in_flight)
+    jumps = True
+    for r in range(rows):
+        jumps = jumps and not (flows.active_set[s, r] and system.spring[r] == math.inf)
+    for j in range(m):
+        forms.free[j] = 0.0
+        for i in range(system.bodies):
+            if flows.body_acceleration[s, i, i] != 0.0:
+                forms.free[j] += system.mass[n + i] * flows.velocity[s, i, j]
+    set_linear(system, flows, s, m, forms)
+    pairs = invert_rates(flows, s, m, system.period, forms)
+    for what in range(3):  # one place only, which is compiled once
+        if what == 0:
+            form, slow = flows.loss[s], flows.slow_loss[s]
+            split(flows.shape[s, :m, n:], forms.left)
+            for j in range(m):
+                forms.span[j, 0], forms.span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
+            damp(system.damping, forms.left, forms.right, forms.span, m, n, system.proportional)
+        elif what == 1:
+            form, slow = flows.square[s], flows.slow_square[s]
+            take_factor(flows.response[s], flows.response[s], 1.0, 0, m, forms)
+        else:
+            if not flows.damped[s]:
+                break
+            form, slow, width = flows.dashpot[s], flows.slow_dashpot[s], 0
+            for r in range(rows):
+                if flows.active_set[s, r] and system.dashpot[r] > 0.0:
+                    take_factor(flows.velocity[s, r], flows.velocity[s, r], system.dashpot[r], width, m, forms)
+                    width += 1
+        set_form(flows, s, m, forms, form, slow, pairs)
+        if flows.coalescing[s]:  # line.energy_balance integrates by quadrature
+            form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
+        for r in range(rows if jumps else 0):
+            kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
+    flows.slow_count[s] = list_single(flows, s, m, system.period, pairs)
+    for r in range(rows if jumps else 0):
+        change = flows.impulse_response[s, r]
+        for c in range(flows.kick_maps.shape[2]):
+            total = 0.0
+            for j in range(e, m):
+                total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
+            flows.kick_maps[s, r, c] = total

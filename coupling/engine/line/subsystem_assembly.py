@@ -18,11 +18,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
-from vanedamp.coupling.engine.line.subsystems import Known, most_modes
+from vanedamp.coupling.engine.known import ROOM, places
+from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import MANY
 from vanedamp.coupling.engine.peaks import GRIDS
-from vanedamp.coupling.engine.run import ROOM, IllConditioned, places, with_free_place
 from vanedamp.coupling.numerics.codes import WORK_MAP
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.system.line_system import LineSystem
@@ -116,16 +115,3 @@ def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
     sizes["k"] = len(system.outputs)
     return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})
-
-
-def add_flow(flows: Flows, system: LineSystem, closed: np.ndarray) -> Flows:
-    """Return the stack with the subsystem of the closed rows (r,). Raises IllConditioned if doubles cannot resolve it.
-
-    For flows of one system alone, without what compiled runs (line.scenes) keep of its structure.
-    """
-    known = Known(system)
-    k = known.place(system, closed)
-    flows, s = with_free_place(flows, flows.subsystem, lambda size: empty_flows(system, size))
-    if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system)):
-        raise IllConditioned("its modes cancel, it rests too far away under its weight, or nothing damps its resonance")
-    return flows

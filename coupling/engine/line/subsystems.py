@@ -6,9 +6,6 @@ others move freely. Each subsystem is found once, by numpy; line.flow_assembly s
 
 from __future__ import annotations
 
-import itertools
-import threading
-from collections import OrderedDict
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -16,10 +13,10 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vanedamp.coupling.engine.antiderivatives import coalesce
+from vanedamp.coupling.engine.coalescence import coalesce
+from vanedamp.coupling.engine.known import ROOM, Known, known_of, places
 from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes, real_modes
 from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
-from vanedamp.coupling.engine.run import ROOM, places, with_free_place
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
 from vanedamp.coupling.system.line_system import LineSystem
@@ -104,58 +101,22 @@ def most_modes(system: LineSystem) -> int:
     return most if light and np.all(np.diag(part.damping) <= np.sqrt(part.stiffness)) else 2 * most
 
 
-class Known:
-    """The subsystems met of late, of a system and of those that differ from it by what the excitation decides."""
-
-    def __init__(self, system: LineSystem) -> None:
-        self.stack = empty_subsystems(system)
-
-    def __bool__(self) -> bool:
-        return bool(self.stack.number.any())
-
-    def place(self, system: LineSystem, closed: np.ndarray) -> int:
-        """Return the place in the stack of the subsystem of the closed rows (r,), which is found if it is new.
-
-        Raises IllConditioned (line.complex_modes) for one that doubles cannot resolve.
-        """
-        found = np.flatnonzero((self.stack.number > 0) & (self.stack.closed == closed).all(axis=1))
-        if len(found):
-            return int(found[0])
-        own = self.stack.number
-        self.stack, k = with_free_place(self.stack, own, lambda size: empty_subsystems(system, size), own)
-        _set(self.stack, k, system, closed)
-        self.stack.number[k] = next(_NUMBERS)
-        return k
-
-
-_NUMBERS = itertools.count(1)
 #: parts of a system that decide its subsystems
 _DECIDING = ("mass", "stiffness", "damping", "response", "floor", "J", "spring", "dashpot")
-#: structures whose subsystems are kept
-_KEPT = 8
 
 
-class _Structures(threading.local):
-    """The latest structures of a thread, and the subsystems that its runs have met."""
-
-    def __init__(self) -> None:
-        self.known: OrderedDict[tuple[bytes, ...], Known] = OrderedDict()
+def new_known(system: LineSystem) -> Known:
+    """Return room for the subsystems of a system."""
+    return Known(system, empty_subsystems, _subsystem, lambda stack, _, closed: (stack.closed == closed).all(axis=1))
 
 
-_STRUCTURES = _Structures()
+def known_subsystems(system: LineSystem) -> Known:
+    """Return the subsystems that runs with a system's structure have met (engine.known)."""
+    return known_of(system, _DECIDING, new_known)
 
 
-def known_of(system: LineSystem) -> Known:
-    """Return the subsystems of a system's structure: those that any run with it has met in this thread."""
-    key, kept = tuple(getattr(system, name).tobytes() for name in _DECIDING), _STRUCTURES.known
-    kept[key] = kept.pop(key) if key in kept else Known(system)
-    while len(kept) > _KEPT:
-        kept.popitem(last=False)
-    return kept[key]
-
-
-def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None:
-    """Set the subsystem of the closed rows (r,) at a free place."""
+def _subsystem(system: LineSystem, key: np.ndarray) -> dict[str, Any]:
+    """Return the fields of the subsystem of the closed rows (r,)."""
     n, b, closed = system.modes, system.bodies, np.flatnonzero(key)
     rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
     carrier, cluster, inner = _attachment(system, rigid)
@@ -175,7 +136,7 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
     values = _functionals(system, carrier, functional, eigenvalue, shape[0])
     values |= _forces(system, rigid, sprung, eigenvalue, values["motion"], shape[:, :n].reshape(2 * n, m))
     values |= _round_off(system, carrier, functional, law, sprung, shape, project)
-    values |= {
+    return values | {
         "closed": key, "held": cluster < 0, "free": free, "sprung": len(sprung) > 0,
         "uncoupled": system.proportional and not len(closed) and m == n, "coalescing": coalescing,
         "carrier": carrier, "functional": functional,
@@ -188,8 +149,6 @@ def _set(stack: Subsystems, k: int, system: LineSystem, key: np.ndarray) -> None
         "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(kept) > 0, "push": push,
         "impulse_response": _times(system.J[:, :n], project[:, 1, :n].T),
     }  # fmt: skip
-    for name, value in values.items():
-        getattr(stack, name)[(k, *map(slice, np.shape(value)))] = value
 
 
 def _real_modes(

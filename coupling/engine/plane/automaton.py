@@ -19,6 +19,7 @@ from vanedamp.coupling.engine.plane.tolerances import (
     SAMPLE,
 )
 from vanedamp.coupling.engine.root_search import ENDLESS
+from vanedamp.coupling.engine.scenes import SLICE
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     ACTIVE,
@@ -49,7 +50,7 @@ from vanedamp.coupling.numerics.codes import (
     TOUCHING,
     UNDECIDED,
 )
-from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.response.recorder import put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
@@ -69,8 +70,6 @@ from vanedamp.coupling.system.unit_kinematics import (
 
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
-#: segments after which a run returns to Python, which sees interrupts
-_SLICE = 4096
 #: events at one instant after which a decision that repeats itself is made anew, for each unit
 _REPEATED = 4
 #: how often a decision is made anew where its forces break their laws
@@ -78,35 +77,36 @@ _ATTEMPTS = 4
 _TINY = 1e-150
 
 
-@entry
-def begin(system, st, rec, log, scratch):
+@kernel
+def begin(system, st, rec, scratch):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
     _set_phases(system, st)
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
-    if _approaches(system, st) and not collide(system, st, rec, log, scratch):
+    if _approaches(system, st) and not collide(system, st, rec, scratch):
         return False
-    _begin_contacts(system, st, rec, log)
-    if not _decide_states(system, st, rec, log, scratch):
+    _begin_contacts(system, st, rec)
+    if not _decide_states(system, st, rec, scratch):
         return False
     st.counters[FLOW] = -1
     return True
 
 
-@entry
-def advance(system, flows, st, watched, rec, log, scratch, periods, max_events):
+@kernel
+def advance(system, flows, st, watched, rec, scratch, periods, max_events):
     """Advance to the end of `periods`. Returns a code."""
     segments = 0
     while st.counters[PERIOD] < periods:
-        found = _begin_flow(system, flows, st, log, scratch)
+        # before a segment begins: its beginning takes round-off away, which another beginning would take again
+        if segments == SLICE or st.counters[LOGGED] + 4 * len(system.rest) >= len(rec.log):
+            return PAUSED
+        segments += 1
+        found = _begin_flow(system, flows, st, rec, scratch)
         if found == STATES_OPEN:
             continue
         if found != STATES_GO_ON:
             return found
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
-        if segments == _SLICE or st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
-            return PAUSED
-        segments += 1
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
         tau, who = next_event(system, flows, st, watched)
@@ -120,9 +120,9 @@ def advance(system, flows, st, watched, rec, log, scratch, periods, max_events):
         st.time[0] += tau
         _set_phases(system, st)
         if who == -2:
-            segments = _SLICE
+            segments = SLICE
             continue
-        if not _handle_event(system, flows, st, rec, log, scratch, watched.unit[who], watched.what[who]):
+        if not _handle_event(system, flows, st, rec, scratch, watched.unit[who], watched.what[who]):
             return UNDECIDED
         if not _within_walls(system, st):
             return ACCURACY_LOST
@@ -130,7 +130,7 @@ def advance(system, flows, st, watched, rec, log, scratch, periods, max_events):
 
 
 @inlined
-def _begin_flow(system, flows, st, log, scratch):
+def _begin_flow(system, flows, st, rec, scratch):
     """Begin the motion of the states as decided, if forces obey their laws in it; that of the last states goes on.
 
     Returns STATES_GO_ON, STATES_OPEN where other states are to be tried, NEEDS_FLOW or UNDECIDED.
@@ -142,6 +142,7 @@ def _begin_flow(system, flows, st, log, scratch):
     if s < 0:
         return NEEDS_FLOW
     st.counters[FLOW] = s
+    flows.used[s] = st.counters[EVENTS]
     _stop_held_rows(system, flows, st)
     _begin_segment(system, flows, st)
     suffice = _forces_suffice(system, flows, st)
@@ -157,7 +158,7 @@ def _begin_flow(system, flows, st, log, scratch):
         st.counters[FLOW] = -1
         return STATES_OPEN
     scratch.attempt[0] = 0
-    _log_changes(system, flows, st, log)
+    _log_changes(system, flows, st, rec)
     return STATES_GO_ON
 
 
@@ -211,7 +212,7 @@ def _almost_closes(system, st):
 
 
 @kernel
-def _begin_contacts(system, st, rec, log):
+def _begin_contacts(system, st, rec):
     """Begin the compliant contacts that are closed and approach."""
     for r in range(system.contacts):
         touches = is_compliant(system, r) and (st.state[r] == OPEN or st.state[r] == TOUCHING)
@@ -219,11 +220,11 @@ def _begin_contacts(system, st, rec, log):
         if touches and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
             st.state[r] = SLIP_RIGHT  # decided next
             st.pushed[r], st.pushed[len(system.rest) + r], st.lost[r] = 0.0, 0.0, 0.0
-            log_impact(system, st, rec, log, r, row_speed(system, r, st.v), 0.0, 0.0, 0.0, 0.0)
+            log_impact(system, st, rec, r, row_speed(system, r, st.v), 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def _end_contact(system, st, log, r):
+def _end_contact(system, st, rec, r):
     """End a compliant contact as its force vanishes: what its spring still holds is lost."""
     u, shift, speed = len(system.rest), gap(system, r, st.q), row_speed(system, r, st.v)
     left = 0.5 * system.spring[r] * shift * shift
@@ -232,7 +233,7 @@ def _end_contact(system, st, log, r):
     st.state[r] = LEAVING if system.dashpot[r] > 0.0 and parts else OPEN
     if st.state[r] == OPEN:
         _close_gap(system, st, r)
-    log_event(system, st, log, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r], st.lost[r] + left)
+    log_event(system, st, rec, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r], st.lost[r] + left)
 
 
 @inlined
@@ -246,16 +247,16 @@ def _is_unloaded(system, st, r):
 
 
 @kernel
-def _end_unloaded(system, st, log, r, what):
+def _end_unloaded(system, st, rec, r, what):
     """End the other compliant contacts whose forces vanish within round-off at the event of unit r: they may pull."""
     for i in range(system.contacts):
         presses = is_compliant(system, i) and st.state[i] < OPEN and st.fresh[i] == 0
         if presses and not (what == RECLOSES and i == r) and _is_unloaded(system, st, i):
-            _end_contact(system, st, log, i)
+            _end_contact(system, st, rec, i)
 
 
 @inlined
-def _handle_event(system, flows, st, rec, log, scratch, r, what):
+def _handle_event(system, flows, st, rec, scratch, r, what):
     """Apply the event of unit r and decide the states after it. Returns False if they cannot be decided."""
     st.counters[EVENTS] += 1
     st.counters[AT_ONCE] += 1
@@ -267,13 +268,13 @@ def _handle_event(system, flows, st, rec, log, scratch, r, what):
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     for i in range(len(system.rest)):
         scratch.before[i] = st.state[i]
-    _change_unit(system, st, log, r, what)
-    _end_unloaded(system, st, log, r, what)
+    _change_unit(system, st, rec, r, what)
+    _end_unloaded(system, st, rec, r, what)
     # at any event another gap may be closed as well, within the resolution of gaps
-    if _approaches(system, st) and not collide(system, st, rec, log, scratch):
+    if _approaches(system, st) and not collide(system, st, rec, scratch):
         return False
-    _begin_contacts(system, st, rec, log)
-    if not _decide_states(system, st, rec, log, scratch):
+    _begin_contacts(system, st, rec)
+    if not _decide_states(system, st, rec, scratch):
         return False
     own = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
     if own and (what == AT_LOW or what == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
@@ -288,14 +289,14 @@ def _handle_event(system, flows, st, rec, log, scratch, r, what):
 
 
 @inlined
-def _change_unit(system, st, log, r, what):
+def _change_unit(system, st, rec, r, what):
     """Change the state of unit r as its event says."""
     elements = len(system.rest) - len(system.tangential)  # the first Jenkins element
     at_bound = what == AT_LOW or what == AT_HIGH
     if what == CLOSES:
         _close_gap(system, st, r)
     elif is_compliant(system, r) and (what == PARTS or (at_bound and _is_unloaded(system, st, r))):
-        _end_contact(system, st, log, r)
+        _end_contact(system, st, rec, r)
     elif what == OPENS:
         st.state[r] = OPEN
         _close_gap(system, st, r)
@@ -310,18 +311,18 @@ def _change_unit(system, st, log, r, what):
 
 
 @kernel
-def _decide_states(system, st, rec, log, scratch):
+def _decide_states(system, st, rec, scratch):
     """Decide the states, if no forces are possible after the impulses that stop what slips. False if that fails."""
     for _ in range(len(system.rest) + 1):
         if decide(system, st, scratch, st.scale[0]):
             return True
-        if not stop_wedged(system, st, rec, log, scratch):
+        if not stop_wedged(system, st, rec, scratch):
             return False
     return False
 
 
 @kernel
-def _log_changes(system, flows, st, log):
+def _log_changes(system, flows, st, rec):
     """Log which units have changed their states."""
     u = len(system.rest)
     for i in range(u):
@@ -338,7 +339,7 @@ def _log_changes(system, flows, st, log):
             kind, speed = SLIPS, row_speed(system, u + i, st.v)
         else:
             continue
-        log_event(system, st, log, kind, i, 0.0, speed, 0.0, 0.0, 0.0)
+        log_event(system, st, rec, kind, i, 0.0, speed, 0.0, 0.0, 0.0)
 
 
 @kernel

@@ -113,7 +113,7 @@ def _add_friction(system, flows, st, scratch, s, tau, count):
             for i in range(flows.slow_count[s]):
                 if flows.slow[s, i, 2] >= SINGLE:
                     break
-                taken += (flows.slow_lost[s, i, place] * slow_product(flows, st, s, i, tau)).real
+                taken += (flows.slow_lost[s, place, i] * slow_product(flows, st, s, i, tau)).real
             st.lost[r] += taken
             for row in (r, u + r):
                 st.pushed[row] += st.force[row] * tau

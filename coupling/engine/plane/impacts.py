@@ -33,6 +33,7 @@ from vanedamp.coupling.numerics.tolerances import CHATTER, COLLAPSE, SPEED_ROUND
 from vanedamp.coupling.response.recorder import note_impact
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
+from vanedamp.coupling.system.system import LEFT, RIGHT
 from vanedamp.coupling.system.unit_kinematics import (
     has_friction,
     is_closed,
@@ -53,7 +54,7 @@ _FAR = 100.0
 
 
 @kernel
-def collide(system, st, rec, log, scratch):
+def collide(system, st, rec, scratch):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
     u, count, tiny = len(system.rest), _list_closed(system, st, scratch), AT_REST * st.scale[0]
     for r in range(2 * u):
@@ -74,7 +75,7 @@ def collide(system, st, rec, log, scratch):
         wedged = low <= WEDGED
         if not _solve_restitution(system, st, scratch, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
-    _apply(system, st, rec, log, scratch, count, tiny)
+    _apply(system, st, rec, scratch, count, tiny)
     return _complete_chatter(system, st, scratch, count, tiny)
 
 
@@ -186,7 +187,7 @@ def _push(system, scratch):
 
 
 @kernel
-def _apply(system, st, rec, log, scratch, count, tiny):
+def _apply(system, st, rec, scratch, count, tiny):
     """Change the velocities by the impulses; log the impacts of contacts that these push, or that have approached."""
     u = len(system.rest)
     _push(system, scratch)
@@ -199,7 +200,7 @@ def _apply(system, st, rec, log, scratch, count, tiny):
             after, loss = row_speed(system, r, st.v), 0.0
             for row in (r, u + r):
                 loss -= 0.5 * scratch.impulse[row] * (scratch.before_impact[row] + row_speed(system, row, st.v))
-            log_impact(system, st, rec, log, r, before, after, push, drag, loss)
+            log_impact(system, st, rec, r, before, after, push, drag, loss)
     for row in range(2 * u):  # of the whole impact: contributions of single rows may be negative
         if scratch.impulse[row] != 0.0:
             st.ledger[IMPACT_LOSS] -= (
@@ -209,22 +210,24 @@ def _apply(system, st, rec, log, scratch, count, tiny):
 
 
 @inlined
-def log_impact(system, st, rec, log, r, before, after, normal, tangential, loss):
+def log_impact(system, st, rec, r, before, after, normal, tangential, loss):
     """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
     rec.impacts[st.counters[PERIOD]] += 1
     energy = 0.5 * before * before / system.delassus[r, r]
     rec.collided[st.counters[PERIOD]] += energy
+    if system.surface[r] == LEFT or system.surface[r] == RIGHT:
+        rec.walls[st.counters[PERIOD], system.body[r]] += 1
     if rec.struck.shape[1] > 0:
         note_impact(rec, st.counters[PERIOD], r, energy)
-    log_event(system, st, log, IMPACT, r, before, after, normal, tangential, loss)
+    log_event(system, st, rec, IMPACT, r, before, after, normal, tangential, loss)
 
 
 @inlined
-def log_event(system, st, log, kind, r, before, after, normal, tangential, loss):
+def log_event(system, st, rec, kind, r, before, after, normal, tangential, loss):
     """One entry: time, kind, unit, relative velocities (m/s), impulses (N s), energy (J)."""
-    entry = log[st.counters[LOGGED]]
+    entry = rec.log[st.counters[LOGGED]]
     st.counters[LOGGED] += 1
     entry[0] = st.counters[PERIOD] * system.period + st.time[0]
     entry[1], entry[2], entry[3], entry[4] = kind, r, before, after
@@ -262,7 +265,7 @@ def _complete_chatter(system, st, scratch, count, tiny):
 
 
 @kernel
-def stop_wedged(system, st, rec, log, scratch):
+def stop_wedged(system, st, rec, scratch):
     """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
 
     They are those of a step of Moreau's scheme in the limit of short ones. Slips that the loads turn within it stop.
@@ -275,7 +278,7 @@ def stop_wedged(system, st, rec, log, scratch):
         return False
     for r in range(2 * u):
         scratch.before_impact[r] = row_speed(system, r, st.v)
-    _apply(system, st, rec, log, scratch, count, math.inf)
+    _apply(system, st, rec, scratch, count, math.inf)
     for p in range(count):
         r = scratch.listed[p]
         slip = after_impulses(system, u + r, scratch.impulse, scratch.speed[u + r])

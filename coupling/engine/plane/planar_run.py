@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.engine.plane import automaton
+from vanedamp.coupling.engine.columns import Columns, system_in
+from vanedamp.coupling.engine.plane.columns import BY_UNIT, columns
+from vanedamp.coupling.engine.plane.flow_assembly import Flows, empty_flows, new_assembly_scratch
+from vanedamp.coupling.engine.plane.scenes import run
 from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.plane.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.engine.plane.subsystems import known_subsystems
 from vanedamp.coupling.engine.run import EventDrivenRun
-from vanedamp.coupling.numerics.codes import BOUNDED, DONE, FLOW, LOGGED, PERIOD, REDUCED, ROOT, UNDECIDED
-from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
+from vanedamp.coupling.numerics.codes import BOUNDED, FLOW, PERIOD, REDUCED, ROOT
+from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.plane import Plane, plane_of
-from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, Records
-from vanedamp.coupling.response.restart import state_at
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, WIDTH, Records
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
-from vanedamp.coupling.system.assembly import Motion
-from vanedamp.coupling.system.system import LEFT, RIGHT, System
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.system import System
 
 
 def is_common(system: System, modes: int) -> bool:
@@ -33,47 +36,56 @@ def is_common(system: System, modes: int) -> bool:
 
 
 class PlanarRun(EventDrivenRun):
-    """A run of bodies in the plane. linearisation: largest shortening by a tilt over the play, for a status ok."""
+    """A run of bodies in the plane."""
 
     NUMBERS: ClassVar = EventDrivenRun.NUMBERS | {"reduced_impacts": REDUCED}
     rows_of: ClassVar = staticmethod(rows_of_units)
+    compiled: ClassVar = staticmethod(run)
+    is_common: ClassVar = staticmethod(is_common)
 
     def __init__(
-        self, system: System, initial: Motion, records: Records, events: bool, max_events: int,
+        self, system: System, start: RestartState, records: Records, events: bool, max_events: int,
         linearisation: float = 0.01,
     ) -> None:  # fmt: skip
-        super().__init__(system, records, events, max_events)
-        self.system, self.linearisation, self.flows = system, linearisation, empty_flows(system)
+        super().__init__(system, system, start, records, events, max_events)
+        self.linearisation = linearisation
+
+    def _new_state(self) -> None:
+        system = self.system
+        self.known, self.flows = known_subsystems(system), empty_flows(system)
+        self.assembly = new_assembly_scratch(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.state, self.watched = new_state(system, modes, initial), new_event_functions(system, modes)
-        self.walls = np.zeros((len(records.impacts), system.bodies), np.int64)
-        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
-        self._advance_compiled = automaton.advance
-        if is_common(system, modes) and hasattr(automaton.advance, "sized"):
-            self._advance_compiled = automaton.advance.sized(
-                system, self.flows, self.state, self.watched, records, self.log, self.scratch, 0, 0
-            )
+        self.state, self.watched = new_state(system, modes), new_event_functions(system, modes)
+        self.scratch = new_scratch(system, modes)
+
+    def check(self) -> None:
+        """Take any structure."""
+
+    @property
+    def key(self) -> np.ndarray:
+        """The states."""
+        states: np.ndarray = self.state.state
+        return states
+
+    def _empty_flows(self, size: int) -> Flows:
+        return empty_flows(self.system, size)
+
+    def columns_of(
+        self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
+    ) -> tuple[Columns, Iterable[int]]:
+        """Return the columns of scenes, as EventDrivenRun says."""
+        return columns(scene, self.whole, start, values)
+
+    def whole_in(self, table: Columns, k: int) -> System:
+        """Return the system of scene k."""
+        system = system_in(self.whole, table, k, np.arange(len(self.whole.rest)))
+        return system._replace(**{name: getattr(table, name)[k] for name in BY_UNIT})
 
     def reuse(self, earlier: PlanarRun) -> None:
         """Take over the flows that an earlier run has met, if it is one of the same system."""
         alike = map(partial(np.array_equal, equal_nan=True), self.system, earlier.system)
         if self.system is earlier.system or all(alike):
             self.flows = earlier.flows
-
-    def begin(self, max_events: int) -> int:
-        """Decide the initial state. Return the code of numerics.codes."""
-        self.begun = True
-        return DONE if automaton.begin(self.system, self.state, self.records, self.log, self.scratch) else UNDECIDED
-
-    def _advance(self, periods: int, max_events: int) -> int:
-        code = int(self._advance_compiled(
-            self.system, self.flows, self.state, self.watched, self.records, self.log, self.scratch, periods, max_events
-        ))  # fmt: skip
-        self._count_walls(self.log[: self.counters[LOGGED]])
-        return code
-
-    def _add_flow(self) -> None:
-        self.flows = add_flow(self.flows, self.system, self.state.state)
 
     def _segment(self) -> Segment:
         self.watched.status[:] = BOUNDED  # roots of other segments do not apply
@@ -110,17 +122,5 @@ class PlanarRun(EventDrivenRun):
             reduced=int(st.counters[REDUCED]) > since.reduced,
         )  # fmt: skip
 
-    def _left(self) -> RestartState:
-        return state_at(self.system, Motion(self.state.q, self.state.v))
-
-    def _count_walls(self, entries: np.ndarray) -> None:
-        """Count the impacts of each body on its walls, by periods."""
-        hits = entries[entries[:, 1] == IMPACT]
-        units = hits[:, 2].astype(int)
-        walls = (self.system.surface[units] == LEFT) | (self.system.surface[units] == RIGHT)
-        periods = np.minimum(hits[walls, 0] / self.system.period, len(self.walls) - 1).astype(int)
-        places = periods * self.system.bodies + self.system.body[units[walls]]
-        self.walls += np.bincount(places, minlength=self.walls.size).reshape(self.walls.shape)
-
     def _plane(self) -> Plane:
-        return plane_of(self.system, self.records, self.linearisation, self.walls)
+        return plane_of(self.whole, self.records, self.linearisation)

@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine.root_search import Expansion, new_expansion
-from vanedamp.coupling.numerics.codes import COUNTERS, LEAVING, OPEN, SLIP_RIGHT
+from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
-from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
 
@@ -110,15 +108,12 @@ class Scratch(NamedTuple):
     drive: np.ndarray  # (m,) complex
 
 
-def new_state(system: System, modes: int, initial: Motion) -> State:
-    """Return the state at time zero. A spring that is compressed pushes, or lags behind the body that leaves it."""
-    u, size, sprung = len(system.rest), len(system.mass), np.isfinite(system.spring)
-    gap, speed = system.rest + system.J[:u] @ initial.q, system.J[:u] @ initial.v
-    pushes = np.where(sprung, system.spring, 0.0) * gap + system.dashpot * speed < 0.0
-    state = np.where(sprung & (gap < -SIMULTANEOUS * system.play), np.where(pushes, SLIP_RIGHT, LEAVING), OPEN)
+def new_state(system: System, modes: int) -> State:
+    """Return room for the state."""
+    u, size = len(system.rest), len(system.mass)
     return State(
-        counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
-        state=state, other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
+        counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=np.zeros(size), v=np.zeros(size),
+        state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), reach=np.abs(system.J).max(axis=0, initial=0.0),
         last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)),

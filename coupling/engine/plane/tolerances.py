@@ -45,7 +45,7 @@ FRICTION_EDGE = 1e-9
 #: least size of the problem of a short step, times the motion: round-off is below the resolution of a pivot then
 STEP_SCALE = 1e-4
 
-# --- modes (subsystem_assembly; of constraints in system.flow)
+# --- modes (subsystems; of constraints in system.flow)
 #: rank of the rows of stiffness and damping: singular values times the largest
 RANK = 1e-12
 #: frequencies of modes, times the excitation's, outside of which runs are rejected: displacements would be quotients of

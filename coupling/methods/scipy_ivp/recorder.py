@@ -9,7 +9,6 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import ROUND_OFF, Motion, Unforced
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN
-from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH
 from vanedamp.coupling.response.recorder import cubic_extremum, note_outputs, note_step, record_section
 from vanedamp.coupling.response.records import (
     CONTACT,
@@ -18,7 +17,9 @@ from vanedamp.coupling.response.records import (
     FRICTION,
     IMPACT,
     IMPACT_LOSS,
+    LINE_WIDTH,
     VISCOUS,
+    WIDTH,
     Records,
 )
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
@@ -43,7 +44,6 @@ class Recorder:
         self.first = 0 if self.plane else system.bodies + system.dampers
         self.period, self.impacts, self.deep = 0, 0, 0.0
         self.impact_loss, self.spring_loss = 0.0, 0.0
-        self.walls = np.zeros((len(records.impacts), system.bodies), np.int64)
         self.log: list[list[float]] = []
         self.begun: dict[int, tuple[list[float], np.ndarray]] = {}
         self.state = np.full(free.u, OPEN)
@@ -194,7 +194,7 @@ class Recorder:
         self.impacts += 1
         self.records.impacts[self.period] += 1
         if self.system.surface[r] in (LEFT, RIGHT):
-            self.walls[self.period, self.system.body[r]] += 1
+            self.records.walls[self.period, self.system.body[r]] += 1
         self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
         entry = [self.period * self.system.period + t, IMPACT, self.first + r, before, after, *others]
         entry = entry[: WIDTH if self.plane else LINE_WIDTH]

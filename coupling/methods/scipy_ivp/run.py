@@ -115,7 +115,7 @@ class IvpRun:
         rows, plane = rows_of_line(system), None
         if system.in_plane:
             rows = rows_of_units(system)
-            plane = plane_of(system, record.records, self.options.linearisation, record.walls)
+            plane = plane_of(system, record.records, self.options.linearisation)
         numbers = {"impacts": record.impacts, "changes": self.events, "evaluations": self.evaluations}
         log, bound = [np.array(record.log)] if record.log else [], _OPEN_LEDGER * max(self.options.rtol, _LEAST)
         return Outcome(

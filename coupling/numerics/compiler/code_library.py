@@ -82,12 +82,7 @@ class _Kernel(_FromZero):
 
     def lowered(self) -> Any:
         """Return the module of this function alone."""
-        module = super()._get_module_for_linking()
-        for function in module.functions:
-            # what is called by a module that is linked later would be left out
-            if function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = llvm.Linkage.weak_odr
-        return module
+        return _whole(super()._get_module_for_linking())
 
     def _get_module_for_linking(self) -> Any:
         """Return the module of this function with all that it calls, for a library of numba's own."""
@@ -179,7 +174,17 @@ def _below(library: Any) -> Iterator[Any]:
 
 
 def _module(library: Any) -> Any:
-    return library.lowered() if isinstance(library, _Kernel) else library._get_module_for_linking()
+    if isinstance(library, _Kernel):
+        return library.lowered()
+    return _whole(library._get_module_for_linking().clone())  # numba links its own as it is
+
+
+def _whole(module: Any) -> Any:
+    """Return a module of which nothing is left out because a module that calls it is linked later."""
+    for function in module.functions:
+        if function.linkage == llvm.Linkage.linkonce_odr:
+            function.linkage = llvm.Linkage.weak_odr
+    return module
 
 
 def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) -> type[CompilerBase]:

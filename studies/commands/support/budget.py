@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vanedamp.coupling.engine.line.columns import columned
+from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file

@@ -26,7 +26,6 @@ from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.system.assembly import Motion
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.kinds.orbits.page import branches_figure
 
@@ -307,8 +306,7 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     for way in (1, -1):
         tilted = x.copy()
         tilted[tilt] += way * 1e-8
-        start = Motion(*np.split(found._frame.from_state @ tilted, 2))
-        run = PlanarRun(system, start, new_records(system, periods, 0), False, 10**6)
+        run = PlanarRun(system, found._frame.restart_of(tilted), new_records(system, periods, 0), False, 10**6)
         assert run.advance_to(periods) is Status.OK
         ends.append(found._frame.to_state @ np.r_[run.state.q, run.state.v])
     grown = (ends[0] - ends[1]) / 2e-8

@@ -8,9 +8,9 @@ import pytest
 from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.response import evaluation
 from vanedamp.coupling.response.evaluation import Needs, Observer
-from vanedamp.coupling.response.event_log import WIDTH, entries_of, rows_of_units
+from vanedamp.coupling.response.event_log import entries_of, rows_of_units
 from vanedamp.coupling.response.observers import EVENT_LIST, samples
-from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS
+from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS, WIDTH
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate

@@ -88,7 +88,7 @@ NAMED = {
     "coupling/engine/line/contact_states.py": 10, "coupling/engine/line/event_driven.py": 3,
     "coupling/engine/line/event_functions.py": 16, "coupling/engine/line/impacts.py": 1,
     "coupling/engine/plane/automaton.py": 13, "coupling/engine/plane/event_functions.py": 10,
-    "coupling/engine/plane/subsystem_assembly.py": 4,
+    "coupling/engine/plane/subsystems.py": 2, "coupling/engine/plane/scenes.py": 1,
 }  # fmt: skip
 
 

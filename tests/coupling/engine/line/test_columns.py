@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine.line.columns import Columns, columned, columns
+from vanedamp.coupling.engine.columns import Columns, columned, repeated
+from vanedamp.coupling.engine.line.columns import columns
 from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -31,17 +32,14 @@ _VALUES = {
 }  # fmt: skip
 
 
-def _row(scene: Scene) -> list[np.ndarray]:
+#: columns that scenes of sliders need not have
+_UNUSED = ("moment", "speed")
+
+
+def _row(scene: Scene) -> Columns:
     """Return the row of one scene from a system of its own."""
     whole = assemble(scene)
-    system, start = line_system(whole), start_of(scene, whole)
-    return [
-        np.asarray(value)
-        for value in (
-            system.omega, system.period, system.frequency, system.load, system.rest, system.free_travel, system.limit,
-            system.restitution, start.displacement, start.velocity, start.slip, start.slip_velocity, start.elongation,
-        )
-    ]  # fmt: skip
+    return repeated(whole, line_system(whole), start_of(scene, whole))
 
 
 @pytest.mark.parametrize("paths", [[path] for path in _VALUES] + [list(_VALUES)[::2], list(_VALUES)[1::2]], ids=str)
@@ -55,7 +53,8 @@ def test_columns_have_the_digits_of_systems_assembled_one_by_one(paths):
     for k in range(len(weights)):
         one = _row(scene.replace({path: float(numbers[k]) for path, numbers in values.items()}))
         for name, own, column in zip(Columns._fields, one, found, strict=True):
-            np.testing.assert_array_equal(column[k], own, err_msg=f"{name} of {paths}")
+            if name not in _UNUSED:
+                np.testing.assert_array_equal(column[k], own[0], err_msg=f"{name} of {paths}")
 
 
 def test_a_level_by_the_resonance_has_a_column():

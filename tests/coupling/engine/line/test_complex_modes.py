@@ -9,14 +9,15 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from tests.coupling.engine.line.test_subsystem_motion import add_flow
 from tests.reference.compliant_collision import damping_ratio
 from tests.reference.multiprecision import propagator
 from tests.tools.closed_form_compliant_scenes import STILL, scene
+from vanedamp.coupling.engine.known import IllConditioned
 from vanedamp.coupling.engine.line import complex_modes as module
 from vanedamp.coupling.engine.line.complex_modes import complex_modes, real_modes
-from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
 from vanedamp.coupling.engine.line.subsystems import _about_centre
-from vanedamp.coupling.engine.run import IllConditioned
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble

@@ -12,6 +12,7 @@ import pytest
 
 from tests.reference.comparison import follow
 from tests.tools.laws_by_event import check_events
+from vanedamp.coupling.engine import known
 from vanedamp.coupling.engine.line import subsystems
 from vanedamp.coupling.engine.line.event_driven import EngineRun
 from vanedamp.coupling.scene.scene import Scene
@@ -194,7 +195,7 @@ def test_driven_or_not_is_the_same(name, monkeypatch, driven, tmp_path):
     assert any(driven)
     driven.clear()
     monkeypatch.setattr(subsystems, "DRIVEN", 0.0)
-    monkeypatch.setattr(subsystems._STRUCTURES, "known", OrderedDict())  # kept with the other bound
+    monkeypatch.setattr(known._STRUCTURES, "known", OrderedDict())  # kept with the other bound
     two = simulate(case, events=True, samples_per_period=16)
     assert not any(driven)
     assert len(one.event_list) == len(two.event_list) > 10

@@ -51,7 +51,7 @@ def counted(function, calls):
 def test_segments_with_many_turns_are_cut():
     """Two periods of 89,000 radians each: their integrals follow every turn."""
     calls, run = [], open_run(on_a_track(1e7), 2, 10**6)
-    run._advance_compiled = counted(run._advance_compiled, calls)
+    run._run = counted(run._run, calls)
     assert run.advance_to(2) is Status.OK
     angle = run.system.period * run.flows.fastest.max()
     assert angle == pytest.approx(2 * np.pi * 62.832 * np.sqrt(1e7 / 0.02) / (2 * np.pi * 15.9), rel=0.3)

@@ -7,11 +7,11 @@ rate f G: every check is an identity for any amplitudes.
 import numpy as np
 import pytest
 
-from tests.coupling.engine.line.test_subsystem_motion import random_system
+from tests.coupling.engine.line.test_subsystem_motion import add_flow, random_system
+from vanedamp.coupling.engine.known import IllConditioned
 from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
-from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
-from vanedamp.coupling.engine.line.subsystems import Known
-from vanedamp.coupling.engine.run import IllConditioned
+from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
+from vanedamp.coupling.engine.line.subsystems import new_known
 from vanedamp.coupling.numerics.codes import (
     CALM,
     DIFFERENCE,
@@ -266,7 +266,7 @@ def test_impulses_change_forms_and_maps(places):
 def test_known_subsystems_serve_all_frequencies():
     """Each is found once; a place that is filled again is as if it were new."""
     system, rng = system_of("two driven", 0, 4, 2, False)
-    keys, known, scratch = [*subsystems_of(system, rng, 12)], Known(system), new_assembly_scratch(system)
+    keys, known, scratch = [*subsystems_of(system, rng, 12)], new_known(system), new_assembly_scratch(system)
     assert not known
     for factor in (1.0, 1.7):
         now = system._replace(

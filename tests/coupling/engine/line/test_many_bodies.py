@@ -5,7 +5,7 @@ import pytest
 
 from tests.coupling.orbits.test_waves import ring
 from tests.tools.laws_by_event import check_events
-from vanedamp.coupling.engine import run
+from vanedamp.coupling.engine import known
 from vanedamp.coupling.engine.line import subsystem_assembly, subsystems
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -54,8 +54,8 @@ def test_subsystems_that_memory_does_not_hold_are_found_again(monkeypatch):
     scene = ring(8, 1, periods=60).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
     whole = simulate(scene)
     assert whole.counters["subsystems"] > 12
-    monkeypatch.setattr(subsystems, "_STRUCTURES", subsystems._Structures())
-    for module, name in ((subsystems, "ROOM"), (subsystem_assembly, "_ROOM"), (run, "ROOM")):
+    monkeypatch.setattr(known, "_STRUCTURES", known._Structures())
+    for module, name in ((subsystems, "ROOM"), (subsystem_assembly, "_ROOM"), (known, "ROOM")):
         monkeypatch.setattr(module, name, 0)
     few = simulate(scene)
     assert few.counters["subsystems"] <= 4 and few.counters["impacts"] == whole.counters["impacts"]

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, null_space
 
-from vanedamp.coupling.engine.line.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.engine.known import IllConditioned, with_place
+from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
+from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
+from vanedamp.coupling.engine.line.subsystems import new_known
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.line_system import line_system
@@ -18,6 +21,17 @@ from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import validate
 
 OMEGA = 1.3
+
+
+def add_flow(flows, system, closed):
+    """The flows with that of the closed rows (r,), at a place that was free."""
+    known = new_known(system)
+    k = known.place(system, closed)
+    flows = with_place(flows, known, k, lambda size: empty_flows(system, size))
+    s = int(np.flatnonzero(flows.subsystem == 0)[0])
+    if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system)):
+        raise IllConditioned("its modes cancel, it rests too far away, or nothing damps its resonance")
+    return flows
 
 
 def random_system(seed, modes, bodies, labels, proportional=False):

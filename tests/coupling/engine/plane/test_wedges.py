@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
+from tests.tools.planar import Run, initial_motion, ledger, open_run, planar_run, planar_scene, still_table
 from tests.tools.planar_laws import LONGEST, check_laws, tables
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, OPEN, UNDECIDED
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.system.system import CEILING, FLOOR
 
 #: half length and half height of a block, m; its play, m
@@ -100,13 +100,14 @@ def test_unequal_restitution_brings_no_energy():
             "friction": mu, "restitution": 1.0, "velocity": float(rng.uniform(-0.1, 0.1)),
             "lift_velocity": -(1.0 + slower) / 2, "tilt_rate": float(rng.choice([-1, 1])) * (1.0 - slower) / 0.02,
         }  # fmt: skip
-        opened = open_run(planar_scene(still_table(100.0, gravity=0.0), block), 1, 10**6)
+        scene = planar_scene(still_table(100.0, gravity=0.0), block)
+        opened = open_run(scene, 1, 10**6)
         u = len(opened.system.rest)
         floor = np.flatnonzero(opened.system.surface == FLOOR)
         coefficients = np.where(np.arange(u) == floor[0], *rng.permutation([0.1, 0.9]))
         system = opened.system._replace(restitution=coefficients)
-        v = opened.state.v.copy()
-        run = Run(system, Motion(opened.state.q, v), new_records(system, 1, 0), True, 1)
+        v = initial_motion(scene, opened.system).v
+        run = Run(system, start_of(scene, system), new_records(system, 1, 0), True, 1)
         before = system.J @ v
         run.advance_to(1)
         hits = [hit for hit in run.events(IMPACT) if hit[0] == 0.0]

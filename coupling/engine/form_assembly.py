@@ -1,8 +1,15 @@
-"""The energies of a flow as forms of its amplitudes: antiderivatives of line.subsystem_assembly.Flows."""
+"""Antiderivatives of energies, harmonics and means in a subsystem, as forms of the amplitudes (engine.energy_forms).
+
+A segment's integral is the form at its end less the form at its start. Where the rate by which a product of two modes
+changes vanishes relative to the frequency, the form would cancel: such pairs are left out of the forms, and listed.
+Flows and scratch space are those of either engine, whose fields have the same names.
+"""
 
 from __future__ import annotations
 
-import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
 
 from vanedamp.coupling.numerics.codes import (
     CALM,
@@ -16,61 +23,41 @@ from vanedamp.coupling.numerics.codes import (
     WORK_MAP,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.compiler.record import record, room
 from vanedamp.coupling.numerics.elimination import reciprocal
 from vanedamp.coupling.numerics.tolerances import SLOW
 
 
-@kernel
-def set_energies(system, flows, s, m, scratch):
-    """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
-    n, e, rows = system.modes, len(system.frequency), len(system.spring)
-    # impacts between free flights happen where no rigid row is closed (line.impacts.all_in_flight)
-    jumps = True
-    for r in range(rows):
-        jumps = jumps and not (flows.active_set[s, r] and system.spring[r] == math.inf)
-    _set_linear(system, flows, s, m, scratch)
-    pairs = _invert_rates(flows, s, m, system.period, scratch)
-    for what in range(3):  # one place only, which is compiled once
-        if what == 0:
-            form, slow = flows.loss[s], flows.slow_loss[s]
-            _split(flows.shape[s, :m, n:], scratch.left)
-            for j in range(m):
-                scratch.span[j, 0], scratch.span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
-            _damp(system.damping, scratch.left, scratch.right, scratch.span, m, n, system.proportional)
-        elif what == 1:
-            form, slow = flows.square[s], flows.slow_square[s]
-            _take_factor(flows.response[s], 1.0, 0, m, scratch)
-        else:
-            if not flows.damped[s]:
-                break
-            form, slow, width = flows.dashpot[s], flows.slow_dashpot[s], 0
-            for r in range(rows):
-                if flows.active_set[s, r] and system.dashpot[r] > 0.0:
-                    _take_factor(flows.velocity[s, r], system.dashpot[r], width, m, scratch)
-                    width += 1
-        _set_form(flows, s, m, scratch, form, slow, pairs)
-        if flows.coalescing[s]:  # line.energy_balance integrates by quadrature
-            form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
-        for r in range(rows if jumps else 0):
-            _kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
-    flows.slow_count[s] = _list_single(flows, s, m, system.period, pairs)
-    for r in range(rows if jumps else 0):
-        change = flows.impulse_response[s, r]
-        for c in range(flows.kick_maps.shape[2]):
-            total = 0.0
-            for j in range(e, m):
-                total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
-            flows.kick_maps[s, r, c] = total
+@record
+class FormScratch(NamedTuple):
+    """Space for the forms of m modes: each of N coordinates, of products with w factors."""
+
+    inverse_rate: Annotated[np.ndarray, "m", complex]  # reciprocals of the eigenvalues
+    speed: Annotated[np.ndarray, "m N", complex]  # of the coordinates that loads act on
+    free: Annotated[np.ndarray, "m", complex]  # momentum of bodies whose motion has a part besides the modes
+    along: Annotated[np.ndarray, "m", complex]  # of the rate of a product with a harmonic
+    against: Annotated[np.ndarray, "m", complex]  # and of one with its conjugate
+    integral: Annotated[np.ndarray, "4 m", complex]
+    frame: Annotated[np.ndarray, "m", int]  # harmonic with which a mode turns, -1: none
+    span: Annotated[np.ndarray, "m 2", int]  # first factor of a mode that is not zero, and the last plus 1
+    left: Annotated[np.ndarray, "2 m w"]  # real and imaginary parts of the factors of a product of modes
+    right: Annotated[np.ndarray, "2 m w"]
+    reciprocals: Annotated[np.ndarray, "2 m m", complex]  # of the rates of products of modes, SUM and DIFFERENCE
+    products: Annotated[np.ndarray, "2 m m", complex]  # of modes k <= j
+
+
+def new_form_scratch(modes: int, coordinates: int, factors: int) -> FormScratch:
+    """Return space for the forms of so many modes."""
+    return room(FormScratch, {"m": modes, "N": coordinates, "w": max(factors, 1)})
 
 
 @kernel
-def _take_factor(values, weight, place, m, scratch):
-    """Take a functional of the modes as factor `place`, the last one, of their products, by a weight."""
+def take_factor(left, right, weight, place, m, forms):
+    """Take two functionals of the modes as factors `place`, the last ones, of their products, by a weight."""
     for j in range(m):
-        x, y = values[j].real, values[j].imag
-        scratch.left[0, j, place], scratch.left[1, j, place] = x, y
-        scratch.right[0, j, place], scratch.right[1, j, place] = weight * x, weight * y
-        scratch.span[j, 0], scratch.span[j, 1] = 0, place + 1
+        forms.left[0, j, place], forms.left[1, j, place] = left[j].real, left[j].imag
+        forms.right[0, j, place], forms.right[1, j, place] = weight * right[j].real, weight * right[j].imag
+        forms.span[j, 0], forms.span[j, 1] = 0, place + 1
 
 
 @inlined
@@ -80,17 +67,14 @@ def _is_slow(rate, period):
 
 
 @kernel
-def _set_linear(system, flows, s, m, scratch):
+def set_linear(system, flows, s, m, forms):
     """Set the linear maps, by the columns of numerics.codes."""
-    n, e, linear, driven, load = system.modes, len(system.frequency), flows.linear[s], flows.driven[s], flows.load[s]
-    along, against, part = scratch.along, scratch.against, scratch.integral
+    e, linear, driven, load = len(system.frequency), flows.linear[s], flows.driven[s], flows.load[s]
+    along, against, part = forms.along, forms.against, forms.integral
     for j in range(m):
-        rate = flows.eigenvalue[s, j]
-        along[j] = 0.0j if _is_slow(rate, system.period) else scratch.inverse_rate[j]
-        part[0, j], free = flows.response[s, j], 0.0j
-        for b in range(system.bodies):
-            if flows.body_acceleration[s, b, b] != 0.0:
-                free += system.mass[n + b] * flows.velocity[s, b, j]
+        rate, free = flows.eigenvalue[s, j], forms.free[j]
+        along[j] = 0.0j if _is_slow(rate, system.period) else forms.inverse_rate[j]
+        part[0, j] = flows.response[s, j]
         linear[j, FREE_MOMENTUM_MAP], linear[j, FREE_MOMENTUM_MAP + 1] = free.real, -free.imag
     _integrate(part[0], along, driven, load, m)
     for j in range(m):
@@ -102,12 +86,11 @@ def _set_linear(system, flows, s, m, scratch):
             sum_, difference = rate + turn, rate - turn
             along[j] = 0.0j if _is_slow(sum_, system.period) else reciprocal(sum_)
             # a harmonic and the modes that it drives turn together: a product of one with a conjugate one is slow
-            slow = scratch.frame[j] == h or _is_slow(difference, system.period)
+            slow = forms.frame[j] == h or _is_slow(difference, system.period)
             against[j] = 0.0j if slow else reciprocal(difference)
-            for i in range(n + system.bodies):
-                speed = flows.shape[s, j, n + i] if i < n else scratch.body_rate[j, i - n]
-                with_load += system.load[h, i] * speed
-                with_conjugate += system.load[h, i].conjugate() * speed
+            for i in range(system.load.shape[1]):
+                with_load += system.load[h, i] * forms.speed[j, i]
+                with_conjugate += system.load[h, i].conjugate() * forms.speed[j, i]
             flows.work[s, h, j], part[0, j], part[1, j] = with_conjugate, with_load, with_conjugate
         _integrate(part[0], along, driven, load, m)
         _integrate(part[1], against, driven, load, m)
@@ -148,9 +131,9 @@ def _integrate(values, reciprocals, driven, load, m):
 
 
 @kernel
-def _invert_rates(flows, s, m, period, scratch):
+def invert_rates(flows, s, m, period, forms):
     """Set the reciprocals of the rates of products of modes k <= j, 0 for slow ones. List these; return how many."""
-    e, count, frame = flows.driven.shape[1] - 1, 0, scratch.frame
+    e, count, frame = flows.driven.shape[1] - 1, 0, forms.frame
     for kind in range(2):
         sign = 1.0 if kind == SUM else -1.0
         for j in range(m):
@@ -159,9 +142,9 @@ def _invert_rates(flows, s, m, period, scratch):
                 rate = complex(one.real + other.real, one.imag + sign * other.imag)
                 together = kind == DIFFERENCE and frame[j] == frame[k] and frame[j] >= 0
                 if not (together or _is_slow(rate, period)):
-                    scratch.reciprocals[kind, j, k] = reciprocal(rate)
+                    forms.reciprocals[kind, j, k] = reciprocal(rate)
                     continue
-                scratch.reciprocals[kind, j, k] = 0.0
+                forms.reciprocals[kind, j, k] = 0.0
                 flows.slow[s, count, 0], flows.slow[s, count, 1], flows.slow[s, count, 2] = j, k, kind
                 # a mode that is slow relative to a harmonic, or to modes that it drives, is seen from its frame
                 flows.slow[s, count, 3] = frame[k] if kind == DIFFERENCE and j >= e else -1
@@ -171,7 +154,7 @@ def _invert_rates(flows, s, m, period, scratch):
 
 
 @kernel
-def _list_single(flows, s, m, period, count):
+def list_single(flows, s, m, period, count):
     """List the modes that are left out of means, and calm modes, behind the pairs. Return the number of all."""
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
     # is taken at once (line.energy_balance)
@@ -193,7 +176,7 @@ def _list_single(flows, s, m, period, count):
 
 
 @summing
-def _split(values, parts):
+def split(values, parts):
     """Set the real and imaginary parts (2, m, n) of numbers (m, n)."""
     for j in range(values.shape[0]):
         for i in range(values.shape[1]):
@@ -201,7 +184,7 @@ def _split(values, parts):
 
 
 @summing
-def _damp(damping, left, right, span, m, n, proportional):
+def damp(damping, left, right, span, m, n, proportional):
     """Set the damping forces of speeds, real and imaginary parts (2, m, n)."""
     for part in range(2):
         for j in range(m):
@@ -216,10 +199,10 @@ def _damp(damping, left, right, span, m, n, proportional):
 
 
 @kernel
-def _set_form(flows, s, m, scratch, form, slow, pairs):
-    """Set the form of a product of modes (scratch.left, right), and the parts of the listed slow pairs."""
-    products, reciprocals = scratch.products, scratch.reciprocals
-    _multiply(scratch.left, scratch.right, scratch.span, m, products[0], products[1])
+def set_form(flows, s, m, forms, form, slow, pairs):
+    """Set the form of a product of modes (FormScratch.left, right), and the parts of the listed slow pairs."""
+    products, reciprocals = forms.products, forms.reciprocals
+    _multiply(forms.left, forms.right, forms.span, m, products[0], products[1])
     if flows.driven[s, flows.driven.shape[1] - 1] > flows.driven[s, 0]:
         for kind in range(2):
             _integrate_by_parts(products[kind], reciprocals[kind], flows.driven[s], flows.load[s], m, kind == SUM)
@@ -285,7 +268,7 @@ def _compose(both, mixed, of_both, of_mixed, form, m):
 
 
 @summing
-def _kick(change, form, kick):
+def kick(change, form, kick):
     """Set the product (2m,) of the changes (m,) by a unit impulse with a form."""
     m = len(change)
     for i in range(2 * m):

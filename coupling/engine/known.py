@@ -1,0 +1,141 @@
+"""The linear subsystems that runs with a structure have met: what no frequency of the excitation changes in a flow.
+
+Each is found once, by numpy, in the subsystems of an engine (line.subsystems, plane.subsystems), and kept for all runs
+with that structure; its exact flow at a frequency is filled in compiled code (line.flow_assembly, plane.flow_assembly).
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.numerics.codes import DONE, ILL_CONDITIONED, NEEDS_FLOW
+from vanedamp.coupling.numerics.compiler.jit import kernel
+
+#: bytes that the subsystems of one run may take
+ROOM = 2**29
+_NUMBERS = itertools.count(1)
+#: structures whose subsystems are kept
+_KEPT = 8
+
+
+class IllConditioned(ArithmeticError):
+    """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
+
+
+def with_free_place(
+    stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray | None = None
+) -> tuple[Any, int]:
+    """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
+
+    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again or, by the
+    times (s,) at which its places were last used, gives away the one that has waited longest, as it is.
+    """
+    free = np.flatnonzero(filled == 0)
+    if len(free):
+        return stack, int(free[0])
+    size = len(filled)
+    if 2 * sum(part.nbytes for part in stack) > ROOM:
+        if used is None:
+            return empty(size), 0
+        return stack, int(np.argmin(used))
+    larger = empty(2 * size)
+    for part, old in zip(larger, stack, strict=True):
+        part[:size] = old
+    return larger, size
+
+
+def places(empty: Callable[[int], Any], room: int) -> int:
+    """Return how many places of a stack `empty(size)` so many bytes hold, all zeros of which take no memory."""
+    return max(4, room // sum(part.nbytes for part in empty(1)))
+
+
+class Known:
+    """The subsystems met of late, of a system and of those that differ from it by what the excitation decides.
+
+    empty: returns storage for subsystems of a system, for some number of them (None: a few); of: returns their fields
+    by name, from a system and its key; same: tells which places have a key in a system.
+    """
+
+    def __init__(
+        self, system: Any, empty: Callable[..., Any], of: Callable[[Any, np.ndarray], dict[str, Any]],
+        same: Callable[[Any, Any, np.ndarray], np.ndarray],
+    ) -> None:  # fmt: skip
+        self.stack, self._empty, self._of, self._same = empty(system, None), empty, of, same
+
+    def __bool__(self) -> bool:
+        return bool(self.stack.number.any())
+
+    def place(self, system: Any, key: np.ndarray) -> int:
+        """Return the place in the stack of the subsystem of a key, closed rows or states, which is found if it is new.
+
+        Raises IllConditioned for one that doubles cannot resolve.
+        """
+        found = np.flatnonzero((self.stack.number > 0) & self._same(self.stack, system, key))
+        if len(found):
+            return int(found[0])
+        own, values = self.stack.number, self._of(system, key)
+        self.stack, k = with_free_place(self.stack, own, lambda size: self._empty(system, size), own)
+        for name, value in values.items():
+            getattr(self.stack, name)[(k, *map(slice, np.shape(value)))] = value
+        self.stack.number[k] = next(_NUMBERS)
+        return k
+
+
+class _Structures(threading.local):
+    """The latest structures of a thread, and the subsystems that its runs have met."""
+
+    def __init__(self) -> None:
+        self.known: OrderedDict[tuple[Any, ...], Known] = OrderedDict()
+
+
+_STRUCTURES = _Structures()
+
+
+def known_of(system: Any, deciding: Iterable[str], make: Callable[[Any], Known]) -> Known:
+    """Return the subsystems of a system's structure: those that any run with it has met in this thread.
+
+    deciding: names of the parts of the system that decide its subsystems.
+    """
+    key, kept = (make, *(np.asarray(getattr(system, name)).tobytes() for name in deciding)), _STRUCTURES.known
+    kept[key] = kept.pop(key) if key in kept else make(system)
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)
+    return kept[key]
+
+
+@kernel
+def add_known(same, fill, system, subsystems, key, flows, scratch):
+    """Fill the flow of a key, closed rows or states, at a place that has been its own before or is new.
+
+    same: whether a subsystem is the key's; fill: sets a flow. Returns DONE, ILL_CONDITIONED where doubles do not
+    resolve it, NEEDS_FLOW for a subsystem that is new, or no place.
+    """
+    for k in range(len(subsystems.number)):
+        if not (subsystems.number[k] > 0 and same(system, subsystems, k, key)):
+            continue
+        free = -1
+        for s in range(len(flows.subsystem)):
+            if flows.subsystem[s] == subsystems.number[k]:
+                free = s
+                break
+            if flows.subsystem[s] == 0 and free < 0:
+                free = s
+        if free < 0:
+            return NEEDS_FLOW
+        return DONE if fill(system, subsystems, k, flows, free, scratch) else ILL_CONDITIONED
+    return NEEDS_FLOW
+
+
+def with_place(flows: Any, known: Known, k: int, empty: Callable[[int], Any]) -> Any:
+    """Return flows with a place for subsystem k, which compiled code fills: its own, a free one, or the oldest's."""
+    if not np.any(flows.subsystem == known.stack.number[k]):
+        flows, s = with_free_place(flows, flows.subsystem, empty, flows.used)
+        flows.subsystem[s] = flows.modes[s] = 0
+    return flows

@@ -1,0 +1,61 @@
+"""Many scenes of bodies in the plane that differ in numbers: columns over one of them (engine.columns).
+
+Frequency, level and starts are known by themselves; what gaps, friction and restitution change is read from the systems
+of the scenes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vanedamp.coupling.engine.columns import STARTS, Columns, repeated, set_excitation, set_starts, system_in
+from vanedamp.coupling.response.restart import start_of
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.paths import with_numbers
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, with_scales
+from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import InputError
+
+#: parts of a system that columns have for each unit or body, and as they are
+BY_UNIT = ("friction", "limit", "restitution", "holds", "neglected")
+_WITH_COLUMNS = ("omega", "period", "moment", "speed", "frequency", "load", "rest", "play", *BY_UNIT)
+#: keys whose numbers are known to change these only
+_KNOWN = ("frequency", "force", "resonance_amplitude", "displacement", "velocity", "position")
+
+
+def columns(
+    scene: Scene, whole: System, start: RestartState, values: Mapping[str, np.ndarray]
+) -> tuple[Columns, list[int]]:
+    """Return the columns of scenes that differ from `scene` in some numbers, by paths: (k,) each.
+
+    Beside them the places of scenes that differ in more than columns have. whole, start: of the scene itself.
+    """
+    found, outside = repeated(whole, whole, start, len(next(iter(values.values())))), list[int]()
+    if all(path.rpartition(".")[2] in _KNOWN for path in values):
+        set_excitation(scene, whole, found, values)
+        set_starts(scene, found, values)
+        for k in range(len(found.omega)):
+            own = with_scales(system_in(whole, found, k, np.arange(len(whole.rest))))
+            found.moment[k], found.speed[k] = own.moment, own.speed
+        return found, outside
+    data = scene.to_dict()
+    for k in range(len(found.omega)):
+        try:
+            own = with_numbers(scene, data, {path: float(numbers[k]) for path, numbers in values.items()})
+            system = assemble(own)
+            begun = start_of(own, system)
+        except InputError:
+            outside.append(k)
+            continue
+        others = [name for name in System._fields if name not in _WITH_COLUMNS]
+        if not all(np.array_equal(getattr(system, name), getattr(whole, name), equal_nan=True) for name in others):
+            outside.append(k)
+            continue
+        for name in _WITH_COLUMNS:
+            getattr(found, name)[k] = getattr(system, name)
+        for name in STARTS:
+            getattr(found, name)[k] = getattr(begun, name)
+    return found, outside

@@ -1,0 +1,194 @@
+"""Runs of bodies in the plane in one compiled call (engine.scenes)."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.engine.known import add_known
+from vanedamp.coupling.engine.plane.automaton import advance, begin
+from vanedamp.coupling.engine.plane.flow_assembly import fill, is_in_states
+from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_scene
+from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
+from vanedamp.coupling.numerics.compiler.record import changed
+from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
+
+#: overlap relative to the play up to which a contact is closed as a run begins (response.restart)
+_ROUND_OFF = 1e-12
+
+
+@entry
+def run(
+    job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck,
+    measured, goal, max_events,
+):  # fmt: skip
+    """Run a scene to the end of `goal` periods, or all scenes of a job.
+
+    Returns the code (numerics.codes) of why it returns.
+    """
+    while take_scene(_take_numbers, job, columns, base, flows, setup, measured):
+        k = job.at[PLACE]
+        system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
+        system = changed(changed(system, "moment", columns.moment[k]), "speed", columns.speed[k])
+        code = run_scene(
+            begin, advance, _fill_known, _set_start, _is_outside, _leave, _repeat, job, columns, system, subsystems,
+            flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
+        )  # fmt: skip
+        if code != ON:
+            return code
+    return DONE
+
+
+@kernel
+def _fill_known(system, subsystems, st, flows, assembly):
+    """Fill the flow of the states (engine.known.add_known)."""
+    return add_known(is_in_states, fill, system, subsystems, st.state, flows, assembly)
+
+
+@kernel
+def _take_numbers(columns, base, flows, setup, measured, k, linked):
+    """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again."""
+    same = copy(base.frequency, columns.frequency[k])
+    same = copy(base.rest, columns.rest[k]) and same
+    same = copy(base.friction, columns.friction[k]) and same
+    same = copy(base.limit, columns.limit[k]) and same
+    copy(base.play, columns.play[k])
+    copy(base.restitution, columns.restitution[k])
+    for h in range(base.load.shape[0]):
+        setup.frequency[h], measured.frequency[h] = base.frequency[h], base.frequency[h]
+        for i in range(base.load.shape[1]):
+            load = columns.load[k, h, i]
+            same = same and base.load[h, i] == load
+            base.load[h, i], setup.load[h, i], measured.load[h, i] = load, load, load
+    if not same:
+        flows.modes[:] = 0
+    setup.clock[0], setup.clock[1] = columns.omega[k], columns.period[k]
+    measured.clock[0], measured.clock[1] = columns.omega[k], columns.period[k]
+    for i in range(0 if linked else base.modes):
+        setup.q[i] = columns.displacement[k, i] / base.scale
+        setup.v[i] = columns.velocity[k, i] / base.scale
+    copy(measured.holds, columns.holds[k])
+    copy(measured.rest, columns.rest[k])
+    copy(measured.play, columns.play[k])
+
+
+@kernel
+def _is_outside(system, st, columns, k, linked, left):
+    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python.
+
+    left: the number of the scene that has left the state of a linked one; as long as there is none, Python says how
+    a scene begins.
+    """
+    if linked and k > 0 and left == 0:
+        return True
+    for r in range(system.contacts):
+        yields = system.spring[r] < math.inf
+        if linked and (k == 0 or (yields and columns.play[k, r] == columns.play[left - 1, r])):
+            continue
+        gap = system.rest[r]
+        for i in range(len(st.q)):
+            gap += system.J[r, i] * st.q[i]
+        if gap < -_ROUND_OFF * system.play[r]:
+            return True
+    return False
+
+
+@kernel
+def _leave(system, flows, st, scratch, columns, k):
+    """Let scene k begin with the present state."""
+    for i in range(system.modes):
+        columns.displacement[k, i], columns.velocity[k, i] = system.scale * st.q[i], system.scale * st.v[i]
+    for b in range(system.bodies):
+        x = system.along[b]
+        columns.slip[k, b], columns.slip_velocity[k, b] = _relative(system.floor[b], st, x)
+        columns.lift[k, b], columns.lift_velocity[k, b], columns.tilt[k, b], columns.tilt_rate[k, b] = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
+        if system.tilt[b] >= 0:
+            columns.lift[k, b], columns.lift_velocity[k, b] = _relative(system.rise[b], st, x + 1)
+            columns.tilt[k, b], columns.tilt_rate[k, b] = _relative(system.turn[b], st, x + 2)
+    columns.elongation[k, :] = 0.0
+    for j in range(len(system.tangential)):
+        stretch = 0.0
+        for i in range(len(st.q)):
+            stretch += system.elongation[j, i] * st.q[i]
+        columns.elongation[k, _damper(system, j)] = stretch
+
+
+@kernel
+def _relative(carrier, st, x):
+    """Return place and rate of coordinate x relative to what carries it (N,)."""
+    place, rate = st.q[x], st.v[x]
+    for i in range(len(carrier)):
+        place -= carrier[i] * st.q[i]
+        rate -= carrier[i] * st.v[i]
+    return place, rate
+
+
+@kernel
+def _damper(system, j):
+    """Return the number of the friction damper that is Jenkins element j."""
+    return system.body[len(system.body) - len(system.tangential) + j]
+
+
+@kernel
+def _repeat(columns, k):
+    """Let the scene after scene k begin as that."""
+    for part in (
+        columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation, columns.lift,
+        columns.lift_velocity, columns.tilt, columns.tilt_rate,
+    ):  # fmt: skip
+        for i in range(part.shape[1]):
+            part[k + 1, i] = part[k, i]
+
+
+@strict
+def _set_start(system, st, watched, columns, k):
+    """Set the state at time zero to the start of scene k.
+
+    A spring that is compressed pushes, or lags behind the body that leaves it.
+    """
+    n, size, sliders = system.modes, len(st.q), len(system.tangential)
+    for part in (
+        st.time, st.q, st.v, st.rate, st.scale, st.pushed, st.lost, st.ledger, st.change, st.offset, st.bend, st.force,
+        st.prestress,
+    ):  # fmt: skip
+        part[:] = 0.0
+    st.counters[:], st.fresh[:], st.amplitude[:], watched.status[:] = 0, 0, 0.0, 0
+    st.other[:], st.known[:], st.last_impact[:] = OPEN, OPEN, -math.inf
+    for i in range(n):
+        st.q[i] = columns.displacement[k, i] / system.scale
+        st.v[i] = columns.velocity[k, i] / system.scale
+    for b in range(system.bodies):
+        x = system.along[b]
+        _place(system.floor[b], st, n, x, columns.slip[k, b], columns.slip_velocity[k, b])
+        if system.tilt[b] >= 0:
+            _place(system.rise[b], st, n, x + 1, columns.lift[k, b], columns.lift_velocity[k, b])
+            _place(system.turn[b], st, n, x + 2, columns.tilt[k, b], columns.tilt_rate[k, b])
+    for j in range(sliders):
+        stretch = 0.0
+        for i in range(size - sliders):
+            stretch += system.elongation[j, i] * st.q[i]
+        at = system.body[len(system.body) - sliders + j]
+        st.q[size - sliders + j] = stretch - columns.elongation[k, at]
+    for r in range(len(st.state)):
+        gap, speed = system.rest[r], 0.0
+        for i in range(size):
+            gap += system.J[r, i] * st.q[i]
+            speed += system.J[r, i] * st.v[i]
+        st.state[r] = OPEN
+        if system.spring[r] < math.inf and gap < -SIMULTANEOUS * system.play[r]:
+            pushes = system.spring[r] * gap + system.dashpot[r] * speed < 0.0
+            st.state[r] = SLIP_RIGHT if pushes else LEAVING
+
+
+@strict
+def _place(carrier, st, n, x, place, rate):
+    """Set coordinate x from its place and rate relative to what carries it, in n modes."""
+    for i in range(n):
+        place += carrier[i] * st.q[i]
+        rate += carrier[i] * st.v[i]
+    st.q[x], st.v[x] = place, rate
