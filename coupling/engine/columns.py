@@ -29,6 +29,8 @@ STARTS = (
 )  # fmt: skip
 LEVELS = ("excitation.force", "excitation.resonance_amplitude")
 
+#: keys whose numbers change no more than their columns, of bodies in the plane, too
+_KNOWN = ("frequency", "force", "resonance_amplitude", "displacement", "velocity", "position")
 _PLACES = re.compile(
     r"(?P<table>excitation|initial|cavity|damper)(\.(?P<entry>[^.]+))?\."
     r"(?P<key>frequency|force|resonance_amplitude|displacement|velocity|gap|friction|restitution|position)"
@@ -177,3 +179,12 @@ def columned(scene: Scene, paths: Iterable[str]) -> list[str]:
     own = [path for path in paths if entries_of(scene, path) is not None]
     # a number of a body or a cavity is one of each sector's, which may scatter about it
     return [path for path in own if path.startswith("excitation.")] if scene.repeats else own
+
+
+def foreseen(scene: Scene, paths: Iterable[str]) -> list[str]:
+    """Return those of some paths whose columns are known without the systems of the scenes.
+
+    Of bodies in the plane, gaps, friction and restitution enter in more than one place.
+    """
+    found = columned(scene, paths)
+    return [path for path in found if path.rpartition(".")[2] in _KNOWN] if scene.planar else found

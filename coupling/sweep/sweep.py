@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.engine.columns import columned
+from vanedamp.coupling.engine.columns import foreseen
 from vanedamp.coupling.methods.registry import wall_warnings
 from vanedamp.coupling.quantities.energy import penetration
 from vanedamp.coupling.quantities.quantity import evaluated
@@ -138,7 +138,7 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
     low, high = min(grid.axes[swept]), max(grid.axes[swept])
     points, found, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
     feels = [path for path in others if not UNFELT.fullmatch(path)]
-    fits = set(columned(grid.base, others)) | set(feels) == set(others)  # others may keep bodies from fitting together
+    fits = set(foreseen(grid.base, others)) | set(feels) == set(others)  # others may keep bodies from fitting together
     for values in itertools.product(*others.values()):
         felt = tuple(value for path, value in zip(others, values, strict=True) if path in feels)
         if felt in known and fits:

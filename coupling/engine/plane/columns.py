@@ -10,7 +10,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vanedamp.coupling.engine.columns import STARTS, Columns, repeated, set_excitation, set_starts, system_in
+from vanedamp.coupling.engine.columns import (
+    STARTS,
+    Columns,
+    foreseen,
+    repeated,
+    set_excitation,
+    set_starts,
+    system_in,
+)
 from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.paths import with_numbers
@@ -22,8 +30,6 @@ from vanedamp.files.toml_input import InputError
 #: parts of a system that columns have for each unit or body, and as they are
 BY_UNIT = ("friction", "limit", "restitution", "holds", "neglected")
 _WITH_COLUMNS = ("omega", "period", "moment", "speed", "frequency", "load", "rest", "play", *BY_UNIT)
-#: keys whose numbers are known to change these only
-_KNOWN = ("frequency", "force", "resonance_amplitude", "displacement", "velocity", "position")
 
 
 def columns(
@@ -34,7 +40,7 @@ def columns(
     Beside them the places of scenes that differ in more than columns have. whole, start: of the scene itself.
     """
     found, outside = repeated(whole, whole, start, len(next(iter(values.values())))), list[int]()
-    if all(path.rpartition(".")[2] in _KNOWN for path in values):
+    if len(foreseen(scene, values)) == len(values):
         set_excitation(scene, whole, found, values)
         set_starts(scene, found, values)
         for k in range(len(found.omega)):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vanedamp.coupling.engine.columns import columned
+from vanedamp.coupling.engine.columns import foreseen
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
@@ -118,7 +118,7 @@ def exponent_seconds(scene: Scene) -> float:
 
 def beginning(scene: Scene) -> float:
     """Return the processor time of a run in addition to its periods, s: of each point of a scene with a sweep."""
-    return TOGETHER if scene.axes and len(columned(scene, scene.axes)) == len(scene.axes) else RUN
+    return TOGETHER if scene.axes and len(foreseen(scene, scene.axes)) == len(scene.axes) else RUN
 
 
 def run_seconds(scene: Scene) -> float:
