@@ -29,7 +29,7 @@ class Model:
     def __init__(self, system: LineSystem) -> None:
         self.system, self.n, self.order = system, len(system.mass), system.order.astype(float)
         omega, contact = system.omega, np.arange(len(system.J)) >= system.friction_rows
-        self.length = float(system.free_travel.min())
+        self.length = float(system.play.min())
         moved = np.abs(system.J).max(axis=0)
         self.size = self.length / np.where(moved > 0, moved, 1.0)
         self.row, self.rest = system.J * self.size / self.length, system.rest / self.length

@@ -58,7 +58,7 @@ class _Units:
     """Scales of length (m), time (s), mass (kg) and force (N)."""
 
     def __init__(self, equations: Coupled) -> None:
-        gaps = equations.system.free_travel[np.isfinite(equations.system.free_travel)]
+        gaps = equations.system.play[np.isfinite(equations.system.play)]
         self.length, self.time, self.mass = (
             float(gaps.min()),
             equations.system.period,

@@ -129,7 +129,7 @@ def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
     whole = assemble(scene)
     system, motion = line_system(whole), motion_of(whole, start_of(scene, whole))
-    travel, size = np.where(np.isinf(system.spring), system.free_travel, np.inf), len(system.mass)
+    travel, size = np.where(np.isinf(system.spring), system.play, np.inf), len(system.mass)
     times = time_grid(scene, whole, steps)._replace(travel=travel)
     return Coupled(system, times, Motion(motion.q[:size], motion.v[:size]))
 

@@ -117,7 +117,7 @@ def repeated(whole: System, system: Any, start: RestartState, size: int = 1) -> 
     """Return the columns of as many equal scenes. system: that of the engine, in whose order rows are."""
     row = (
         whole.omega, whole.period, whole.moment, whole.speed, whole.frequency, system.load, system.rest,
-        system.free_travel, getattr(system, "friction", np.zeros(0)), system.limit, system.restitution,
+        system.play, getattr(system, "friction", np.zeros(0)), system.limit, system.restitution,
         whole.holds, whole.neglected, *(getattr(start, name) for name in STARTS),
     )  # fmt: skip
     return Columns(*(np.repeat(np.asarray(value)[None], size, axis=0) for value in row))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -52,6 +52,11 @@ class EventDrivenRun(ABC):
     #: the compiled function, and whether a scene is so common that it is compiled for its lengths
     compiled: ClassVar[Any]
     is_common: ClassVar[Any]
+    #: make, for a system: known subsystems, room for flows (and some number of them), room to fill these; and with a
+    #: number of modes state, event functions and scratch space
+    rooms: ClassVar[tuple[Callable[..., Any], ...]]
+    #: name of what names a subsystem in the state
+    key: ClassVar[str]
     #: those compiled for lengths, by engine
     _sized: ClassVar[dict[type, Any]] = {}
     known: Known
@@ -72,25 +77,15 @@ class EventDrivenRun(ABC):
         self.begun, self.ended, self._since = False, False, START
         self.listed = 0  # entries of the log, kept or not
         self.columns, self.job, self.statistics = repeated(whole, system, start), new_job(), UNJUDGED
-        self._new_state()
+        known, self._empty_flows, to_fill, *of_modes = self.rooms
+        self.known, self.flows, self.assembly = known(system), self._empty_flows(system), to_fill(system)
+        modes = self.flows.eigenvalue.shape[1]
+        self.state, self.watched, self.scratch = (room(system, modes) for room in of_modes)
         self._run = self.compiled
-        if hasattr(self._run, "sized") and self.is_common(system, self.flows.eigenvalue.shape[1]):
+        if hasattr(self._run, "sized") and self.is_common(system, modes):
             if type(self) not in self._sized:
                 self._sized[type(self)] = self._run.sized(*self._records(), 0, 0)
             self._run = self._sized[type(self)]
-
-    @abstractmethod
-    def _new_state(self) -> None:
-        """Make known subsystems, flows, state, event functions and scratch space."""
-
-    @property
-    @abstractmethod
-    def key(self) -> np.ndarray:
-        """What names the present subsystem: closed rows, or states."""
-
-    @abstractmethod
-    def _empty_flows(self, size: int) -> Any:
-        """Return storage for so many flows."""
 
     @abstractmethod
     def columns_of(
@@ -127,7 +122,8 @@ class EventDrivenRun(ABC):
 
     def _add_flow(self) -> None:
         """Find the subsystem that the state calls for, and a place for it. Raises IllConditioned, LinAlgError."""
-        self.flows = with_place(self.flows, self.known, self.known.place(self.system, self.key), self._empty_flows)
+        k = self.known.place(self.system, getattr(self.state, self.key))
+        self.flows = with_place(self.flows, self.known, k, partial(self._empty_flows, self.system))
 
     def run_many(self, job: Job, columns: Columns, statistics: tuple[Any, ...]) -> int:
         """Go on with the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.

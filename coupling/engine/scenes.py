@@ -91,7 +91,7 @@ def take_scene(take, job, columns, base, flows, setup, measured):
 
 @kernel
 def run_scene(
-    begin, advance, fill_known, start, is_outside, leave, repeat, job, columns, system, subsystems, flows, st, watched,
+    begin, advance, fill_known, start, is_outside, leave, job, columns, system, subsystems, flows, st, watched,
     rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
 ):  # fmt: skip
     """Go on with the present scene by the functions of its engine; `goal` periods of one that the caller judges.
@@ -146,6 +146,47 @@ def run_scene(
         at[SEGMENTS] = 0
         return PAUSED
     return ON
+
+
+@kernel
+def take_numbers(columns, base, flows, setup, measured, k, linked, same):
+    """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again.
+
+    same: whether an engine's own numbers that enter flows are those that were.
+    """
+    same = copy(base.frequency, columns.frequency[k]) and same
+    copy(base.rest, columns.rest[k])
+    same = copy(base.play, columns.play[k]) and same
+    copy(base.limit, columns.limit[k])
+    copy(base.restitution, columns.restitution[k])
+    for h in range(base.load.shape[0]):
+        setup.frequency[h], measured.frequency[h] = base.frequency[h], base.frequency[h]
+        for i in range(base.load.shape[1]):
+            load = columns.load[k, h, i]
+            same = same and base.load[h, i] == load
+            base.load[h, i], setup.load[h, i], measured.load[h, i] = load, load, load
+    if not same:
+        flows.modes[:] = 0
+    setup.clock[0], setup.clock[1] = columns.omega[k], columns.period[k]
+    measured.clock[0], measured.clock[1] = columns.omega[k], columns.period[k]
+    for i in range(0 if linked else base.modes):
+        setup.q[i] = columns.displacement[k, i] / base.scale
+        setup.v[i] = columns.velocity[k, i] / base.scale
+    copy(measured.holds, columns.holds[k])
+    behind = len(base.rest) - len(measured.rest)
+    for u in range(len(measured.rest)):
+        measured.rest[u], measured.play[u] = base.rest[behind + u], base.play[behind + u]
+
+
+@kernel
+def repeat(columns, k):
+    """Let the scene after scene k begin as that."""
+    for part in (
+        columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation, columns.lift,
+        columns.lift_velocity, columns.tilt, columns.tilt_rate,
+    ):  # fmt: skip
+        for i in range(part.shape[1]):
+            part[k + 1, i] = part[k, i]
 
 
 @kernel

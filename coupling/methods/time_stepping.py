@@ -109,7 +109,7 @@ def time_grid(scene: Scene, system: System, steps: int) -> TimeGrid:
     return TimeGrid(
         step=system.period / steps, phase=np.column_stack([np.cos(angle), np.sin(angle)]),
         load=np.vstack([load, load[:1]]), table=np.ascontiguousarray((system.phases(angle) @ table).real),
-        travel=np.where(np.isinf(system.spring), system.free_travel, np.inf),
+        travel=np.where(np.isinf(system.spring), system.play, np.inf),
         stiffness=sparse(system.stiffness), damping=sparse(system.damping),
     )  # fmt: skip
 

@@ -51,7 +51,7 @@ class LineSystem(NamedTuple):
     dashpot: np.ndarray  # (r,) N s/m
     restitution: np.ndarray  # (r,) of rigid contacts, or the coefficient from which their law takes it at a speed
     restitution_at: int  # address of that law (numerics.function_address); 0: the coefficient at every speed
-    free_travel: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
+    play: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
     left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
     right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall
     moves_with_floor: np.ndarray  # (r,) whether a contact's gap is a difference of slips
@@ -120,7 +120,7 @@ def line_system(system: System) -> LineSystem:
         limit=np.concatenate([system.holds, system.grip, np.zeros(system.contacts)]),
         spring=rows(np.inf, system.casing_spring, system.spring), dashpot=rows(0.0, 0.0, system.dashpot),
         restitution=rows(0.0, 0.0, system.restitution), restitution_at=system.restitution_at,
-        free_travel=rows(np.inf, np.inf, system.play), left_body=np.r_[np.full(b + d, -1), left],
+        play=rows(np.inf, np.inf, system.play), left_body=np.r_[np.full(b + d, -1), left],
         right_body=np.r_[np.full(b + d, -1), right],
         moves_with_floor=contact & on_bodies.any(axis=1) & alike, outputs=system.outputs,
     )  # fmt: skip

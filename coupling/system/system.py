@@ -87,7 +87,7 @@ class System(NamedTuple):
     elongation: np.ndarray  # (j, N) of these springs
     in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
-    play: np.ndarray  # (u,) m, the scale of a contact's gap
+    play: np.ndarray  # (u,) free travel, m: the scale of a contact's gap; inf for friction elements
     body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body, of its own table
     other: np.ndarray  # (u,) number of the body to its right; -1: none
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
@@ -126,11 +126,6 @@ class System(NamedTuple):
             self.mass[at], np.zeros(len(at)), self.damping[np.ix_(at, at)], self.load[:, at], self.weight[at],
             self.response[at], self.J[:, at],
         )  # fmt: skip
-
-    @property
-    def free_travel(self) -> np.ndarray:
-        """Free travel (u,) of each contact, m: the scale of its gap; inf for friction elements."""
-        return self.play
 
     @property
     def dampers(self) -> int:

@@ -56,7 +56,7 @@ def check_events(scene: Scene, longest: int | None = None) -> Worst:
     """Step through a run, or its first `longest` steps. Raises AssertionError at the first law that is broken."""
     worst, stepper = Worst(scenes=1), Stepper(scene)
     system = stepper.run.system
-    widest = system.free_travel[_contacts(system)].max()
+    widest = system.play[_contacts(system)].max()
     fastest, last = SLOW * system.omega * widest, np.full(len(system.delassus), -np.inf)
     if stepper.code == DONE:
         first = stepper.segment()
@@ -84,7 +84,7 @@ def _check_between(worst: Worst, step: Step) -> Moment:
     segment, system = step.before, step.before.system
     path = segment.at(step.span * np.linspace(0.0, 1.0, POINTS))
     solid = _contacts(system) & np.isinf(system.spring)
-    depth = -path.gap[:, solid].min(axis=0, initial=0.0) / system.free_travel[solid]
+    depth = -path.gap[:, solid].min(axis=0, initial=0.0) / system.play[solid]
     worst.note("penetration", depth.max(initial=0.0), PENETRATION, step)
     _check_bounds(worst, segment, path, step)
     return path.take(-1)
@@ -98,7 +98,7 @@ def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | Non
     friction = np.abs(force[:, :k]) - system.limit[:k]
     # a compliant contact ends when its spring is pulled by ADHESION of the free travel, not before
     springs = np.where(np.isfinite(system.spring[k:]), system.spring[k:], 0.0)
-    pull = -force[:, k:] - 2 * ADHESION * springs * system.free_travel[k:]
+    pull = -force[:, k:] - 2 * ADHESION * springs * system.play[k:]
     for excess in (friction.max(axis=0) / size[:k], pull.max(axis=0, initial=0.0) / size[k:]):
         worst.note("bound", excess.max(initial=0.0), BALANCE, step)
     slides = np.isin(segment.state[:k], SLIDES)
@@ -130,7 +130,7 @@ def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None)
     assert np.all(segment.velocity[still & (friction | system.moves_with_floor)] == 0.0), "a row at rest moves"
     assert np.all(segment.displacement[still & ~friction] == 0.0), "a closed contact is open"
     open_ = ~friction & (state == OPEN)
-    gap = system.free_travel[open_]
+    gap = system.play[open_]
     if np.any(open_ & solid):
         assert np.all(now.force[open_] == 0.0), "an open contact pushes"
     worst.note("penetration", (-segment.displacement[open_] / gap).max(initial=0.0), PENETRATION, step)
@@ -139,7 +139,7 @@ def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None)
     starts = solid & friction & np.isin(state, SLIDES) & (segment.velocity == 0.0)
     worst.note("balance", (-state * acceleration)[starts].max(initial=0.0) / scale, BALANCE, step)
     left = ~friction & (state == LEAVING)
-    travel = system.spring[left] * system.free_travel[left]
+    travel = system.spring[left] * system.play[left]
     pushes = -(system.spring[left] * segment.displacement[left] + system.dashpot[left] * segment.velocity[left])
     worst.note("bound", (pushes / travel).max(initial=0.0), BALANCE, step)
 
@@ -148,7 +148,7 @@ def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: fl
     """Impulses at closed contacts explain every jump and obey Newton's law. Returns the contacts that were hit."""
     after, system = step.after, step.before.system
     contacts = _contacts(system)
-    scale = np.where(contacts, system.free_travel, max(np.abs(end.gap).max(), 1e-300))
+    scale = np.where(contacts, system.play, max(np.abs(end.gap).max(), 1e-300))
     # speeds that differ by SPEED_ROUND_OFF of the fastest are equal: slip and gap at a wall apart from the floor may
     # have drifted apart at that speed for a period when they are joined again
     scale = scale + SPEED_ROUND_OFF * fastest * system.period / SIMULTANEOUS

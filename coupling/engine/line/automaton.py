@@ -178,8 +178,8 @@ def begin(system, st, rec, scratch):
             st.state[r] = _jenkins_state(system, st, r)
     for r in range(len(st.state)):
         scratch.forced[r] = 0
-        if r >= system.friction_rows and st.displacement[r] <= SIMULTANEOUS * system.free_travel[r]:
-            if not rigid(system, r) and st.displacement[r] < -SIMULTANEOUS * system.free_travel[r]:
+        if r >= system.friction_rows and st.displacement[r] <= SIMULTANEOUS * system.play[r]:
+            if not rigid(system, r) and st.displacement[r] < -SIMULTANEOUS * system.play[r]:
                 # compressed from the start: its impact was before the run
                 st.state[r] = SPRUNG if spring_force(system, st, r) > 0.0 else LEAVING
                 continue
@@ -535,7 +535,7 @@ def _within_walls(system, st):
     friction = system.friction_rows
     for r in range(friction, len(st.state)):
         pressed = st.state[r] == SPRUNG or st.state[r] == LEAVING
-        if not pressed and not st.displacement[r] >= -OVERLAP * system.free_travel[r]:
+        if not pressed and not st.displacement[r] >= -OVERLAP * system.play[r]:
             return False
     return True
 

@@ -254,7 +254,7 @@ def _free_accelerations(system, st, scratch):
     for r in range(len(st.state)):
         total, terms = row_terms(system.J[r], scratch.loads, scratch.sizes)
         if r >= system.friction_rows and st.state[r] == SPRUNG:
-            terms += TRAVEL * system.spring[r] * system.free_travel[r] * system.delassus[r, r]
+            terms += TRAVEL * system.spring[r] * system.play[r] * system.delassus[r, r]
         scratch.acceleration[r] = total
         largest = max(largest, terms)
     return largest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from vanedamp.coupling.engine.line.complex_modes import complex_modes
 from vanedamp.coupling.engine.line.flow_assembly import new_assembly_scratch
 from vanedamp.coupling.engine.line.scenes import run
 from vanedamp.coupling.engine.line.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.engine.line.subsystem_assembly import Flows, empty_flows
+from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
 from vanedamp.coupling.engine.line.subsystems import known_subsystems
 from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.numerics.codes import (
@@ -61,23 +61,14 @@ class EngineRun(EventDrivenRun):
     rows_of: ClassVar = staticmethod(rows_of_line)
     compiled: ClassVar = staticmethod(run)
     is_common: ClassVar = staticmethod(is_common)
+    rooms: ClassVar = (
+        known_subsystems, empty_flows, new_assembly_scratch, new_state, new_event_functions, new_scratch
+    )  # fmt: skip
+    key: ClassVar = "active_set"
 
-    def _new_state(self) -> None:
-        system, self._rows = self.system, rows_of_units(self.whole)
-        self.known, self.flows = known_subsystems(system), empty_flows(system)
-        self.assembly = new_assembly_scratch(system)
-        modes = self.flows.eigenvalue.shape[1]
-        self.state, self.watched = new_state(system, modes), new_event_functions(system, modes)
-        self.scratch = new_scratch(system, modes)
-
-    @property
-    def key(self) -> np.ndarray:
-        """The closed rows."""
-        closed: np.ndarray = self.state.active_set
-        return closed
-
-    def _empty_flows(self, size: int) -> Flows:
-        return empty_flows(self.system, size)
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._rows = rows_of_units(self.whole)
 
     def columns_of(
         self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]

@@ -391,7 +391,7 @@ def _add_force(system, flows, st, watched, s, r, side, sides, near, far, value, 
         bound += second_bound
     if st.state[r] == SPRUNG and r >= system.friction_rows:
         # bodies that touch without force, as in a free flight side by side, are not parted by round-off
-        near += ADHESION * system.spring[r] * system.free_travel[r]
+        near += ADHESION * system.spring[r] * system.play[r]
     watched.k0[k, 0], watched.k0[k, 1], watched.k1[k], watched.k2[k] = near, far, 0.0, 0.0
     if _begin_function(st, watched, r, FORCE, side, sides, k):
         watched.no_root_before[k] = _bounded_step(near + value, slope, bound)

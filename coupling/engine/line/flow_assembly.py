@@ -126,7 +126,7 @@ def _rests(system, subsystems, k, reach):
             total += subsystems.static[k, i, n + b] * system.weight[n + b]
         reach[i] = abs(total)
     for r in range(len(system.spring)):
-        nearest, moved = min(nearest, system.free_travel[r]), 0.0
+        nearest, moved = min(nearest, system.play[r]), 0.0
         for i in range(n):
             moved += abs(subsystems.functional[k, r, i]) * reach[i]
         far = max(far, moved)

@@ -37,7 +37,7 @@ def align_gaps(system, st, y):
     """
     n = len(st.constant)
     for r in range(system.friction_rows, len(st.state)):
-        scale = system.free_travel[r]
+        scale = system.play[r]
         if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < CLOSING * scale:
             continue
         k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
@@ -116,7 +116,7 @@ def close_gaps(system, st, scratch):
     """Close the rigid contacts that touch to round-off exactly, and list them. Return their number."""
     count, tiny, friction = 0, slowest(system, st), system.friction_rows
     for r in range(friction, len(st.state)):
-        near = st.displacement[r] <= SIMULTANEOUS * system.free_travel[r] and st.velocity[r] <= tiny
+        near = st.displacement[r] <= SIMULTANEOUS * system.play[r] and st.velocity[r] <= tiny
         scratch.touching[r] = rigid(system, r) and (st.displacement[r] == 0.0 or near)
         if scratch.touching[r]:
             scratch.listed[count] = r

@@ -32,7 +32,7 @@ def single_impact(system, st, rec, scratch, r):
     if -speed <= slowest(system, st):
         return False
     for i in range(friction, len(st.state)):
-        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * system.free_travel[i]):
+        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * system.play[i]):
             return False
     impulse = -(1.0 + restitution) * speed / system.delassus[r, r]
     for i in range(len(st.state)):

@@ -9,7 +9,7 @@ from vanedamp.coupling.engine.line.automaton import advance, begin
 from vanedamp.coupling.engine.line.flow_assembly import fill, is_closed_as
 from vanedamp.coupling.engine.line.gap_kinematics import rigid
 from vanedamp.coupling.engine.line.recording import structure_state
-from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_scene
+from vanedamp.coupling.engine.scenes import ON, PLACE, run_scene, take_numbers, take_scene
 from vanedamp.coupling.numerics.codes import COAST, DONE, OPEN
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
@@ -29,7 +29,7 @@ def run(
         k = job.at[PLACE]
         system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
         code = run_scene(
-            begin, advance, _fill_known, _set_start, _is_outside, _leave, _repeat, job, columns, system, subsystems,
+            begin, advance, _fill_known, _set_start, _is_outside, _leave, job, columns, system, subsystems,
             flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
         )  # fmt: skip
         if code != ON:
@@ -45,29 +45,8 @@ def _fill_known(system, subsystems, st, flows, assembly):
 
 @kernel
 def _take_numbers(columns, base, flows, setup, measured, k, linked):
-    """Set what differs between scenes to the numbers of scene k; flows of other excitations are to be filled again."""
-    same = copy(base.frequency, columns.frequency[k])
-    same = copy(base.free_travel, columns.play[k]) and same
-    copy(base.rest, columns.rest[k])
-    copy(base.limit, columns.limit[k])
-    copy(base.restitution, columns.restitution[k])
-    for h in range(base.load.shape[0]):
-        setup.frequency[h], measured.frequency[h] = base.frequency[h], base.frequency[h]
-        for i in range(base.load.shape[1]):
-            load = columns.load[k, h, i]
-            same = same and base.load[h, i] == load
-            base.load[h, i], setup.load[h, i], measured.load[h, i] = load, load, load
-    if not same:
-        flows.modes[:] = 0
-    setup.clock[0], setup.clock[1] = columns.omega[k], columns.period[k]
-    measured.clock[0], measured.clock[1] = columns.omega[k], columns.period[k]
-    for i in range(0 if linked else base.modes):
-        setup.q[i] = columns.displacement[k, i] / base.scale
-        setup.v[i] = columns.velocity[k, i] / base.scale
-    for b in range(base.bodies):
-        measured.holds[b] = columns.holds[k, b]
-    for u in range(len(base.rest) - base.friction_rows):
-        measured.rest[u], measured.play[u] = base.rest[base.friction_rows + u], base.free_travel[base.friction_rows + u]
+    """Set what differs between scenes (engine.scenes.take_numbers)."""
+    take_numbers(columns, base, flows, setup, measured, k, linked, True)
 
 
 @kernel
@@ -85,7 +64,7 @@ def _is_outside(system, st, columns, k, linked, left):
             if k == 0 or (not rigid(system, r) and columns.play[k, r] == columns.play[left - 1, r]):
                 continue
             if system.left_body[r] >= 0 or system.right_body[r] >= 0:
-                least = -SIMULTANEOUS * system.free_travel[r]
+                least = -SIMULTANEOUS * system.play[r]
         if st.displacement[r] < least:
             return True
     return False
@@ -102,14 +81,6 @@ def _leave(system, flows, st, scratch, columns, k):
         columns.slip[k, body], columns.slip_velocity[k, body] = st.displacement[body], st.velocity[body]
     for r in range(b, system.friction_rows):
         columns.elongation[k, r - b] = 0.0 if rigid(system, r) else st.displacement[r]
-
-
-@kernel
-def _repeat(columns, k):
-    """Let the scene after scene k begin as that."""
-    for part in (columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation):
-        for i in range(part.shape[1]):
-            part[k + 1, i] = part[k, i]
 
 
 @strict

@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.engine.columns import Columns, system_in
 from vanedamp.coupling.engine.plane.columns import BY_UNIT, columns
-from vanedamp.coupling.engine.plane.flow_assembly import Flows, empty_flows, new_assembly_scratch
+from vanedamp.coupling.engine.plane.flow_assembly import empty_flows, new_assembly_scratch
 from vanedamp.coupling.engine.plane.scenes import run
 from vanedamp.coupling.engine.plane.state import new_event_functions, new_scratch, new_state
 from vanedamp.coupling.engine.plane.subsystems import known_subsystems
@@ -42,6 +42,10 @@ class PlanarRun(EventDrivenRun):
     rows_of: ClassVar = staticmethod(rows_of_units)
     compiled: ClassVar = staticmethod(run)
     is_common: ClassVar = staticmethod(is_common)
+    rooms: ClassVar = (
+        known_subsystems, empty_flows, new_assembly_scratch, new_state, new_event_functions, new_scratch
+    )  # fmt: skip
+    key: ClassVar = "state"
 
     def __init__(
         self, system: System, start: RestartState, records: Records, events: bool, max_events: int,
@@ -50,25 +54,8 @@ class PlanarRun(EventDrivenRun):
         super().__init__(system, system, start, records, events, max_events)
         self.linearisation = linearisation
 
-    def _new_state(self) -> None:
-        system = self.system
-        self.known, self.flows = known_subsystems(system), empty_flows(system)
-        self.assembly = new_assembly_scratch(system)
-        modes = self.flows.eigenvalue.shape[1]
-        self.state, self.watched = new_state(system, modes), new_event_functions(system, modes)
-        self.scratch = new_scratch(system, modes)
-
     def check(self) -> None:
         """Take any structure."""
-
-    @property
-    def key(self) -> np.ndarray:
-        """The states."""
-        states: np.ndarray = self.state.state
-        return states
-
-    def _empty_flows(self, size: int) -> Flows:
-        return empty_flows(self.system, size)
 
     def columns_of(
         self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]

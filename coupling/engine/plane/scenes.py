@@ -7,7 +7,7 @@ import math
 from vanedamp.coupling.engine.known import add_known
 from vanedamp.coupling.engine.plane.automaton import advance, begin
 from vanedamp.coupling.engine.plane.flow_assembly import fill, is_in_states
-from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_scene
+from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_numbers, take_scene
 from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
@@ -31,7 +31,7 @@ def run(
         system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
         system = changed(changed(system, "moment", columns.moment[k]), "speed", columns.speed[k])
         code = run_scene(
-            begin, advance, _fill_known, _set_start, _is_outside, _leave, _repeat, job, columns, system, subsystems,
+            begin, advance, _fill_known, _set_start, _is_outside, _leave, job, columns, system, subsystems,
             flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
         )  # fmt: skip
         if code != ON:
@@ -47,29 +47,11 @@ def _fill_known(system, subsystems, st, flows, assembly):
 
 @kernel
 def _take_numbers(columns, base, flows, setup, measured, k, linked):
-    """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again."""
-    same = copy(base.frequency, columns.frequency[k])
-    same = copy(base.rest, columns.rest[k]) and same
+    """Set what differs between scenes (engine.scenes.take_numbers); friction, limits and rests enter flows, too."""
+    same = copy(base.rest, columns.rest[k])
     same = copy(base.friction, columns.friction[k]) and same
     same = copy(base.limit, columns.limit[k]) and same
-    copy(base.play, columns.play[k])
-    copy(base.restitution, columns.restitution[k])
-    for h in range(base.load.shape[0]):
-        setup.frequency[h], measured.frequency[h] = base.frequency[h], base.frequency[h]
-        for i in range(base.load.shape[1]):
-            load = columns.load[k, h, i]
-            same = same and base.load[h, i] == load
-            base.load[h, i], setup.load[h, i], measured.load[h, i] = load, load, load
-    if not same:
-        flows.modes[:] = 0
-    setup.clock[0], setup.clock[1] = columns.omega[k], columns.period[k]
-    measured.clock[0], measured.clock[1] = columns.omega[k], columns.period[k]
-    for i in range(0 if linked else base.modes):
-        setup.q[i] = columns.displacement[k, i] / base.scale
-        setup.v[i] = columns.velocity[k, i] / base.scale
-    copy(measured.holds, columns.holds[k])
-    copy(measured.rest, columns.rest[k])
-    copy(measured.play, columns.play[k])
+    take_numbers(columns, base, flows, setup, measured, k, linked, same)
 
 
 @kernel
@@ -132,17 +114,6 @@ def _relative(carrier, st, x):
 def _damper(system, j):
     """Return the number of the friction damper that is Jenkins element j."""
     return system.body[len(system.body) - len(system.tangential) + j]
-
-
-@kernel
-def _repeat(columns, k):
-    """Let the scene after scene k begin as that."""
-    for part in (
-        columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation, columns.lift,
-        columns.lift_velocity, columns.tilt, columns.tilt_rate,
-    ):  # fmt: skip
-        for i in range(part.shape[1]):
-            part[k + 1, i] = part[k, i]
 
 
 @strict

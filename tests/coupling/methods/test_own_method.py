@@ -134,7 +134,7 @@ class Leapfrog:
         records.impacts[p] += np.count_nonzero(begun)
         records.collided[p] += (0.5 * closing**2 / np.diag(system.delassus)[friction:])[begun].sum()
         if self.rigid.any():
-            self.deepest = max(self.deepest, (-gap / system.free_travel[friction:])[self.rigid].max())
+            self.deepest = max(self.deepest, (-gap / system.play[friction:])[self.rigid].max())
         (x0, rate0, turn0), (x1, rate1, turn1) = before, self.response(k + 1)
         records.peak[p] = max(records.peak[p], abs(x1), abs(cubic_extremum(h, x0, x1, rate0, rate1)))
         records.square[p] += h * (x0 * x0 + x1 * x1) / 2
