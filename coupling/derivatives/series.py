@@ -5,6 +5,8 @@ z' = X z, and by P numbers of X: Z' = X Z + D z. The series end at round-off, so
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from copy import copy
 from typing import NamedTuple
 
@@ -15,6 +17,8 @@ from vanedamp.coupling.numerics.compiler.jit import entry
 
 #: norm of X, balanced, over a panel, and terms of a series then: 3^32/32! < 1e-19
 _NORM, _TERMS = 3.0, 32
+#: most panels of a motion whose nodes are kept at once
+_MOST = 200
 #: nodes and weights of Gauss and Legendre on a panel (0 to 1): they integrate the motion and its squares to round-off
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
 
@@ -60,12 +64,27 @@ class Series:
         eye = np.eye(len(self.X))
         return self.alone.course(eye[0], eye, step, False).end
 
+    def pieces(self, z: np.ndarray, Z: np.ndarray, duration: float) -> Iterator[tuple[float, float, Course]]:
+        """Yield start, end and course, with nodes, of the pieces of a motion from z (K,), Z (K, P) over a duration, s.
+
+        A stiff contact has tens of thousands of panels, whose nodes together take more memory than there is.
+        """
+        count = max(int(np.ceil(self._panels(duration) / _MOST)), 1)
+        times = [*(duration * piece / count for piece in range(count)), duration]
+        for start, end in itertools.pairwise(times):
+            course = self.course(z, Z, end - start, True)
+            yield start, end, course
+            z, Z = course.last, course.end
+
+    def _panels(self, duration: float) -> int:
+        return max(int(np.ceil(self._norm * abs(duration) / _NORM)), 1)
+
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
         """Return the motion from z (K,), Z (K, k + P) over a duration, s; at nodes, or without any.
 
         The first k columns are derivatives by what changes no flow.
         """
-        panels = max(int(np.ceil(self._norm * abs(duration) / _NORM)), 1)
+        panels = self._panels(duration)
         step, (k, p) = duration / panels, Z.shape
         places = _NODES if nodes else np.zeros(0)
         g = len(places)

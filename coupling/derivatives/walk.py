@@ -14,7 +14,6 @@ from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.jump import Untrusted
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
-from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.start import Start
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.response.records import new_records
@@ -44,8 +43,8 @@ class Watch(Protocol):
     def begin(self, unheld: np.ndarray) -> None:
         """Take the derivative (2N, k + P) of the start as it is given, before what sticks is stopped."""
 
-    def segment(self, begun: Before, course: Course) -> None:
-        """Take the motion until the next event. begun: its start, with the derivative there."""
+    def segment(self, begun: Before, duration: float) -> None:
+        """Take the motion over a duration, s, until the next event. begun: its start, with the derivative there."""
 
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end. M: the derivative after it; shift: (k + P,) of its time, s."""
@@ -131,9 +130,9 @@ class PassageWalk:
         if numbers is not None:
             series = derivative_of(begun.flow, numbers).series
             Z[one:, Z.shape[1] - len(numbers) :] = numbers.harmonics(self._dynamics, begun.segment.start)[:, one:].T
-        course = series.course(begun.z, Z, duration, watch is not None)
+        course = series.course(begun.z, Z, duration, False)
         if watch is not None:
-            watch.segment(begun, course)
+            watch.segment(begun, duration)
         return begun._replace(z=course.last, M=course.end[:one])
 
     def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:

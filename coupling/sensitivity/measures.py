@@ -76,7 +76,6 @@ class Measures:
         self._times, self.samples = list(times), list[tuple[float, np.ndarray, np.ndarray]]()
         self._since: np.ndarray = np.zeros(self._P)
         self._begun: Before | None = None
-        self._course: Course | None = None
 
     # --- what a walk calls
 
@@ -84,9 +83,9 @@ class Measures:
         """Take the start as it is given: friction may take its momentum at once."""
         self._unheld = unheld[:, self._k :]
 
-    def segment(self, begun: Before, course: Course) -> None:
+    def segment(self, begun: Before, duration: float) -> None:
         """Take the motion until the next event."""
-        self._begun, self._course = begun, course._replace(Z=course.Z[..., self._k :], end=course.end[:, self._k :])
+        self._begun = begun._replace(segment=begun.segment._replace(duration=duration))
 
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end, and what led there."""
@@ -105,24 +104,39 @@ class Measures:
 
     def _passed(self, before: Before, shift: np.ndarray) -> None:
         """Take a segment whose end moves by `shift` (P,)."""
-        begun, course = self._begun, self._course
-        assert begun is not None and course is not None
-        segment = begun.segment
-        Z = self._whole(begun.M, segment.start)
-        end = before.z, np.vstack([before.M[:, self._k :], course.end[self.dynamics.one :]])
-        series, ends = derivative_of(begun.flow, self.numbers).series, ((begun.z, Z, self._since), (*end, shift))
-        self.response.passed(segment.period, series, course, segment.duration, ends)
+        begun = self._begun
+        assert begun is not None
+        segment, whole = begun.segment, begun.segment.duration
+        Z, series = self._whole(begun.M, segment.start), derivative_of(begun.flow, self.numbers).series
         self._sample(begun, Z)
+        z, since = begun.z, self._since
+        for start, stop, course in series.pieces(z, Z, whole):
+            piece = segment._replace(time=segment.time + start, duration=stop - start)
+            end, moves = (course.last, course.end), np.zeros(self._P)
+            if stop == whole:
+                end, moves = (before.z, np.vstack([before.M[:, self._k :], course.end[self.dynamics.one :]])), shift
+            self._take(begun._replace(segment=piece, z=z), Z, course, end, (since, moves))
+            z, Z, since = course.last, course.end, moves
         if segment.period < self.first:
             return
-        for swing in (*self.outputs, *self.tilts):
-            swing.passed(segment.period - self.first, series, course, segment.duration, ends)
-        self._integrate(begun, Z, course, end, shift)
         floor = self.dynamics.system.surface == FLOOR
         stands = floor & (segment.state != codes.OPEN) & (segment.state != codes.LEAVING)
         up = np.setdiff1d(np.arange(len(self.lifted.value)), self.dynamics.system.body[stands])
-        self.lifted.value[up] += segment.duration
+        self.lifted.value[up] += whole
         self.lifted.turns[up] += shift - self._since
+
+    def _take(
+        self, begun: Before, Z: np.ndarray, course: Course, end: tuple[np.ndarray, np.ndarray],
+        moves: tuple[np.ndarray, np.ndarray],
+    ) -> None:  # fmt: skip
+        """Take a piece of a segment. end: z (K,), Z (K, P) there; moves: (P,) of its start and end in time."""
+        segment, series = begun.segment, derivative_of(begun.flow, self.numbers).series
+        ends = (begun.z, Z, moves[0]), (*end, moves[1])
+        self.response.passed(segment.period, series, course, segment.duration, ends)
+        if segment.period >= self.first:
+            for swing in (*self.outputs, *self.tilts):
+                swing.passed(segment.period - self.first, series, course, segment.duration, ends)
+            self._integrate(begun, Z, course, end, moves)
 
     def _whole(self, M: np.ndarray, time: float) -> np.ndarray:
         """Return the derivatives (K, P) of z at a time since the start, s."""
@@ -131,8 +145,9 @@ class Measures:
         return Z
 
     def _integrate(
-        self, begun: Before, Z: np.ndarray, course: Course, end: tuple[np.ndarray, np.ndarray], shift: np.ndarray
-    ) -> None:
+        self, begun: Before, Z: np.ndarray, course: Course, end: tuple[np.ndarray, np.ndarray],
+        moves: tuple[np.ndarray, np.ndarray],
+    ) -> None:  # fmt: skip
         segment, flow = begun.segment, begun.flow
         if flow not in self._powers:
             if len(self._powers) > _KEPT:
@@ -143,7 +158,7 @@ class Measures:
         # of the ends only the value counts, times how they move
         weight = np.concatenate([[0.0], course.weight, [0.0]])
         edges = np.zeros((len(weight), self._P))
-        edges[0], edges[-1] = -self._since, shift
+        edges[0], edges[-1] = -moves[0], moves[1]
         for row, product in enumerate([self._square, *self._powers[flow]]):
             value, turns = product.each(z, at)
             each = weight @ value, np.tensordot(weight, turns, 1) + value.T @ edges
@@ -167,10 +182,10 @@ class Measures:
                 swing.integrate(weight, edges, z, at)
         if segment.start == 0.0:
             Z = np.vstack([self._unheld, Z[len(self._unheld) :]])
-        for instant, turned, moves in ((begun.z, Z, self._since), (*end, shift)):
+        for instant, turned, moved in ((begun.z, Z, moves[0]), (*end, moves[1])):
             value, turns = self._momentum.of(instant[None], turned[None])
             drift = self._momentum.rows @ flow.X @ instant
-            self.ends = [*self.ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moves)]
+            self.ends = [*self.ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moved)]
 
     @property
     def omega(self) -> Dual:

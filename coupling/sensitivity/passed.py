@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from vanedamp.coupling.derivatives.derivative import Before
-from vanedamp.coupling.derivatives.series import Course
 from vanedamp.coupling.derivatives.walk import Watch
 from vanedamp.coupling.response.segment import EventRun, Segment
 
@@ -40,11 +39,9 @@ class Passed:
         """Take the start as it is given."""
         self._told.append(lambda watch, moved: watch.begin(moved(unheld)))
 
-    def segment(self, begun: Before, course: Course) -> None:
+    def segment(self, begun: Before, duration: float) -> None:
         """Take the motion until the next event."""
-        self._told.append(lambda watch, moved: watch.segment(
-            begun._replace(M=moved(begun.M)), course._replace(Z=moved(course.Z), end=moved(course.end))
-        ))  # fmt: skip
+        self._told.append(lambda watch, moved: watch.segment(begun._replace(M=moved(begun.M)), duration))
 
     def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end, and what led there."""
