@@ -13,9 +13,6 @@ from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 
-#: overlap relative to the play up to which a contact is closed as a run begins (response.restart)
-_ROUND_OFF = 1e-12
-
 
 @entry
 def run(
@@ -70,7 +67,7 @@ def _is_outside(system, st, columns, k, linked, left):
         gap = system.rest[r]
         for i in range(len(st.q)):
             gap += system.J[r, i] * st.q[i]
-        if gap < -_ROUND_OFF * system.play[r]:
+        if gap < -SIMULTANEOUS * system.play[r]:  # as response.restart
             return True
     return False
 
