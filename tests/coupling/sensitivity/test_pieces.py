@@ -1,5 +1,7 @@
 """Segments whose quick modes need many panels are taken piece by piece: the pieces add up to the whole."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def test_pieces_are_the_course():
         pieces = list(moved.pieces(z, Z, duration))
     assert len(pieces) >= 3
     assert pieces[0][0] == 0.0 and pieces[-1][1] == duration
-    assert all(one[1] == other[0] for one, other in zip(pieces, pieces[1:], strict=False))
+    assert all(one[1] == other[0] for one, other in itertools.pairwise(pieces))
     np.testing.assert_allclose(pieces[-1][2].last, whole.last, rtol=1e-10)
     np.testing.assert_allclose(pieces[-1][2].end, whole.end, rtol=1e-10)
     for power in (1, 2):  # integrals
