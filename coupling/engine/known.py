@@ -28,22 +28,18 @@ class IllConditioned(ArithmeticError):
     """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
-def with_free_place(
-    stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray | None = None
-) -> tuple[Any, int]:
+def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
     A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
-    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again or, by the
-    times (s,) at which its places were last used, gives away the one that has waited longest, as it is.
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM gives away, as it is, the
+    place that has waited longest, by the times (s,) at which places were last used.
     """
     free = np.flatnonzero(filled == 0)
     if len(free):
         return stack, int(free[0])
     size = len(filled)
     if 2 * sum(part.nbytes for part in stack) > ROOM:
-        if used is None:
-            return empty(size), 0
         return stack, int(np.argmin(used))
     larger = empty(2 * size)
     for part, old in zip(larger, stack, strict=True):

@@ -132,16 +132,9 @@ class EventDrivenRun(ABC):
         the loose and the held system, Measured.
         """
         self.job, self.columns, self.statistics, self.chunks = job, columns, statistics, []
-        while True:
-            code = self._advance(0, self.max_events)
-            self._keep_log()
-            if code == NEEDS_FLOW:
-                try:
-                    self._add_flow()
-                except (IllConditioned, np.linalg.LinAlgError):
-                    job.at[CODE] = ILL_CONDITIONED
-            elif code != PAUSED:
-                return code
+        while (code := self.advance(0, self.max_events)) == ILL_CONDITIONED:
+            job.at[CODE] = code  # of one scene, whose subsystem Python has not found
+        return code
 
     def start_in(self, k: int, left: int) -> RestartState:
         """Return the start of scene k in the columns, in the cavities of the scene, by its place, that has left it."""

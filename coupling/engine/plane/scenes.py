@@ -12,6 +12,7 @@ from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
+from vanedamp.coupling.system.unit_kinematics import gap, is_compliant
 
 
 @entry
@@ -61,13 +62,9 @@ def _is_outside(system, st, columns, k, linked, left):
     if linked and k > 0 and left == 0:
         return True
     for r in range(system.contacts):
-        yields = system.spring[r] < math.inf
-        if linked and (k == 0 or (yields and columns.play[k, r] == columns.play[left - 1, r])):
+        if linked and (k == 0 or (is_compliant(system, r) and columns.play[k, r] == columns.play[left - 1, r])):
             continue
-        gap = system.rest[r]
-        for i in range(len(st.q)):
-            gap += system.J[r, i] * st.q[i]
-        if gap < -SIMULTANEOUS * system.play[r]:  # as response.restart
+        if gap(system, r, st.q) < -SIMULTANEOUS * system.play[r]:  # as response.restart
             return True
     return False
 
@@ -107,7 +104,7 @@ def _relative(carrier, st, x):
     return place, rate
 
 
-@kernel
+@strict
 def _damper(system, j):
     """Return the number of the friction damper that is Jenkins element j."""
     return system.body[len(system.body) - len(system.tangential) + j]
@@ -140,16 +137,15 @@ def _set_start(system, st, watched, columns, k):
         stretch = 0.0
         for i in range(size - sliders):
             stretch += system.elongation[j, i] * st.q[i]
-        at = system.body[len(system.body) - sliders + j]
-        st.q[size - sliders + j] = stretch - columns.elongation[k, at]
+        st.q[size - sliders + j] = stretch - columns.elongation[k, _damper(system, j)]
     for r in range(len(st.state)):
-        gap, speed = system.rest[r], 0.0
+        shift, speed = system.rest[r], 0.0
         for i in range(size):
-            gap += system.J[r, i] * st.q[i]
+            shift += system.J[r, i] * st.q[i]
             speed += system.J[r, i] * st.v[i]
         st.state[r] = OPEN
-        if system.spring[r] < math.inf and gap < -SIMULTANEOUS * system.play[r]:
-            pushes = system.spring[r] * gap + system.dashpot[r] * speed < 0.0
+        if system.spring[r] < math.inf and shift < -SIMULTANEOUS * system.play[r]:
+            pushes = system.spring[r] * shift + system.dashpot[r] * speed < 0.0
             st.state[r] = SLIP_RIGHT if pushes else LEAVING
 
 
